@@ -1,0 +1,47 @@
+"""Tensor mathematics of constitutive laws: basis, invariants, candidate terms, libraries."""
+
+from tensor_library.algebra import (
+    anticommutator,
+    from_shear,
+    identity_like,
+    inner,
+    square,
+    to_shear,
+    trace,
+)
+from tensor_library.conventions import SHEAR_COMPONENTS
+from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
+from tensor_library.invariants import INVARIANT_NAMES, scalar_invariants
+from tensor_library.kinematics import (
+    planar_extension,
+    rate_of_deformation,
+    simple_shear,
+    uniaxial_extension,
+    upper_convected_production,
+)
+from tensor_library.library import TermLibrary, build_library
+from tensor_library.terms import CandidateTerm, parse_term
+
+__all__ = [
+    "INVARIANT_NAMES",
+    "SHEAR_COMPONENTS",
+    "TENSOR_NAMES",
+    "CandidateTerm",
+    "TermLibrary",
+    "anticommutator",
+    "build_library",
+    "from_shear",
+    "identity_like",
+    "inner",
+    "integrity_basis",
+    "parse_term",
+    "planar_extension",
+    "rate_of_deformation",
+    "scalar_invariants",
+    "simple_shear",
+    "square",
+    "to_shear",
+    "trace",
+    "uniaxial_extension",
+    "upper_convected_production",
+]

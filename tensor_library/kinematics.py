@@ -1,0 +1,53 @@
+"""Kinematics of homogeneous flows."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tensor_library.algebra import Symmetric
+
+VelocityGradient = Float[Array, "3 3"] | Float[Array, ""]
+
+
+def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of v₁ = γ̇ x₂."""
+    return jnp.zeros((3, 3), dtype=jnp.result_type(shear_rate, float)).at[0, 1].set(shear_rate)
+
+
+def uniaxial_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of uniaxial extension along x₁ at constant volume."""
+    return extension_rate * jnp.diag(jnp.array([1.0, -0.5, -0.5]))
+
+
+def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of planar extension in the x₁ x₂ plane."""
+    return extension_rate * jnp.diag(jnp.array([1.0, -1.0, 0.0]))
+
+
+def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
+    """Return γ̇ = L + Lᵀ.
+
+    Parameters
+    ----------
+    velocity_gradient
+        L, shape (3, 3), or the scalar shear rate of simple shear.
+    """
+    velocity_gradient = jnp.asarray(velocity_gradient)
+    if velocity_gradient.shape == ():
+        zero = jnp.zeros_like(velocity_gradient)
+        return jnp.stack([zero, zero, zero, velocity_gradient])
+    return velocity_gradient + velocity_gradient.T
+
+
+def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
+    """Return L·σ + σ·Lᵀ, the change of stress in a flow that carries the material lines along.
+
+    This is what the upper convected derivative subtracts from dσ/dt   [Oldroyd 1950].
+    """
+    velocity_gradient = jnp.asarray(velocity_gradient)
+    if velocity_gradient.shape == ():
+        zero = jnp.zeros_like(stress[0])
+        return jnp.stack(
+            [2.0 * velocity_gradient * stress[3], zero, zero, velocity_gradient * stress[1]]
+        )
+    product = velocity_gradient @ stress
+    return product + product.T

@@ -1,0 +1,220 @@
+"""Libraries of candidate terms, built from a short description."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from tensor_library.algebra import Symmetric
+from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
+from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
+from tensor_library.invariants import (
+    IDENTICALLY_ZERO_IN_SHEAR,
+    INVARIANT_NAMES,
+    scalar_invariants,
+)
+from tensor_library.terms import CandidateTerm
+
+N_INVARIANTS = len(INVARIANT_NAMES)
+
+
+@dataclass(frozen=True)
+class TermLibrary:
+    """An ordered set of candidate terms, evaluated together.
+
+    Hashable, so that it can be a static field of a JAX module.
+
+    Attributes
+    ----------
+    terms
+        The candidate terms, without repetition.
+    """
+
+    terms: tuple[CandidateTerm, ...]
+
+    def __post_init__(self):
+        if not self.terms:
+            raise ValueError("A library needs at least one term; got none.")
+        if len(set(self.terms)) != len(self.terms):
+            raise ValueError("A library must not hold a term twice.")
+
+    def __len__(self) -> int:
+        return len(self.terms)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self.terms)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Canonical spelling of each term."""
+        return tuple(term.name for term in self.terms)
+
+    @cached_property
+    def complexities(self) -> tuple[int, ...]:
+        """Complexity of each term."""
+        return tuple(term.complexity for term in self.terms)
+
+    @cached_property
+    def forms(self) -> tuple[ClosedForm, ...]:
+        """Closed forms that occur, in the order of their inner parameters."""
+        used = {term.closed_form for term in self.terms}
+        return tuple(form for name, form in CLOSED_FORMS.items() if name in used)
+
+    @property
+    def inner_names(self) -> tuple[str, ...]:
+        """Names of the inner parameters that `evaluate` takes."""
+        return tuple(form.inner_name for form in self.forms)
+
+    @property
+    def inner_default(self) -> Float[np.ndarray, " m"]:
+        """Values from which a fit of the inner parameters starts."""
+        return np.array([form.inner_default for form in self.forms], dtype=float)
+
+    @property
+    def inner_bounds(self) -> tuple[tuple[float, float], ...]:
+        """Admissible range of each inner parameter."""
+        return tuple(form.inner_bounds for form in self.forms)
+
+    def subset(self, indices: Iterable[int]) -> "TermLibrary":
+        """Return the library of some of the terms, in the order given."""
+        return TermLibrary(tuple(self.terms[int(i)] for i in indices))
+
+    @cached_property
+    def _layout(self):
+        """Index arrays that turn many small products into a few gathers.
+
+        The monomials of degree d are products of one of degree d − 1 and one invariant, so one
+        gather and one product per degree serve any number of terms.
+        """
+        monomials: list[tuple[int, ...]] = [(0,) * N_INVARIANTS]
+        position = {monomials[0]: 0}
+
+        def place(powers: tuple[int, ...]) -> int:
+            if powers not in position:
+                last = max(i for i, p in enumerate(powers) if p)
+                place(tuple(p - (i == last) for i, p in enumerate(powers)))
+                position[powers] = len(monomials)
+                monomials.append(powers)
+            return position[powers]
+
+        for term in self.terms:
+            place(term.powers)
+        order = sorted(range(len(monomials)), key=lambda i: sum(monomials[i]))
+        ranked = [monomials[i] for i in order]
+        rank = {powers: i for i, powers in enumerate(ranked)}
+        levels = []
+        for degree in range(1, max(sum(p) for p in ranked) + 1):
+            parents, factors = [], []
+            for powers in (p for p in ranked if sum(p) == degree):
+                last = max(i for i, p in enumerate(powers) if p)
+                parents.append(rank[tuple(p - (i == last) for i, p in enumerate(powers))])
+                factors.append(last)
+            levels.append((np.array(parents), np.array(factors)))
+        form_position = {form.name: 1 + i for i, form in enumerate(self.forms)}
+        return (
+            levels,
+            np.array([rank[term.powers] for term in self.terms]),
+            np.array([form_position.get(term.closed_form or "", 0) for term in self.terms]),
+            np.array([term.tensor for term in self.terms]),
+        )
+
+    def evaluate(
+        self, stress: Symmetric, rate: Symmetric, inner: Float[Array, " m"] | None = None
+    ) -> Float[Array, "n 3 3"] | Float[Array, "n 4"]:
+        """Return the value of every term at one state.
+
+        Parameters
+        ----------
+        stress, rate
+            Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
+        inner
+            Inner parameters in the order of `inner_names`; their defaults if None.
+
+        Returns
+        -------
+        Shape (n, 3, 3) or (n, 4).
+        """
+        levels, monomial_of_term, form_of_term, tensor_of_term = self._layout
+        invariants = scalar_invariants(stress, rate)
+        monomials = jnp.ones((1,), dtype=invariants.dtype)
+        for parents, factors in levels:
+            monomials = jnp.concatenate([monomials, monomials[parents] * invariants[factors]])
+        scalar = monomials[monomial_of_term]
+        if self.forms:
+            inner = jnp.asarray(self.inner_default if inner is None else inner)
+            values = [
+                form.function(invariants[0], inner[i]).astype(invariants.dtype)
+                for i, form in enumerate(self.forms)
+            ]
+            scalar = scalar * jnp.stack([jnp.ones((), invariants.dtype), *values])[form_of_term]
+        basis = integrity_basis(stress, rate)[tensor_of_term]
+        return scalar.reshape((-1,) + (1,) * stress.ndim) * basis
+
+
+def build_library(
+    tensors: Sequence[str] = TENSOR_NAMES,
+    degree: int = 0,
+    closed_forms: Sequence[str] = (),
+    invariants: Sequence[str] | None = None,
+    closed_form_tensors: Sequence[str] = ("sigma",),
+) -> TermLibrary:
+    """Return the library of tensors × invariant monomials up to a degree, plus closed forms.
+
+    Parameters
+    ----------
+    tensors
+        Canonical names from `TENSOR_NAMES`.
+    degree
+        Highest total degree of the invariant multipliers, 0 to 4.
+    closed_forms
+        Keys of `CLOSED_FORMS`, each multiplied with every tensor of `closed_form_tensors`.
+    invariants
+        Canonical names from `INVARIANT_NAMES`; by default all that can differ from zero in
+        simple shear (tr γ̇³ vanishes there, and no shear experiment can see it).
+    closed_form_tensors
+        Tensors that the closed forms multiply.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or the degree is outside 0 to 4.
+    """
+    if not 0 <= degree <= 4:
+        raise ValueError(f"degree must be 0 to 4; got {degree}. Higher degrees are not separable.")
+    if invariants is None:
+        invariants = [
+            name for i, name in enumerate(INVARIANT_NAMES) if i not in IDENTICALLY_ZERO_IN_SHEAR
+        ]
+    for given, known, what in (
+        (tensors, TENSOR_NAMES, "tensor"),
+        (closed_form_tensors, TENSOR_NAMES, "tensor"),
+        (invariants, INVARIANT_NAMES, "invariant"),
+        (closed_forms, tuple(CLOSED_FORMS), "closed form"),
+    ):
+        unknown = [name for name in given if name not in known]
+        if unknown:
+            raise ValueError(f"Unknown {what} {unknown[0]!r}; known are {', '.join(known)}.")
+    positions = [INVARIANT_NAMES.index(name) for name in invariants]
+    monomials = []
+    for d in range(degree + 1):
+        for chosen in combinations_with_replacement(positions, d):
+            monomials.append(tuple(chosen.count(i) for i in range(N_INVARIANTS)))
+    terms = [
+        CandidateTerm(TENSOR_NAMES.index(tensor), powers)
+        for powers in monomials
+        for tensor in tensors
+    ]
+    terms += [
+        CandidateTerm(TENSOR_NAMES.index(tensor), closed_form=form)
+        for form in closed_forms
+        for tensor in closed_form_tensors
+    ]
+    return TermLibrary(tuple(dict.fromkeys(terms)))

@@ -1,0 +1,151 @@
+"""A candidate term: tensor × invariant multipliers × closed-form scalar."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from jaxtyping import Array, Float
+
+from tensor_library.algebra import Symmetric
+from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
+from tensor_library.integrity_basis import TENSOR_NAMES, TENSOR_ORDERS, integrity_basis
+from tensor_library.invariants import INVARIANT_NAMES, INVARIANT_ORDERS, scalar_invariants
+
+if TYPE_CHECKING:
+    import sympy
+
+_NO_POWERS = (0,) * len(INVARIANT_NAMES)
+
+
+@dataclass(frozen=True)
+class CandidateTerm:
+    """One term that a constitutive law may hold.
+
+    Attributes
+    ----------
+    tensor
+        Index into `TENSOR_NAMES`.
+    powers
+        Exponent of each invariant of `INVARIANT_NAMES`.
+    closed_form
+        Key of `CLOSED_FORMS`, or None.
+    """
+
+    tensor: int
+    powers: tuple[int, ...] = _NO_POWERS
+    closed_form: str | None = None
+
+    def __post_init__(self):
+        if not 0 <= self.tensor < len(TENSOR_NAMES):
+            raise ValueError(f"tensor must be 0 to {len(TENSOR_NAMES) - 1}; got {self.tensor}.")
+        if len(self.powers) != len(INVARIANT_NAMES) or min(self.powers) < 0:
+            raise ValueError(
+                f"powers must be {len(INVARIANT_NAMES)} non-negative integers; got {self.powers}."
+            )
+        if self.closed_form is not None and self.closed_form not in CLOSED_FORMS:
+            raise ValueError(
+                f"Unknown closed form {self.closed_form!r}; known are {', '.join(CLOSED_FORMS)}."
+            )
+
+    @property
+    def form(self) -> ClosedForm | None:
+        """The closed form itself, or None."""
+        return None if self.closed_form is None else CLOSED_FORMS[self.closed_form]
+
+    @property
+    def degree(self) -> int:
+        """Total degree in the invariants."""
+        return sum(self.powers)
+
+    @property
+    def name(self) -> str:
+        """Canonical spelling, multipliers first: ``tr(sigma)*sigma``."""
+        factors = [] if self.form is None else [self.form.spelling]
+        for invariant, power in zip(INVARIANT_NAMES, self.powers, strict=True):
+            if power:
+                factors.append(invariant if power == 1 else f"{invariant}^{power}")
+        tensor = TENSOR_NAMES[self.tensor]
+        if factors and "+" in tensor:
+            tensor = f"({tensor})"
+        return "*".join([*factors, tensor])
+
+    @property
+    def complexity(self) -> int:
+        """Number of tensors multiplied, plus the cost of the closed form."""
+        invariants = sum(p * o for p, o in zip(self.powers, INVARIANT_ORDERS, strict=True))
+        form = 0 if self.form is None else self.form.complexity
+        return 1 + TENSOR_ORDERS[self.tensor] + invariants + form
+
+    @property
+    def inner_names(self) -> tuple[str, ...]:
+        """Names of the inner parameters, none or one."""
+        return () if self.form is None else (self.form.inner_name,)
+
+    def evaluate(
+        self, stress: Symmetric, rate: Symmetric, inner: Mapping[str, Float[Array, ""]] | None = None
+    ) -> Symmetric:
+        """Return the value of the term at one state.
+
+        Parameters
+        ----------
+        stress, rate
+            Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
+        inner
+            Inner parameters by name; the form's default where one is missing.
+        """
+        invariants = scalar_invariants(stress, rate)
+        value = integrity_basis(stress, rate)[self.tensor]
+        for index, power in enumerate(self.powers):
+            if power:
+                value = invariants[index] ** power * value
+        if self.form is not None:
+            parameter = (inner or {}).get(self.form.inner_name, self.form.inner_default)
+            value = self.form.function(invariants[0], parameter) * value
+        return value
+
+    def sympy(self) -> "sympy.Expr":
+        """Return the term as a SymPy expression with non-commuting tensors."""
+        from tensor_library.symbolic import term_expression
+
+        return term_expression(self)
+
+    def latex(self) -> str:
+        """Return the term as LaTeX."""
+        from tensor_library.symbolic import to_latex
+
+        return to_latex(self.sympy())
+
+
+def parse_term(name: str) -> CandidateTerm:
+    """Return the term with this canonical spelling.
+
+    Parameters
+    ----------
+    name
+        Such as ``sigma``, ``tr(sigma)*sigma`` or ``(exp(epsilon*tr(sigma))-1)*sigma``.
+
+    Raises
+    ------
+    ValueError
+        If the text is not a canonical spelling. The text is matched, never evaluated.
+    """
+    rest = name.replace(" ", "")
+    closed_form = None
+    for key, form in CLOSED_FORMS.items():
+        if rest.startswith(form.spelling + "*"):
+            closed_form, rest = key, rest[len(form.spelling) + 1 :]
+    powers = list(_NO_POWERS)
+    while match := re.match(r"(tr\([a-z.]+\))(?:\^(\d{1,2}))?\*", rest):
+        if match[1] not in INVARIANT_NAMES:
+            break
+        powers[INVARIANT_NAMES.index(match[1])] += int(match[2] or 1)
+        rest = rest[match.end() :]
+    tensor = rest[1:-1] if rest.startswith("(") and rest.endswith(")") else rest
+    if tensor not in TENSOR_NAMES:
+        raise ValueError(
+            f"Cannot read the term {name!r}: {tensor!r} is not one of the tensors "
+            f"{', '.join(TENSOR_NAMES)}. Write invariant multipliers first, such as "
+            "'tr(sigma)*sigma'."
+        )
+    return CandidateTerm(TENSOR_NAMES.index(tensor), tuple(powers), closed_form)
