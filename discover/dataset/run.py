@@ -1,0 +1,183 @@
+"""Runs and data sets as the rest of the software sees them: SI units, checked."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.protocols.shear import ShearProtocol
+
+
+@dataclass(frozen=True)
+class ShearRun:
+    """One experiment in simple shear.
+
+    Attributes
+    ----------
+    name
+        File name, or name of the protocol.
+    time
+        Sampling times in s, shape (n,), increasing, from the start of the flow at 0.
+    protocol
+        The shear rate as a function of time, commanded or measured.
+    shear_rate
+        Shear rate at the sampling times, in 1/s, shape (n,).
+    shear_stress
+        σ12 in Pa, shape (n,).
+    first_normal_stress_difference, second_normal_stress_difference
+        N1 and N2 in Pa, shape (n,), where measured.
+    strain
+        Strain at the sampling times, where recorded; computed from the rate otherwise.
+    clock_factor
+        Time on the instrument's clock is ``time / clock_factor``; differs from one for data that
+        were shifted to another temperature.
+    metadata
+        What else the source says of the run.
+    """
+
+    name: str
+    time: Float[np.ndarray, " n"]
+    protocol: ShearProtocol
+    shear_rate: Float[np.ndarray, " n"]
+    shear_stress: Float[np.ndarray, " n"]
+    first_normal_stress_difference: Float[np.ndarray, " n"] | None = None
+    second_normal_stress_difference: Float[np.ndarray, " n"] | None = None
+    strain: Float[np.ndarray, " n"] | None = None
+    clock_factor: float = 1.0
+    metadata: Mapping[str, float | str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        n = self.time.shape[0] if self.time.ndim == 1 else 0
+        if n == 0:
+            raise InputError(f"The run {self.name!r} has no samples; give at least one.")
+        for label, values in (
+            ("time", self.time),
+            ("shear_rate", self.shear_rate),
+            ("shear_stress", self.shear_stress),
+            ("first_normal_stress_difference", self.first_normal_stress_difference),
+            ("second_normal_stress_difference", self.second_normal_stress_difference),
+            ("strain", self.strain),
+        ):
+            if values is None:
+                continue
+            if values.shape != (n,):
+                raise InputError(
+                    f"{label} of the run {self.name!r} must have shape ({n},) like its time; got "
+                    f"{values.shape}."
+                )
+            if not np.all(np.isfinite(values)):
+                row = int(np.argmin(np.isfinite(values)))
+                raise InputError(
+                    f"{label} of the run {self.name!r} must be finite; sample {row} holds "
+                    f"{values[row]}. Remove that sample."
+                )
+        if self.time[0] < 0 or np.any(np.diff(self.time) <= 0):
+            raise InputError(
+                f"time of the run {self.name!r} must start at or after 0 and increase strictly. "
+                "Sort the samples and remove repeated times."
+            )
+        if not self.clock_factor > 0:
+            raise InputError(
+                f"The clock factor of the run {self.name!r} must be positive; got "
+                f"{self.clock_factor}."
+            )
+
+    def __len__(self) -> int:
+        return self.time.shape[0]
+
+    def window(self, keep: np.ndarray) -> "ShearRun":
+        """Return the run with only the samples where the boolean array `keep` holds.
+
+        The flow's history is unchanged: it is the protocol's, from t = 0.
+        """
+
+        def cut(values):
+            return None if values is None else values[keep]
+
+        return replace(
+            self,
+            time=self.time[keep],
+            shear_rate=self.shear_rate[keep],
+            shear_stress=self.shear_stress[keep],
+            first_normal_stress_difference=cut(self.first_normal_stress_difference),
+            second_normal_stress_difference=cut(self.second_normal_stress_difference),
+            strain=cut(self.strain),
+        )
+
+
+@dataclass(frozen=True)
+class LinearSweep:
+    """Small-amplitude oscillatory shear: G′ and G″ against frequency.
+
+    Attributes
+    ----------
+    angular_frequency
+        In rad/s, shape (n,), increasing.
+    storage_modulus, loss_modulus
+        In Pa, shape (n,).
+    """
+
+    angular_frequency: Float[np.ndarray, " n"]
+    storage_modulus: Float[np.ndarray, " n"]
+    loss_modulus: Float[np.ndarray, " n"]
+
+
+@dataclass(frozen=True)
+class ShearDataset:
+    """Runs on one fluid.
+
+    Attributes
+    ----------
+    name
+        Name of the folder, or of the synthetic study.
+    runs
+        The runs.
+    linear_sweep
+        Small-amplitude data on the same fluid, where there are any.
+    provenance
+        Where the data come from, in words.
+    """
+
+    name: str
+    runs: tuple[ShearRun, ...]
+    linear_sweep: LinearSweep | None = None
+    provenance: str = ""
+
+    def __post_init__(self):
+        names = [run.name for run in self.runs]
+        repeated = {name for name in names if names.count(name) > 1}
+        if repeated:
+            raise InputError(
+                f"The data set {self.name!r} holds the run {sorted(repeated)[0]!r} twice."
+            )
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __iter__(self) -> Iterator[ShearRun]:
+        return iter(self.runs)
+
+    def __getitem__(self, name: str) -> ShearRun:
+        for run in self.runs:
+            if run.name == name:
+                return run
+        raise InputError(
+            f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.name for run in self.runs)
+
+    def select(self, names: Sequence[str]) -> "ShearDataset":
+        """Return the data set of the named runs, in the order given.
+
+        Raises
+        ------
+        InputError
+            If a run does not exist.
+        """
+        return replace(self, runs=tuple(self[name] for name in names))

@@ -1,0 +1,28 @@
+"""Constitutive laws behind one interface."""
+
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.fene_p import FenePeterlin
+from discover.laws.giesekus import Giesekus
+from discover.laws.johnson_segalman import JohnsonSegalman
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.multimode import Fluid
+from discover.laws.phan_thien_tanner import ExponentialPhanThienTanner, LinearPhanThienTanner
+from discover.laws.registry import LAWS, NamedLaw, make_law
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+
+__all__ = [
+    "LAWS",
+    "AbstractConstitutiveLaw",
+    "ExponentialPhanThienTanner",
+    "FenePeterlin",
+    "Fluid",
+    "Giesekus",
+    "JohnsonSegalman",
+    "LibraryExpansion",
+    "LinearPhanThienTanner",
+    "NamedLaw",
+    "TensorBasisNetwork",
+    "UpperConvectedMaxwell",
+    "make_law",
+]

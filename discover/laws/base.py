@@ -1,0 +1,55 @@
+"""The interface of every constitutive law."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from tensor_library.algebra import Symmetric
+from tensor_library.kinematics import (
+    VelocityGradient,
+    rate_of_deformation,
+    upper_convected_production,
+)
+
+
+class AbstractConstitutiveLaw(eqx.Module):
+    """A Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), dimensionless.
+
+    Time is scaled by the relaxation time and stress by the modulus. A law says only its extra
+    term h; truth, learned laws and augmented laws all come in this form.
+
+    Attributes
+    ----------
+    linear_relaxation
+        Whether the −σ is part of the known law. False where it too is left to a learner.
+    """
+
+    linear_relaxation: eqx.AbstractVar[bool]
+
+    @abstractmethod
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ, γ̇), in the storage of `stress`."""
+
+    def stress_rate(self, stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
+        """Return dσ/dt.
+
+        Parameters
+        ----------
+        stress
+            Dimensionless extra stress, (3, 3), or (4,) in simple shear.
+        velocity_gradient
+            Dimensionless L, (3, 3), or the scalar shear rate in simple shear.
+        """
+        rate = rate_of_deformation(velocity_gradient)
+        change = rate + upper_convected_production(stress, velocity_gradient)
+        if self.linear_relaxation:
+            change = change - stress
+        return change - self.extra_term(stress, rate)
+
+
+def as_parameter(value: float | Float[Array, ""]) -> Float[Array, ""]:
+    """Return a law's parameter as an array, so that gradients and `vmap` reach it."""
+    import jax.numpy as jnp
+
+    return jnp.asarray(value, dtype=jnp.result_type(float))

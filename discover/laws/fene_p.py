@@ -1,0 +1,33 @@
+"""FENE-P law in stress form."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from tensor_library.algebra import Symmetric, identity_like, inner, trace
+
+
+class FenePeterlin(AbstractConstitutiveLaw):
+    """FENE-P law   [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
+
+    With the conformation A at equilibrium I, σ = f A − I and f = (L² − 3)/(L² − tr A). Eliminating
+    A gives f = 1 + tr(σ)/L² and, with the upper convected derivative of A equal to −σ,
+
+        h = (f − 1) σ − (ḟ/f)(σ + I),    ḟ = (tr(σ·γ̇) − f tr σ)/(L² − tr A),
+
+    so that the law is one of Maxwell type whose extra term depends on the rate. L² → ∞ is UCM.
+    """
+
+    maximum_extension_squared: Float[Array, ""] = eqx.field(converter=as_parameter)  # L², over 3
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ, γ̇) as above."""
+        limit = self.maximum_extension_squared
+        trace_of_stress = trace(stress)
+        factor = 1.0 + trace_of_stress / limit
+        trace_of_conformation = (trace_of_stress + 3.0) / factor
+        factor_rate = (inner(stress, rate) - factor * trace_of_stress) / (
+            limit - trace_of_conformation
+        )
+        return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))

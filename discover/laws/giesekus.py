@@ -1,0 +1,19 @@
+"""Giesekus law."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from tensor_library.algebra import Symmetric, square
+
+
+class Giesekus(AbstractConstitutiveLaw):
+    """Giesekus law: h = α σ·σ   [Giesekus 1982, JNNFM 11, 69]."""
+
+    mobility: Float[Array, ""] = eqx.field(converter=as_parameter)  # α, 0 to 1
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = α σ·σ."""
+        del rate  # this law has no explicit rate dependence
+        return self.mobility * square(stress)

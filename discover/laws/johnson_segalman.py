@@ -1,0 +1,18 @@
+"""Johnson–Segalman law."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from tensor_library.algebra import Symmetric, anticommutator
+
+
+class JohnsonSegalman(AbstractConstitutiveLaw):
+    """Johnson–Segalman law: h = (ξ/2)(σ·γ̇ + γ̇·σ)   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    slip_parameter: Float[Array, ""] = eqx.field(converter=as_parameter)  # ξ, 0 to 2
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
+        return 0.5 * self.slip_parameter * anticommutator(stress, rate)

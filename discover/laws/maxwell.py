@@ -1,0 +1,18 @@
+"""Upper convected Maxwell law."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from discover.laws.base import AbstractConstitutiveLaw
+from tensor_library.algebra import Symmetric
+
+
+class UpperConvectedMaxwell(AbstractConstitutiveLaw):
+    """Upper convected Maxwell law: h = 0   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
+
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = 0."""
+        del rate
+        return jnp.zeros_like(stress)

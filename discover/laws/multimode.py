@@ -1,0 +1,77 @@
+"""A fluid: one law in each of several relaxation modes, with units."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+
+
+def _as_modes(value: float | Sequence[float] | Float[Array, " k"]) -> Float[Array, " k"]:
+    return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
+
+
+class Fluid(eqx.Module):
+    """Sum of modes that share one dimensionless law, plus a Newtonian solvent.
+
+    Mode k obeys the law in its own scaled stress and rate: with s = σ_k/G_k,
+    λ_k ds/dt = γ̇λ_k + ... − s − h(s, γ̇λ_k), and σ = Σ G_k s_k + η_s γ̇.
+
+    Attributes
+    ----------
+    law
+        The dimensionless law.
+    modulus
+        G_k, shape (k,), in Pa.
+    relaxation_time
+        λ_k, shape (k,), in s.
+    solvent_viscosity
+        η_s, in Pa s.
+    """
+
+    law: AbstractConstitutiveLaw
+    modulus: Float[Array, " k"] = eqx.field(converter=_as_modes)
+    relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes)
+    solvent_viscosity: Float[Array, ""] = eqx.field(converter=as_parameter, default=0.0)
+
+    @classmethod
+    def dimensionless(cls, law: AbstractConstitutiveLaw) -> "Fluid":
+        """Return the single mode with unit modulus and unit relaxation time."""
+        return cls(law, 1.0, 1.0)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of relaxation modes."""
+        return self.relaxation_time.shape[0]
+
+    def rest(self) -> Float[Array, "k 4"]:
+        """Return the state at rest."""
+        return jnp.zeros((self.n_modes, 4))
+
+    def decay_rate(self) -> Float[Array, " k"]:
+        """Return the rate of linear relaxation of each mode, in 1/s."""
+        rate = 1.0 / self.relaxation_time
+        return rate if self.law.linear_relaxation else jnp.zeros_like(rate)
+
+    def state_rate(
+        self, state: Float[Array, "k 4"], shear_rate: Float[Array, ""]
+    ) -> Float[Array, "k 4"]:
+        """Return d(state)/dt in simple shear, in 1/s.
+
+        Parameters
+        ----------
+        state
+            σ_k/G_k in the four shear components.
+        shear_rate
+            γ̇ in 1/s.
+        """
+        scaled = jax.vmap(self.law.stress_rate)(state, self.relaxation_time * shear_rate)
+        return scaled / self.relaxation_time[:, None]
+
+    def stress(self, state: Float[Array, "k 4"], shear_rate: Float[Array, ""]) -> Float[Array, "4"]:
+        """Return the total extra stress (11, 22, 33, 12) in Pa."""
+        polymer = jnp.tensordot(self.modulus, state, axes=1)
+        return polymer.at[3].add(self.solvent_viscosity * shear_rate)

@@ -1,0 +1,32 @@
+"""Linear and exponential Phan-Thien–Tanner laws, affine (ξ = 0)."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from tensor_library.algebra import Symmetric, trace
+
+
+class LinearPhanThienTanner(AbstractConstitutiveLaw):
+    """Linear PTT law: h = ε tr(σ) σ   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
+
+    extensibility: Float[Array, ""] = eqx.field(converter=as_parameter)  # ε
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = ε tr(σ) σ."""
+        del rate
+        return self.extensibility * trace(stress) * stress
+
+
+class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
+    """Exponential PTT law: h = (exp(ε tr σ) − 1) σ   [Phan-Thien 1978, J. Rheol. 22, 259]."""
+
+    extensibility: Float[Array, ""] = eqx.field(converter=as_parameter)  # ε
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = (exp(ε tr σ) − 1) σ."""
+        del rate
+        return jnp.expm1(self.extensibility * trace(stress)) * stress

@@ -1,0 +1,69 @@
+"""What a learner hands on: the same kind of result from both."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.laws.base import AbstractConstitutiveLaw
+
+
+@dataclass(frozen=True)
+class RecoveredTerm:
+    """One term of a recovered law.
+
+    Attributes
+    ----------
+    term
+        Canonical spelling.
+    coefficient
+        Refitted without penalty (debiased).
+    coefficient_penalised
+        From the penalised or thresholded problem that selected it, or None where there was none.
+    ci95
+        95 % interval of `coefficient`, or None where not computed.
+    inner
+        Inner parameters by name.
+    latex
+        The term as LaTeX, without its coefficient.
+    """
+
+    term: str
+    coefficient: float
+    coefficient_penalised: float | None = None
+    ci95: tuple[float, float] | None = None
+    inner: Mapping[str, float] = field(default_factory=dict)
+    latex: str = ""
+
+
+@dataclass(frozen=True)
+class LearnerResult:
+    """A learned law and how it was learned.
+
+    Attributes
+    ----------
+    learner
+        Name of the learner.
+    law
+        The law, dimensionless, ready to simulate.
+    terms
+        The law, or its projection on a library, term by term.
+    train_seconds
+        Wall-clock time of `fit`.
+    loss_history
+        Iterations and losses, both of shape (m,).
+    details
+        What else this learner can say; JSON-able.
+    message
+        One sentence on how the fit ended.
+    """
+
+    learner: str
+    law: AbstractConstitutiveLaw
+    terms: tuple[RecoveredTerm, ...]
+    train_seconds: float
+    loss_history: tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    details: Mapping[str, Any] = field(default_factory=dict)
+    message: str = ""

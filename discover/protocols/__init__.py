@@ -1,0 +1,22 @@
+"""Shear protocols."""
+
+from discover.protocols.paper import paper_test_protocols, paper_training_protocols
+from discover.protocols.shear import (
+    ShearProtocol,
+    measured_rate,
+    oscillatory_shear,
+    stack_protocols,
+    start_up,
+    step_rates,
+)
+
+__all__ = [
+    "ShearProtocol",
+    "measured_rate",
+    "oscillatory_shear",
+    "paper_test_protocols",
+    "paper_training_protocols",
+    "stack_protocols",
+    "start_up",
+    "step_rates",
+]

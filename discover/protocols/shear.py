@@ -1,0 +1,178 @@
+"""Shear protocols: what the rheometer was told to do."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.errors import InputError
+
+
+class ShearProtocol(eqx.Module):
+    """Shear rate as a function of time: a piecewise-linear table plus a sum of cosines.
+
+    One class holds every protocol, so that runs of different kinds stack into one batch and
+    superposed flows need nothing new. A jump is two table entries at the same time.
+
+    Attributes
+    ----------
+    table_times, table_rates
+        Table of shear rate against time, in s and 1/s, shape (m,); held at its end values.
+    amplitudes, frequencies, phases
+        Cosine terms a cos(ω t + φ), shape (c,), in 1/s, rad/s and rad.
+    """
+
+    table_times: Float[Array, " m"]
+    table_rates: Float[Array, " m"]
+    amplitudes: Float[Array, " c"]
+    frequencies: Float[Array, " c"]
+    phases: Float[Array, " c"]
+
+    def shear_rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
+        """Return γ̇(t) in 1/s; at a jump, the value after it."""
+        time = jnp.asarray(time)
+        table = _interpolate(time, self.table_times, self.table_rates)
+        waves = self.amplitudes * jnp.cos(self.frequencies * time + self.phases)
+        return table + jnp.sum(waves)
+
+    def strain(self, time: Float[Array, ""]) -> Float[Array, ""]:
+        """Return the strain since t = 0, exactly integrated."""
+        times, rates = self.table_times, self.table_rates
+        # Integral of the table from its first entry, at each entry
+        areas = 0.5 * (rates[1:] + rates[:-1]) * jnp.diff(times)
+        cumulative = jnp.concatenate([jnp.zeros(1), jnp.cumsum(areas)])
+
+        def area(t):
+            i = jnp.clip(jnp.searchsorted(times, t, side="right") - 1, 0, times.shape[0] - 1)
+            before = jnp.minimum(t - times[0], 0.0) * rates[0]
+            inside = jnp.maximum(t - times[i], 0.0)
+            return cumulative[i] + before + 0.5 * inside * (
+                rates[i] + _interpolate(t, times, rates)
+            )
+
+        def wave(t):
+            slow = self.frequencies == 0.0
+            frequency = jnp.where(slow, 1.0, self.frequencies)
+            oscillating = jnp.sin(self.frequencies * t + self.phases) / frequency
+            return jnp.sum(
+                self.amplitudes * jnp.where(slow, t * jnp.cos(self.phases), oscillating)
+            )
+
+        zero = jnp.zeros_like(time)
+        return area(time) - area(zero) + wave(time) - wave(zero)
+
+
+def _interpolate(
+    time: Float[Array, ""], times: Float[Array, " m"], values: Float[Array, " m"]
+) -> Float[Array, ""]:
+    # jnp.interp leaves the value at a repeated abscissa (a jump) undefined
+    if times.shape[0] == 1:
+        return values[0]
+    left = jnp.clip(jnp.searchsorted(times, time, side="right") - 1, 0, times.shape[0] - 2)
+    width = times[left + 1] - times[left]
+    jump = width <= 0.0
+    fraction = (time - times[left]) / jnp.where(jump, 1.0, width)
+    fraction = jnp.where(jump, (time >= times[left]).astype(fraction.dtype), fraction)
+    fraction = jnp.clip(fraction, 0.0, 1.0)
+    return values[left] + fraction * (values[left + 1] - values[left])
+
+
+def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
+    array = np.atleast_1d(np.asarray(values, dtype=float))
+    if array.ndim != 1 or array.size == 0 or not np.all(np.isfinite(array)):
+        raise InputError(f"{name} must be a non-empty list of finite numbers; got {values!r}.")
+    return array
+
+
+def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> ShearProtocol:
+    return ShearProtocol(*(jnp.asarray(a, float) for a in (times, rates, amplitudes, frequencies, phases)))
+
+
+def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> ShearProtocol:
+    """Return γ̇(t) = amplitude · cos(frequency · t + phase).
+
+    Parameters
+    ----------
+    amplitude
+        Of the shear rate, in 1/s; dimensionless, the Weissenberg number.
+    frequency
+        In rad/s, positive; dimensionless, the Deborah number.
+    phase
+        In rad; 0 starts at the largest rate, as in the paper.
+    """
+    _checked("amplitude, frequency and phase", [amplitude, frequency, phase])
+    if frequency <= 0:
+        raise InputError(f"frequency must be positive; got {frequency}. Use start_up for a constant rate.")
+    return _protocol([0.0], [0.0], [amplitude], [frequency], [phase])
+
+
+def start_up(rate: float) -> ShearProtocol:
+    """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0."""
+    _checked("rate", [rate])
+    return _protocol([0.0], [rate])
+
+
+def step_rates(times: Sequence[float], rates: Sequence[float]) -> ShearProtocol:
+    """Return a shear rate that jumps to ``rates[i]`` at ``times[i]``.
+
+    Parameters
+    ----------
+    times
+        Times of the jumps in s, increasing; the first rate also holds before ``times[0]``.
+    rates
+        Rate from each jump on, in 1/s, as many as `times`.
+    """
+    t, r = _checked("times", times), _checked("rates", rates)
+    if t.size != r.size or np.any(np.diff(t) <= 0):
+        raise InputError(
+            f"step_rates needs as many rates as times, and increasing times; got {t.size} times "
+            f"and {r.size} rates."
+        )
+    # each jump is a pair of entries at one time
+    table_times = np.concatenate([t[:1], np.repeat(t[1:], 2)])
+    table_rates = np.concatenate([np.repeat(r[:-1], 2), r[-1:]])
+    return _protocol(table_times, table_rates)
+
+
+def measured_rate(times: Sequence[float] | np.ndarray, rates: Sequence[float] | np.ndarray) -> ShearProtocol:
+    """Return the piecewise-linear shear rate through measured points.
+
+    Parameters
+    ----------
+    times
+        In s, strictly increasing.
+    rates
+        In 1/s, as many as `times`.
+    """
+    t, r = _checked("times", times), _checked("rates", rates)
+    if t.size != r.size or np.any(np.diff(t) <= 0):
+        raise InputError(
+            f"measured_rate needs as many rates as times, and strictly increasing times; got "
+            f"{t.size} times and {r.size} rates."
+        )
+    return _protocol(t, r)
+
+
+def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
+    """Return one protocol with a leading batch axis, for `jax.vmap`.
+
+    Tables are padded by holding their last value, cosines by zero amplitudes.
+    """
+    m = max(p.table_times.shape[0] for p in protocols)
+    c = max(p.amplitudes.shape[0] for p in protocols)
+
+    def padded(p: ShearProtocol) -> ShearProtocol:
+        rows = m - p.table_times.shape[0]
+        waves = (0, c - p.amplitudes.shape[0])
+        return ShearProtocol(
+            jnp.concatenate([p.table_times, p.table_times[-1] + 1.0 + jnp.arange(rows)]),
+            jnp.concatenate([p.table_rates, jnp.repeat(p.table_rates[-1:], rows)]),
+            jnp.pad(p.amplitudes, waves),
+            jnp.pad(p.frequencies, waves),
+            jnp.pad(p.phases, waves),
+        )
+
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *[padded(p) for p in protocols])
