@@ -1,0 +1,28 @@
+"""From a fluid and a protocol to stresses."""
+
+from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
+from discover.simulate.grid import IntegrationGrid, make_grid, make_grids
+from discover.simulate.solve import (
+    ShearStress,
+    SimulationError,
+    simulate,
+    simulate_homogeneous_flow,
+    solve_batch,
+    solve_on_grid,
+)
+from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
+
+__all__ = [
+    "ExponentialRungeKutta4",
+    "IntegrationGrid",
+    "ShearStress",
+    "SimulationError",
+    "SyntheticDataset",
+    "make_grid",
+    "make_grids",
+    "simulate",
+    "simulate_homogeneous_flow",
+    "solve_batch",
+    "solve_on_grid",
+    "synthetic_dataset",
+]

@@ -1,0 +1,116 @@
+"""A diffrax solver that treats linear relaxation exactly."""
+
+from collections.abc import Callable
+from typing import ClassVar
+
+import diffrax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+_TAYLOR_TERMS = 14
+
+
+def phi_functions(
+    z: Float[Array, " ..."],
+) -> tuple[Float[Array, " ..."], Float[Array, " ..."], Float[Array, " ..."]]:
+    """Return φ₁, φ₂, φ₃ with φ₁(z) = (eᶻ − 1)/z and φₖ₊₁(z) = (φₖ(z) − 1/k!)/z.
+
+    The recurrence loses digits near zero, so a Taylor series serves there: with 14 terms its
+    remainder at |z| = 1 is below 1e-15, and the recurrence loses less than three digits beyond.
+    """
+    small = jnp.abs(z) < 1.0
+    safe = jnp.where(small, 1.0, z)
+    first = jnp.expm1(safe) / safe
+    second = (first - 1.0) / safe
+    third = (second - 0.5) / safe
+    near = jnp.where(small, z, 0.0)
+    series = jnp.zeros_like(z)
+    factorial = [1.0]
+    for n in range(1, _TAYLOR_TERMS + 4):
+        factorial.append(factorial[-1] * n)
+    for n in reversed(range(_TAYLOR_TERMS)):
+        series = series * near + 1.0 / factorial[n + 3]
+    series_second = 0.5 + near * series
+    series_first = 1.0 + near * series_second
+    return (
+        jnp.where(small, series_first, first),
+        jnp.where(small, series_second, second),
+        jnp.where(small, series, third),
+    )
+
+
+class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
+    """Fourth-order exponential Runge–Kutta method   [Krogstad 2005, JCP 203, 72].
+
+    The vector field is split as f = −decay ∘ y + N(t, y). The decay is integrated exactly, so a
+    spectrum of relaxation times over seven decades costs no more steps than its slowest mode. With
+    zero decay the method is a classical four-stage Runge–Kutta method. The error estimate is the
+    difference to the third-order solution that takes the last stage from the new point; where no
+    error is asked for (fixed steps), that evaluation is compiled away and a step costs four.
+
+    Attributes
+    ----------
+    decay
+        Rates of linear relaxation in 1/s, broadcastable against the state. Any value is
+        consistent: it decides accuracy, not the limit. No gradient flows through it.
+    """
+
+    decay: Float[Array, " ..."]
+    term_structure: ClassVar = diffrax.ODETerm
+    interpolation_cls: ClassVar[Callable[..., diffrax.AbstractPath]] = (
+        diffrax.ThirdOrderHermitePolynomialInterpolation
+    )
+
+    def order(self, terms):
+        """Return the order of convergence."""
+        del terms
+        return 4
+
+    def error_order(self, terms):
+        """Return the order of the local error estimate."""
+        del terms
+        return 4
+
+    def init(self, terms, t0, t1, y0, args):
+        """Return no state: the method has no memory between steps."""
+        del terms, t0, t1, y0, args
+
+    def func(self, terms, t0, y0, args):
+        """Return the whole vector field."""
+        return terms.vf(t0, y0, args)
+
+    def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
+        """Make one step from t0 to t1."""
+        del solver_state, made_jump
+        step = t1 - t0
+        middle = t0 + 0.5 * step
+        slope = terms.vf(t0, y0, args)
+
+        def remainder(t, y):
+            return terms.vf(t, y, args) + self.decay * y
+
+        z = -self.decay * step
+        half_first, half_second, _ = phi_functions(0.5 * z)
+        first, second, third = phi_functions(z)
+        half_decay = jnp.exp(0.5 * z) * y0
+        full_decay = jnp.exp(z) * y0
+
+        n1 = slope + self.decay * y0
+        n2 = remainder(middle, half_decay + 0.5 * step * half_first * n1)
+        n3 = remainder(
+            middle,
+            half_decay + step * ((0.5 * half_first - half_second) * n1 + half_second * n2),
+        )
+        n4 = remainder(
+            t1, full_decay + step * ((first - 2.0 * second) * n1 + 2.0 * second * n3)
+        )
+        last = 4.0 * third - second
+        y1 = full_decay + step * (
+            (first - 3.0 * second + 4.0 * third) * n1
+            + (2.0 * second - 4.0 * third) * (n2 + n3)
+            + last * n4
+        )
+        slope_after = terms.vf(t1, y1, args)
+        error = step * last * (slope_after + self.decay * y1 - n4)
+        dense = {"y0": y0, "y1": y1, "k0": step * slope, "k1": step * slope_after}
+        return y1, error, dense, None, diffrax.RESULTS.successful
