@@ -38,17 +38,18 @@ class ShearRun:
     """
 
     name: str
-    time: Float[np.ndarray, " n"]
+    time: Float[np.ndarray, " _"]
     protocol: ShearProtocol
-    shear_rate: Float[np.ndarray, " n"]
-    shear_stress: Float[np.ndarray, " n"]
-    first_normal_stress_difference: Float[np.ndarray, " n"] | None = None
-    second_normal_stress_difference: Float[np.ndarray, " n"] | None = None
-    strain: Float[np.ndarray, " n"] | None = None
+    shear_rate: Float[np.ndarray, " _"]
+    shear_stress: Float[np.ndarray, " _"]
+    first_normal_stress_difference: Float[np.ndarray, " _"] | None = None
+    second_normal_stress_difference: Float[np.ndarray, " _"] | None = None
+    strain: Float[np.ndarray, " _"] | None = None
     clock_factor: float = 1.0
     metadata: Mapping[str, float | str] = field(default_factory=dict)
 
     def __post_init__(self):
+        # shapes are checked here, not by annotation: users build runs by hand
         n = self.time.shape[0] if self.time.ndim == 1 else 0
         if n == 0:
             raise InputError(f"The run {self.name!r} has no samples; give at least one.")

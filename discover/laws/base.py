@@ -3,6 +3,8 @@
 from abc import abstractmethod
 
 import equinox as eqx
+import jax.numpy as jnp
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from tensor_library.algebra import Symmetric
@@ -48,8 +50,6 @@ class AbstractConstitutiveLaw(eqx.Module):
         return change - self.extra_term(stress, rate)
 
 
-def as_parameter(value: float | Float[Array, ""]) -> Float[Array, ""]:
+def as_parameter(value: ArrayLike) -> Float[Array, ""]:
     """Return a law's parameter as an array, so that gradients and `vmap` reach it."""
-    import jax.numpy as jnp
-
     return jnp.asarray(value, dtype=jnp.result_type(float))

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 
 
-def _as_modes(value: float | Sequence[float] | Float[Array, " k"]) -> Float[Array, " k"]:
+def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
     return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
 
 

@@ -1,0 +1,27 @@
+"""Double precision, strict types and shapes for every test."""
+
+import os
+from pathlib import Path
+
+import pytest
+from jaxtyping import install_import_hook
+
+# Shapes written on public functions are checked while the tests run. The hook must come before
+# the packages are imported.
+install_import_hook(["tensor_library", "discover"], "beartype.beartype")
+
+from discover.precision import enable_x64  # noqa: E402
+
+enable_x64()
+
+
+@pytest.fixture(scope="session")
+def measured_data() -> Path:
+    """Return the folder of measured data sets, or skip and say why."""
+    folder = os.environ.get("DISCOVER_DATA")
+    if not folder or not Path(folder).is_dir():
+        pytest.skip(
+            "measured data are not part of the project: set DISCOVER_DATA to the folder that "
+            "holds pi95k-startup, gel-laos and blood-steps"
+        )
+    return Path(folder)

@@ -1,0 +1,207 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import tensor_library as tl
+from discover.errors import InputError
+from discover.laws import (
+    FenePeterlin,
+    Fluid,
+    Giesekus,
+    LibraryExpansion,
+    TensorBasisNetwork,
+    UpperConvectedMaxwell,
+    make_law,
+)
+from discover.protocols import oscillatory_shear, start_up
+from discover.simulate import SimulationError, simulate, simulate_homogeneous_flow
+
+NONLINEAR = [
+    ("johnson_segalman", {"xi": 0.4}),
+    ("giesekus", {"alpha": 0.2}),
+    ("ptt_linear", {"epsilon": 0.4}),
+    ("ptt_exponential", {"epsilon": 0.4}),
+    ("fene_p", {"L2": 30.0}),
+]
+
+
+def independent_extra_term(name, parameters, s, g):
+    """Write h with NumPy matrices, apart from the software under test."""
+    if name == "johnson_segalman":
+        return 0.5 * parameters["xi"] * (s @ g + g @ s)
+    if name == "giesekus":
+        return parameters["alpha"] * s @ s
+    if name == "ptt_linear":
+        return parameters["epsilon"] * np.trace(s) * s
+    return (np.exp(parameters["epsilon"] * np.trace(s)) - 1.0) * s
+
+
+def independent_stress(name, parameters, rate_of_time, times):
+    if name == "fene_p":
+        return independent_fene_p(parameters["L2"], rate_of_time, times)
+
+    def field(t, y):
+        s, grad = y.reshape(3, 3), np.zeros((3, 3))
+        grad[0, 1] = rate_of_time(t)
+        g = grad + grad.T
+        extra = independent_extra_term(name, parameters, s, g)
+        return (g + grad @ s + s @ grad.T - s - extra).ravel()
+
+    solution = solve_ivp(
+        field, (0, times[-1]), np.zeros(9), t_eval=times, rtol=1e-10, atol=1e-12, method="DOP853"
+    )
+    return solution.y.T.reshape(-1, 3, 3)
+
+
+def independent_fene_p(limit, rate_of_time, times):
+    """Integrate the conformation tensor, from which our stress form was derived."""
+
+    def spring(a):
+        return (limit - 3.0) / (limit - np.trace(a))
+
+    def field(t, y):
+        a, grad = y.reshape(3, 3), np.zeros((3, 3))
+        grad[0, 1] = rate_of_time(t)
+        return (grad @ a + a @ grad.T - (spring(a) * a - np.eye(3))).ravel()
+
+    solution = solve_ivp(
+        field, (0, times[-1]), np.eye(3).ravel(), t_eval=times, rtol=1e-10, atol=1e-12,
+        method="DOP853",
+    )  # fmt: skip
+    return np.array([spring(a) * a - np.eye(3) for a in solution.y.T.reshape(-1, 3, 3)])
+
+
+@pytest.mark.parametrize(("name", "parameters"), NONLINEAR)
+def test_each_nonlinear_law_agrees_with_scipy(name, parameters):
+    times = np.linspace(0, 12, 61)
+    ours = simulate(Fluid.dimensionless(make_law(name, parameters)), oscillatory_shear(2.0, 0.75), times)
+    theirs = independent_stress(name, parameters, lambda t: 2.0 * np.cos(0.75 * t), times)
+    expected = np.stack([theirs[:, 0, 0], theirs[:, 1, 1], theirs[:, 2, 2], theirs[:, 0, 1]], axis=1)
+    # our tolerance is 1e-8 per step; 1e-6 allows for its growth over 12 relaxation times
+    np.testing.assert_allclose(ours.components, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("name", "parameters"), [*NONLINEAR, ("ucm", {})])
+def test_shear_components_agree_with_the_full_tensor(name, parameters):
+    law = make_law(name, parameters)
+    stress = jnp.array([0.9, -0.1, 0.05, 0.6])
+    fast = law.stress_rate(stress, jnp.array(1.4))
+    full = law.stress_rate(tl.from_shear(stress), tl.simple_shear(jnp.array(1.4)))
+    np.testing.assert_allclose(tl.to_shear(full), fast, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("johnson_segalman", {"xi": 0.0}),
+        ("giesekus", {"alpha": 0.0}),
+        ("ptt_linear", {"epsilon": 0.0}),
+        ("ptt_exponential", {"epsilon": 0.0}),
+    ],
+)
+def test_each_law_reduces_to_maxwell_when_its_parameter_is_zero(name, parameters):
+    stress, rate = jnp.array([0.9, -0.1, 0.05, 0.6]), jnp.array(1.4)
+    expected = UpperConvectedMaxwell().stress_rate(stress, rate)
+    np.testing.assert_allclose(make_law(name, parameters).stress_rate(stress, rate), expected)
+
+
+def test_fene_p_tends_to_maxwell_as_chains_grow_long():
+    stress, rate = jnp.array([0.9, -0.1, 0.05, 0.6]), jnp.array(1.4)
+    errors = [
+        float(jnp.max(jnp.abs(FenePeterlin(limit).extra_term(stress, tl.rate_of_deformation(rate)))))
+        for limit in (1e2, 1e4)
+    ]
+    assert errors[1] == pytest.approx(errors[0] / 100, rel=0.1)  # h is of first order in 1/L²
+
+
+def test_linear_ptt_is_the_first_order_of_the_exponential():
+    stress, rate = jnp.array([0.3, 0.0, 0.0, 0.2]), jnp.zeros(4)
+    differences = [
+        float(
+            jnp.max(
+                jnp.abs(
+                    make_law("ptt_exponential", {"epsilon": e}).extra_term(stress, rate)
+                    - make_law("ptt_linear", {"epsilon": e}).extra_term(stress, rate)
+                )
+            )
+        )
+        for e in (0.02, 0.01)
+    ]
+    assert differences[0] / differences[1] == pytest.approx(4.0, rel=0.02)  # second order in ε
+
+
+def test_an_expansion_with_one_term_is_the_named_law():
+    library = tl.build_library()
+    coefficients = jnp.zeros(8).at[library.names.index("sigma.sigma")].set(0.2)
+    expansion = LibraryExpansion(coefficients, jnp.zeros(0), library)
+    stress, rate = jnp.array([0.9, -0.1, 0.05, 0.6]), jnp.array(1.4)
+    np.testing.assert_allclose(
+        expansion.stress_rate(stress, rate), Giesekus(0.2).stress_rate(stress, rate), rtol=1e-14
+    )
+
+
+def test_the_network_is_objective_for_random_weights():
+    law = TensorBasisNetwork.initialise(jax.random.key(0))
+    a = jax.random.normal(jax.random.key(1), (3, 3))
+    b = jax.random.normal(jax.random.key(2), (3, 3))
+    q, _ = jnp.linalg.qr(jax.random.normal(jax.random.key(3), (3, 3)))
+    s, g = a + a.T, b + b.T
+    turned = law.extra_term(q @ s @ q.T, q @ g @ q.T)
+    np.testing.assert_allclose(turned, q @ law.extra_term(s, g) @ q.T, atol=1e-11)
+
+
+def test_two_equal_modes_are_one_mode_of_twice_the_modulus():
+    times = np.linspace(0, 5, 11)
+    one = simulate(Fluid(Giesekus(0.3), 2.0, 1.5), start_up(1.0), times)
+    two = simulate(Fluid(Giesekus(0.3), [1.0, 1.0], [1.5, 1.5]), start_up(1.0), times)
+    np.testing.assert_allclose(one.components, two.components, atol=1e-7)
+
+
+def test_units_scale_out():
+    # the same fluid in dimensionless and in SI units
+    times = np.linspace(0, 5, 11)
+    scaled = simulate(Fluid.dimensionless(Giesekus(0.3)), start_up(2.0), times)
+    in_units = simulate(Fluid(Giesekus(0.3), 150.0, 4.0), start_up(2.0 / 4.0), 4.0 * times)
+    np.testing.assert_allclose(in_units.components, 150.0 * scaled.components, atol=150 * 1e-6)
+
+
+def test_solvent_adds_its_viscous_stress_only():
+    times = np.linspace(0, 3, 7)
+    dry = simulate(Fluid(Giesekus(0.3), 1.0, 1.0), start_up(2.0), times)
+    wet = simulate(Fluid(Giesekus(0.3), 1.0, 1.0, solvent_viscosity=0.25), start_up(2.0), times)
+    np.testing.assert_allclose(wet.components - dry.components, [[0, 0, 0, 0.5]] * 7, atol=1e-12)
+
+
+def test_extension_of_maxwell_matches_the_analytic_solution():
+    rate, times = 0.3, np.linspace(0, 4, 9)
+    stress = simulate_homogeneous_flow(
+        UpperConvectedMaxwell(), lambda t: tl.uniaxial_extension(jnp.array(rate)), times
+    )
+    expected = 2 * rate / (1 - 2 * rate) * (1 - np.exp(-(1 - 2 * rate) * times))
+    np.testing.assert_allclose(stress[:, 0, 0], expected, atol=1e-7)
+
+
+def test_runaway_stress_is_an_error_that_says_so():
+    with pytest.raises(SimulationError, match="runs away"):
+        simulate_homogeneous_flow(
+            make_law("giesekus", {"alpha": 0.0}),
+            lambda t: tl.uniaxial_extension(jnp.array(50.0)),
+            np.linspace(0, 40, 5),
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("oldroyd", {}, "Unknown law 'oldroyd'"),
+        ("giesekus", {}, "needs its parameter 'alpha'"),
+        ("giesekus", {"alpha": 0.1, "xi": 1.0}, "has no parameter 'xi'"),
+        ("giesekus", {"alpha": 1.7}, "from 0 to 1"),
+        ("giesekus", {"alpha": float("nan")}, "from 0 to 1"),
+    ],
+)
+def test_a_wrong_law_is_refused_with_what_was_wanted(name, parameters, message):
+    with pytest.raises(InputError, match=message):
+        make_law(name, parameters)

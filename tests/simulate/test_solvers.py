@@ -1,0 +1,202 @@
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.errors import InputError
+from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell, make_law
+from discover.protocols import (
+    oscillatory_shear,
+    paper_test_protocols,
+    paper_training_protocols,
+    stack_protocols,
+    start_up,
+    step_rates,
+)
+from discover.simulate import (
+    make_grid,
+    make_grids,
+    simulate,
+    solve_batch,
+    solve_on_grid,
+    synthetic_dataset,
+)
+from discover.simulate.exponential_runge_kutta import phi_functions
+
+SPECTRUM = (np.logspace(5, 3, 13), np.logspace(-3, 4, 13))  # 1 ms to 10,000 s
+
+
+def first(tree):
+    return jax.tree.map(lambda leaf: leaf[0], tree)
+
+
+def test_maxwell_start_up_matches_the_analytic_solution():
+    times, rate = np.linspace(0, 8, 33), 1.7
+    stress = simulate(Fluid.dimensionless(UpperConvectedMaxwell()), start_up(rate), times)
+    decay = np.exp(-times)
+    np.testing.assert_allclose(stress.shear_stress, rate * (1 - decay), atol=1e-7)
+    np.testing.assert_allclose(
+        stress.first_normal_stress_difference, 2 * rate**2 * (1 - decay * (1 + times)), atol=1e-6
+    )
+    np.testing.assert_allclose(stress.second_normal_stress_difference, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [0.3, 1.0, 4.0])
+def test_small_oscillation_gives_the_maxwell_moduli(frequency):
+    times = np.linspace(0, 40, 2001)
+    amplitude = 1e-3
+    stress = simulate(
+        Fluid.dimensionless(Giesekus(0.3)), oscillatory_shear(amplitude, frequency), times
+    )
+    late = times > 25.0  # exp(-25) of the start is left
+    basis = np.stack([np.cos(frequency * times), np.sin(frequency * times)], axis=1)[late]
+    in_phase, out_of_phase = np.linalg.lstsq(basis, stress.shear_stress[late], rcond=None)[0]
+    viscosity = 1.0 / (1.0 + frequency**2)
+    # nonlinearity enters at the square of the strain amplitude, 1e-5 here
+    assert in_phase / amplitude == pytest.approx(viscosity, rel=1e-4)
+    assert out_of_phase / amplitude == pytest.approx(frequency * viscosity, rel=1e-4)
+
+
+def test_stiff_spectrum_matches_the_analytic_start_up():
+    modulus, relaxation_time = SPECTRUM
+    times = np.concatenate([[0.0], np.logspace(-3, 3.5, 40)])
+    stress = simulate(Fluid(UpperConvectedMaxwell(), modulus, relaxation_time), start_up(0.02), times)
+    viscosities = modulus * relaxation_time
+    expected = 0.02 * np.sum(
+        viscosities * -np.expm1(-times[:, None] / relaxation_time), axis=1
+    )
+    np.testing.assert_allclose(stress.shear_stress, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
+    modulus, relaxation_time = SPECTRUM
+    fluid = Fluid(Giesekus(0.3), modulus, relaxation_time)
+    rate, times = 0.02, np.concatenate([[0.0], np.logspace(-2, 3, 30)])
+    total = np.zeros((len(times), 4))
+    for g, lam in zip(modulus, relaxation_time, strict=True):  # modes do not talk to each other
+
+        def field(t, s, lam=lam):
+            s11, s22, s33, s12 = s
+            wi = lam * rate
+            return (
+                np.array(
+                    [
+                        2 * wi * s12 - s11 - 0.3 * (s11**2 + s12**2),
+                        -s22 - 0.3 * (s22**2 + s12**2),
+                        -s33 - 0.3 * s33**2,
+                        wi + wi * s22 - s12 - 0.3 * s12 * (s11 + s22),
+                    ]
+                )
+                / lam
+            )
+
+        solution = solve_ivp(
+            field, (0, times[-1]), np.zeros(4), t_eval=times, method="Radau", rtol=1e-9, atol=1e-11
+        )
+        total += g * solution.y.T
+    ours = simulate(fluid, start_up(rate), times).components
+    np.testing.assert_allclose(ours, total, atol=2e-6 * np.abs(total).max())
+    protocol = start_up(rate)
+    on_grid = solve_batch(fluid, stack_protocols([protocol]), make_grids([protocol], [times]))[0]
+    np.testing.assert_allclose(on_grid, total, atol=2e-6 * np.abs(total).max())
+
+
+def test_the_exponential_method_converges_at_fourth_order():
+    fluid = Fluid.dimensionless(make_law("ptt_exponential", {"epsilon": 0.4}))
+    protocol, times = oscillatory_shear(2.0, 1.0), np.linspace(0, 6, 7)
+    reference = simulate(fluid, protocol, times, rtol=1e-11, atol=1e-13).components
+    errors = []
+    for step in (0.1, 0.05, 0.025):
+        grid = make_grids([protocol], [times], strain_step=np.inf, phase_step=np.inf, max_step=step)
+        errors.append(np.abs(solve_batch(fluid, stack_protocols([protocol]), grid)[0] - reference).max())
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert np.all(orders > 3.7), f"observed orders {orders}"
+    assert np.all(orders < 4.6), f"observed orders {orders}"
+
+
+def test_default_grids_are_accurate_to_1e_6_on_all_flows_of_the_paper():
+    for law, parameters in (("giesekus", {"alpha": 0.8}), ("ptt_exponential", {"epsilon": 0.4})):
+        fluid = Fluid.dimensionless(make_law(law, parameters))
+        flows = list(paper_training_protocols().values()) + list(paper_test_protocols().values())
+        times = np.linspace(0, 20, 41)
+        grids = make_grids(flows, [times] * len(flows))
+        fast = solve_batch(fluid, stack_protocols(flows), grids)
+        for stress, flow in zip(fast, flows, strict=True):
+            exact = simulate(fluid, flow, times, rtol=1e-10, atol=1e-12).components
+            assert float(jnp.max(jnp.abs(stress - exact))) < 5e-6 * np.abs(exact).max()
+
+
+def test_phi_functions_match_their_integrals():
+    from scipy.integrate import quad
+
+    for z in (-50.0, -3.0, -1.0001, -0.9999, -0.3, 0.0, 0.4):
+        for k, value in enumerate(phi_functions(jnp.array(z)), start=1):
+            factorial = [1, 1, 2][k - 1]
+            exact, _ = quad(
+                lambda x, z=z, k=k: np.exp((1 - x) * z) * x ** (k - 1), 0, 1, epsabs=1e-14
+            )
+            # the recurrence divides a difference of order one by z up to twice
+            assert float(value) == pytest.approx(exact / factorial, rel=1e-12)
+
+
+def test_a_cessation_is_not_smeared_over_a_step():
+    flow, times = step_rates([0.0, 2.03], [1.5, 0.0]), np.array([0.0, 1.0, 2.03, 3.0])
+    fluid = Fluid.dimensionless(UpperConvectedMaxwell())
+    grids = make_grids([flow], [times])
+    expected = 1.5 * (1 - np.exp(-np.minimum(times, 2.03))) * np.exp(-np.maximum(times - 2.03, 0))
+    for stress in (
+        solve_batch(fluid, stack_protocols([flow]), grids)[0][:, 3],
+        simulate(fluid, flow, times).shear_stress,
+    ):
+        np.testing.assert_allclose(stress, expected, atol=1e-6)
+
+
+def test_forward_and_reverse_gradients_agree_with_finite_differences():
+    flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0, 4, 9)
+    grid = first(make_grids([flow], [times]))
+
+    def total(mobility, adjoint=None):
+        fluid = Fluid(Giesekus(mobility), [1.0, 2.0], [1.0, 0.3])
+        return jnp.sum(solve_on_grid(fluid, flow, grid, adjoint)[:, 3])
+
+    reverse = jax.grad(total)(0.2)
+    _, forward = jax.jvp(lambda a: total(a, diffrax.ForwardMode()), (0.2,), (1.0,))
+    # central difference: error of order step², 1e-8, and rounding of 1e-16/1e-4
+    difference = (total(0.2001) - total(0.1999)) / 2e-4
+    assert float(forward) == pytest.approx(float(reverse), rel=1e-10)
+    assert float(forward) == pytest.approx(float(difference), rel=1e-6)
+
+
+def test_a_law_that_runs_away_on_a_grid_gives_no_error_and_no_finite_number():
+    flow, times = start_up(5.0), np.linspace(0, 20, 5)
+    law = make_law("giesekus", {"alpha": 0.2})
+    bad = Fluid.dimensionless(law.__class__(-5.0))
+    stress = solve_batch(bad, stack_protocols([flow]), make_grids([flow], [times]))
+    assert not bool(jnp.all(jnp.isfinite(stress)))
+
+
+def test_grids_hold_every_sample_and_respect_the_limits():
+    flow, times = oscillatory_shear(2.0, 3.0), np.array([0.013, 0.5, 0.51, 4.0])
+    grid, index = make_grid(flow, times, strain_step=0.1, phase_step=0.15)
+    np.testing.assert_array_equal(grid[index], times)
+    assert np.max(np.diff(grid)) <= min(0.1 / 2.0, 0.15 / 3.0) + 1e-12
+
+
+def test_an_absurd_run_is_refused_before_it_is_integrated():
+    with pytest.raises(InputError, match="units of time"):
+        make_grid(start_up(1e6), np.array([0.0, 1e6]))
+
+
+def test_synthetic_noise_has_the_size_asked_for_and_the_seed_decides_it():
+    one = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.02, seed=3, n_samples=2001)
+    two = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.02, seed=3, n_samples=2001)
+    assert one.exact is not None
+    for run in one:
+        exact = one.exact[run.name].shear_stress
+        ratio = np.std(run.shear_stress - exact) / np.sqrt(np.mean(exact**2))
+        assert ratio == pytest.approx(0.02, rel=0.08)  # five times 1/sqrt(2 n)
+        np.testing.assert_array_equal(run.shear_stress, two[run.name].shear_stress)
+    other = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.02, seed=4, n_samples=2001)
+    assert not np.array_equal(one.runs[0].shear_stress, other.runs[0].shear_stress)

@@ -1,0 +1,121 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import sympy
+
+import tensor_library as tl
+from tensor_library.symbolic import RATE, STRESS, UNIT, Trace
+
+LIBRARY = tl.build_library(degree=2, closed_forms=("exp", "saturating"))
+
+
+def test_sizes_are_tensors_times_monomials_plus_closed_forms():
+    assert len(tl.build_library()) == 8
+    # seven invariants differ from zero in shear: 1 + 7 monomials up to degree one
+    assert len(tl.build_library(degree=1)) == 8 * (1 + 7)
+    assert len(LIBRARY) == 8 * (1 + 7 + 28) + 2
+    assert len(tl.build_library(degree=1, invariants=tl.INVARIANT_NAMES)) == 8 * 9
+
+
+def test_every_name_reads_back_to_its_term():
+    assert [tl.parse_term(name) for name in LIBRARY.names] == list(LIBRARY.terms)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "sigma",
+        "sigma.sigma",
+        "sigma.gammadot+gammadot.sigma",
+        "tr(sigma)*sigma",
+        "tr(sigma.gammadot)*I",
+        "(exp(epsilon*tr(sigma))-1)*sigma",
+    ],
+)
+def test_the_contract_s_spellings_are_canonical(name):
+    assert tl.parse_term(name).name == name
+
+
+@pytest.mark.parametrize(
+    "name", ["", "sigma*tr(sigma)", "__import__('os')", "tr(sigma)*", "tr(x)*sigma", "Sigma"]
+)
+def test_other_text_is_refused_and_never_evaluated(name):
+    with pytest.raises(ValueError, match="Cannot read the term"):
+        tl.parse_term(name)
+
+
+def test_library_evaluation_equals_term_by_term():
+    stress = jnp.array([1.2, -0.3, 0.2, 0.6])
+    rate = tl.rate_of_deformation(jnp.array(1.7))
+    inner = jnp.array([0.4, 0.3])
+    together = LIBRARY.evaluate(stress, rate, inner)
+    named = {"epsilon": inner[0], "kappa": inner[1]}
+    alone = jnp.stack([term.evaluate(stress, rate, named) for term in LIBRARY.terms])
+    np.testing.assert_allclose(together, alone, rtol=1e-12)
+
+
+def test_sympy_form_evaluates_to_the_term():
+    k = jax.random.split(jax.random.key(2))
+    s, g = (np.asarray(a + a.T) for a in (jax.random.normal(x, (3, 3)) for x in k))
+    values = {STRESS: sympy.Matrix(s), RATE: sympy.Matrix(g), UNIT: sympy.eye(3)}
+
+    def number(expression):
+        """Evaluate an expression over tensors with SymPy's own matrices."""
+        if expression in values:
+            return values[expression]
+        if expression.func is Trace:
+            return number(expression.args[0]).trace()
+        arguments = [number(a) for a in expression.args]
+        if not arguments:
+            return sympy.Float(0.4) if expression == sympy.Symbol("epsilon") else expression
+        if expression.is_Mul:
+            result = arguments[0]
+            for a in arguments[1:]:
+                result = result * a
+            return result
+        if expression.is_Add:
+            result = arguments[0]
+            for a in arguments[1:]:
+                result = result + a
+            return result
+        return expression.func(*arguments)
+
+    for name in (
+        "tr(sigma.gammadot)^2*(sigma.gammadot+gammadot.sigma)",
+        "tr(sigma)*gammadot.gammadot",
+        "sigma.sigma.gammadot+gammadot.sigma.sigma",
+        "(exp(epsilon*tr(sigma))-1)*sigma",
+    ):
+        term = tl.parse_term(name)
+        expected = term.evaluate(jnp.array(s), jnp.array(g), {"epsilon": jnp.array(0.4)})
+        got = np.array(number(term.sympy()).evalf(), dtype=float)
+        np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-10)
+
+
+def test_latex_marks_tensors_and_contractions():
+    text = tl.parse_term("tr(sigma)*sigma.sigma").latex()
+    assert r"\boldsymbol{\sigma} \cdot \boldsymbol{\sigma}" in text
+    assert r"\operatorname{tr}" in text
+
+
+def test_complexity_orders_simple_before_involved():
+    names = ["sigma", "sigma.sigma", "tr(sigma)*sigma.sigma", "(exp(epsilon*tr(sigma))-1)*sigma"]
+    sizes = [tl.parse_term(name).complexity for name in names]
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[1] < sizes[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"degree": -1}, "degree"),
+        ({"degree": 9}, "degree"),
+        ({"tensors": ["tau"]}, "Unknown tensor 'tau'"),
+        ({"invariants": ["det(sigma)"]}, "Unknown invariant"),
+        ({"closed_forms": ["sin"]}, "Unknown closed form"),
+    ],
+)
+def test_a_wrong_description_is_refused_with_what_was_wanted(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        tl.build_library(**arguments)
