@@ -57,7 +57,7 @@ def term_expression(term: "CandidateTerm") -> sympy.Expr:
     if term.closed_form is not None:
         scalar *= _closed_form(term.closed_form)
     for invariant, power in zip(_INVARIANTS, term.powers, strict=True):
-        scalar *= invariant**power
+        scalar *= sympy.Pow(invariant, power)
     return scalar * _TENSORS[term.tensor]
 
 

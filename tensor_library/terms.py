@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tensor_library.algebra import Symmetric
@@ -83,7 +84,10 @@ class CandidateTerm:
         return () if self.form is None else (self.form.inner_name,)
 
     def evaluate(
-        self, stress: Symmetric, rate: Symmetric, inner: Mapping[str, Float[Array, ""]] | None = None
+        self,
+        stress: Symmetric,
+        rate: Symmetric,
+        inner: Mapping[str, Float[Array, ""]] | None = None,
     ) -> Symmetric:
         """Return the value of the term at one state.
 
@@ -100,7 +104,9 @@ class CandidateTerm:
             if power:
                 value = invariants[index] ** power * value
         if self.form is not None:
-            parameter = (inner or {}).get(self.form.inner_name, self.form.inner_default)
+            parameter = jnp.asarray(
+                (inner or {}).get(self.form.inner_name, self.form.inner_default)
+            )
             value = self.form.function(invariants[0], parameter) * value
         return value
 
@@ -135,7 +141,7 @@ def parse_term(name: str) -> CandidateTerm:
     for key, form in CLOSED_FORMS.items():
         if rest.startswith(form.spelling + "*"):
             closed_form, rest = key, rest[len(form.spelling) + 1 :]
-    powers = list(_NO_POWERS)
+    powers: list[int] = list(_NO_POWERS)
     while match := re.match(r"(tr\([a-z.]+\))(?:\^(\d{1,2}))?\*", rest):
         if match[1] not in INVARIANT_NAMES:
             break

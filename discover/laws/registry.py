@@ -74,7 +74,11 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
         if key not in parameters:
             raise InputError(f"The law {name!r} needs its parameter {key!r} ({low:g} to {high:g}).")
         value = parameters[key]
-        if not isinstance(value, int | float) or not math.isfinite(value) or not low <= value <= high:
+        if (
+            not isinstance(value, int | float)
+            or not math.isfinite(value)
+            or not low <= value <= high
+        ):
             raise InputError(
                 f"The parameter {key!r} of the law {name!r} must be a number from {low:g} to "
                 f"{high:g}; got {value!r}."

@@ -12,7 +12,7 @@ from tensor_library.invariants import scalar_invariants
 
 
 class TensorBasisNetwork(AbstractConstitutiveLaw):
-    """h = Σ gₙ(invariants) Tₙ with gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
+    """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
 
     Attributes
     ----------
@@ -28,7 +28,8 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        return cls(eqx.nn.MLP(8, 8, width, depth, jax.nn.tanh, key=key), linear_relaxation)
+        network = eqx.nn.MLP(8, 8, width, depth, jax.nn.tanh, key=key)
+        return cls(network=network, linear_relaxation=linear_relaxation)
 
     def coefficients(self, stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
         """Return the coefficients gₙ at one state."""
@@ -36,6 +37,4 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = Σ gₙ Tₙ."""
-        return jnp.tensordot(
-            self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1
-        )
+        return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)

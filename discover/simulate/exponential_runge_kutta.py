@@ -101,9 +101,7 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
             middle,
             half_decay + step * ((0.5 * half_first - half_second) * n1 + half_second * n2),
         )
-        n4 = remainder(
-            t1, full_decay + step * ((first - 2.0 * second) * n1 + 2.0 * second * n3)
-        )
+        n4 = remainder(t1, full_decay + step * ((first - 2.0 * second) * n1 + 2.0 * second * n3))
         last = 4.0 * third - second
         y1 = full_decay + step * (
             (first - 3.0 * second + 4.0 * third) * n1

@@ -84,7 +84,10 @@ def make_grid(
             "shear rate, or thin the run."
         )
     grid = np.concatenate(
-        [a + gap * np.arange(int(n)) / n for a, gap, n in zip(anchors[:-1], gaps, pieces, strict=True)]
+        [
+            a + gap * np.arange(int(n)) / n
+            for a, gap, n in zip(anchors[:-1], gaps, pieces, strict=True)
+        ]
         + [anchors[-1:]]
     )
     return grid, np.searchsorted(grid, times)

@@ -185,7 +185,7 @@ def solve_on_grid(
         max_steps=grid.times.shape[0] - 1,
         throw=False,
     )
-    return solution.ys[grid.sample_index]
+    return jnp.asarray(solution.ys)[grid.sample_index]
 
 
 @eqx.filter_jit
@@ -229,17 +229,17 @@ def simulate_homogeneous_flow(
     SimulationError
         If the stress runs away, as it does in UCM beyond a critical extension rate.
     """
-    times = jnp.asarray(times, dtype=float)
+    sampling = jnp.asarray(times, dtype=float)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, stress, args: law.stress_rate(stress, velocity_gradient(t))),
         diffrax.Tsit5(),
         0.0,
-        times[-1],
+        sampling[-1],
         None,
         jnp.zeros((3, 3)),
-        saveat=diffrax.SaveAt(ts=times),
+        saveat=diffrax.SaveAt(ts=sampling),
         stepsize_controller=diffrax.ClipStepSizeController(
-            diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times
+            diffrax.PIDController(rtol=rtol, atol=atol), step_ts=sampling
         ),
         max_steps=MAX_STEPS,
         throw=False,

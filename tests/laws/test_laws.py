@@ -76,9 +76,13 @@ def independent_fene_p(limit, rate_of_time, times):
 @pytest.mark.parametrize(("name", "parameters"), NONLINEAR)
 def test_each_nonlinear_law_agrees_with_scipy(name, parameters):
     times = np.linspace(0, 12, 61)
-    ours = simulate(Fluid.dimensionless(make_law(name, parameters)), oscillatory_shear(2.0, 0.75), times)
+    ours = simulate(
+        Fluid.dimensionless(make_law(name, parameters)), oscillatory_shear(2.0, 0.75), times
+    )
     theirs = independent_stress(name, parameters, lambda t: 2.0 * np.cos(0.75 * t), times)
-    expected = np.stack([theirs[:, 0, 0], theirs[:, 1, 1], theirs[:, 2, 2], theirs[:, 0, 1]], axis=1)
+    expected = np.stack(
+        [theirs[:, 0, 0], theirs[:, 1, 1], theirs[:, 2, 2], theirs[:, 0, 1]], axis=1
+    )
     # our tolerance is 1e-8 per step; 1e-6 allows for its growth over 12 relaxation times
     np.testing.assert_allclose(ours.components, expected, atol=1e-6 * np.abs(expected).max())
 
@@ -110,7 +114,9 @@ def test_each_law_reduces_to_maxwell_when_its_parameter_is_zero(name, parameters
 def test_fene_p_tends_to_maxwell_as_chains_grow_long():
     stress, rate = jnp.array([0.9, -0.1, 0.05, 0.6]), jnp.array(1.4)
     errors = [
-        float(jnp.max(jnp.abs(FenePeterlin(limit).extra_term(stress, tl.rate_of_deformation(rate)))))
+        float(
+            jnp.max(jnp.abs(FenePeterlin(limit).extra_term(stress, tl.rate_of_deformation(rate))))
+        )
         for limit in (1e2, 1e4)
     ]
     assert errors[1] == pytest.approx(errors[0] / 100, rel=0.1)  # h is of first order in 1/L²

@@ -62,11 +62,11 @@ def test_small_oscillation_gives_the_maxwell_moduli(frequency):
 def test_stiff_spectrum_matches_the_analytic_start_up():
     modulus, relaxation_time = SPECTRUM
     times = np.concatenate([[0.0], np.logspace(-3, 3.5, 40)])
-    stress = simulate(Fluid(UpperConvectedMaxwell(), modulus, relaxation_time), start_up(0.02), times)
-    viscosities = modulus * relaxation_time
-    expected = 0.02 * np.sum(
-        viscosities * -np.expm1(-times[:, None] / relaxation_time), axis=1
+    stress = simulate(
+        Fluid(UpperConvectedMaxwell(), modulus, relaxation_time), start_up(0.02), times
     )
+    viscosities = modulus * relaxation_time
+    expected = 0.02 * np.sum(viscosities * -np.expm1(-times[:, None] / relaxation_time), axis=1)
     np.testing.assert_allclose(stress.shear_stress, expected, rtol=1e-6, atol=1e-6)
 
 
@@ -110,7 +110,9 @@ def test_the_exponential_method_converges_at_fourth_order():
     errors = []
     for step in (0.1, 0.05, 0.025):
         grid = make_grids([protocol], [times], strain_step=np.inf, phase_step=np.inf, max_step=step)
-        errors.append(np.abs(solve_batch(fluid, stack_protocols([protocol]), grid)[0] - reference).max())
+        errors.append(
+            np.abs(solve_batch(fluid, stack_protocols([protocol]), grid)[0] - reference).max()
+        )
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.all(orders > 3.7), f"observed orders {orders}"
     assert np.all(orders < 4.6), f"observed orders {orders}"

@@ -62,7 +62,10 @@ def test_the_four_component_path_equals_the_full_tensor(components, shear_rate):
         tl.from_shear(stress), tl.rate_of_deformation(tl.simple_shear(jnp.array(shear_rate)))
     )
     np.testing.assert_allclose(
-        jax.vmap(tl.to_shear)(full), fast, rtol=1e-12, atol=1e-12 * float(jnp.max(jnp.abs(full)) + 1)
+        jax.vmap(tl.to_shear)(full),
+        fast,
+        rtol=1e-12,
+        atol=1e-12 * float(jnp.max(jnp.abs(full)) + 1),
     )
     assert float(jnp.max(jnp.abs(full[:, 0, 2]))) == 0.0  # 13 and 23 stay dead in simple shear
 
@@ -81,8 +84,7 @@ def test_basis_and_invariants_match_matrix_products_written_out():
         np.eye(3), s, g, s @ s, g @ g, s @ g + g @ s, s @ s @ g + g @ s @ s, s @ g @ g + g @ g @ s,
     ]  # fmt: skip
     invariants = [
-        np.trace(m)
-        for m in (s, s @ s, g @ g, s @ s @ s, g @ g @ g, s @ s @ g, s @ g @ g, s @ g)
+        np.trace(m) for m in (s, s @ s, g @ g, s @ s @ s, g @ g @ g, s @ s @ g, s @ g @ g, s @ g)
     ]
     np.testing.assert_allclose(tl.integrity_basis(jnp.array(s), jnp.array(g)), basis, atol=1e-14)
     np.testing.assert_allclose(
