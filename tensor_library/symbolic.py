@@ -30,7 +30,7 @@ _TENSORS = (
     STRESS**2 * RATE + RATE * STRESS**2,
     STRESS * RATE**2 + RATE**2 * STRESS,
 )
-_INVARIANTS = (
+_INVARIANTS: tuple[sympy.Expr, ...] = (  # pyright: ignore[reportAssignmentType]
     Trace(STRESS),
     Trace(STRESS**2),
     Trace(RATE**2),
