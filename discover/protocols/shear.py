@@ -49,17 +49,15 @@ class ShearProtocol(eqx.Module):
             i = jnp.clip(jnp.searchsorted(times, t, side="right") - 1, 0, times.shape[0] - 1)
             before = jnp.minimum(t - times[0], 0.0) * rates[0]
             inside = jnp.maximum(t - times[i], 0.0)
-            return cumulative[i] + before + 0.5 * inside * (
-                rates[i] + _interpolate(t, times, rates)
+            return (
+                cumulative[i] + before + 0.5 * inside * (rates[i] + _interpolate(t, times, rates))
             )
 
         def wave(t):
             slow = self.frequencies == 0.0
             frequency = jnp.where(slow, 1.0, self.frequencies)
             oscillating = jnp.sin(self.frequencies * t + self.phases) / frequency
-            return jnp.sum(
-                self.amplitudes * jnp.where(slow, t * jnp.cos(self.phases), oscillating)
-            )
+            return jnp.sum(self.amplitudes * jnp.where(slow, t * jnp.cos(self.phases), oscillating))
 
         zero = jnp.zeros_like(time)
         return area(time) - area(zero) + wave(time) - wave(zero)
@@ -88,7 +86,9 @@ def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> ShearProtocol:
-    return ShearProtocol(*(jnp.asarray(a, float) for a in (times, rates, amplitudes, frequencies, phases)))
+    return ShearProtocol(
+        *(jnp.asarray(a, float) for a in (times, rates, amplitudes, frequencies, phases))
+    )
 
 
 def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> ShearProtocol:
@@ -105,7 +105,9 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
     """
     _checked("amplitude, frequency and phase", [amplitude, frequency, phase])
     if frequency <= 0:
-        raise InputError(f"frequency must be positive; got {frequency}. Use start_up for a constant rate.")
+        raise InputError(
+            f"frequency must be positive; got {frequency}. Use start_up for a constant rate."
+        )
     return _protocol([0.0], [0.0], [amplitude], [frequency], [phase])
 
 
@@ -137,7 +139,9 @@ def step_rates(times: Sequence[float], rates: Sequence[float]) -> ShearProtocol:
     return _protocol(table_times, table_rates)
 
 
-def measured_rate(times: Sequence[float] | np.ndarray, rates: Sequence[float] | np.ndarray) -> ShearProtocol:
+def measured_rate(
+    times: Sequence[float] | np.ndarray, rates: Sequence[float] | np.ndarray
+) -> ShearProtocol:
     """Return the piecewise-linear shear rate through measured points.
 
     Parameters
