@@ -1,5 +1,16 @@
 """Data sets: runs, loading, checking, linear viscoelasticity."""
 
+from discover.dataset.check import check_folder
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.load import load_dataset
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 
-__all__ = ["LinearSweep", "ShearDataset", "ShearRun"]
+__all__ = [
+    "LinearSweep",
+    "RelaxationSpectrum",
+    "ShearDataset",
+    "ShearRun",
+    "check_folder",
+    "load_dataset",
+    "relaxation_spectrum",
+]

@@ -1,0 +1,56 @@
+"""Shear rate from recorded strain."""
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+
+DEFAULT_WINDOW = 15
+"""Samples in the moving window; over them the strain is taken to be a cubic in time."""
+
+_DEGREE = 3
+
+
+def differentiate(
+    times: Float[np.ndarray, " n"],
+    values: Float[np.ndarray, " n"],
+    window: int = DEFAULT_WINDOW,
+) -> Float[np.ndarray, " n"]:
+    """Return the time derivative of a noisy record, from a moving cubic fit.
+
+    A cubic is fitted by least squares to the `window` samples nearest in order to each sample, and
+    its slope taken there   [Savitzky & Golay 1964, Anal. Chem. 36, 1627, for any spacing].
+
+    Parameters
+    ----------
+    times
+        Sampling times in s, increasing.
+    values
+        The record at those times.
+    window
+        Number of samples in the window, 5 or more; fewer if the record is shorter.
+
+    Raises
+    ------
+    InputError
+        If the window is too short, or the record has fewer than 5 samples.
+    """
+    if window < _DEGREE + 2:
+        raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")
+    n = len(times)
+    if n < _DEGREE + 2:
+        raise InputError(
+            f"A shear rate cannot be derived from {n} samples of strain; give at least 5, or a "
+            "column shear_rate_1_s."
+        )
+    window = min(window, n)
+    first = np.clip(np.arange(n) - window // 2, 0, n - window)
+    index = first[:, None] + np.arange(window)
+    offset = times[index] - times[:, None]
+    # scaled to the window's width: the normal equations stay well conditioned
+    width = np.max(np.abs(offset), axis=1, keepdims=True)
+    powers = (offset / width)[:, :, None] ** np.arange(_DEGREE + 1)
+    basis, triangle = np.linalg.qr(powers)
+    projected = np.einsum("nwk,nw->nk", basis, values[index])
+    coefficients = np.linalg.solve(triangle, projected[:, :, None])[:, :, 0]
+    return coefficients[:, 1] / width[:, 0]

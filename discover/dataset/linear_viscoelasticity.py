@@ -1,0 +1,128 @@
+"""A spectrum of relaxation modes from a linear frequency sweep."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import nnls
+
+from discover.dataset.run import LinearSweep
+from discover.errors import InputError
+
+MOST_MODES = 30
+TOLERANCE = 1.5
+FLOOR = 0.01
+"""A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
+
+MARGINS = (0.0, 0.25, 0.5)
+
+
+@dataclass(frozen=True)
+class RelaxationSpectrum:
+    """Discrete relaxation spectrum, G(t) = Σ G_k exp(−t/λ_k).
+
+    Attributes
+    ----------
+    modulus
+        G_k in Pa, shape (k,), positive.
+    relaxation_time
+        λ_k in s, shape (k,), increasing.
+    relative_error
+        Root mean square of the relative misfit over all G′ and G″.
+    best_error
+        The smallest such error with any number of modes tried.
+    errors
+        Error against the number of modes, the best for each number.
+    """
+
+    modulus: Float[np.ndarray, " k"]
+    relaxation_time: Float[np.ndarray, " k"]
+    relative_error: float
+    best_error: float
+    errors: dict[int, float]
+
+    def __len__(self) -> int:
+        return self.modulus.shape[0]
+
+    @property
+    def zero_shear_viscosity(self) -> float:
+        """η₀ = Σ G_k λ_k, in Pa s."""
+        return float(np.sum(self.modulus * self.relaxation_time))
+
+    def moduli(
+        self, angular_frequency: Float[np.ndarray, " n"]
+    ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """Return G′ and G″ in Pa at frequencies in rad/s."""
+        x = angular_frequency[:, None] * self.relaxation_time
+        return (x**2 / (1 + x**2)) @ self.modulus, (x / (1 + x**2)) @ self.modulus
+
+
+def relaxation_spectrum(
+    sweep: LinearSweep, most_modes: int = MOST_MODES, tolerance: float = TOLERANCE
+) -> RelaxationSpectrum:
+    """Return the spectrum with the fewest modes that fits nearly as well as any.
+
+    Relaxation times are spaced evenly in log time over the range of the sweep, widened by up to
+    half a decade on each side; moduli come from non-negative least squares on the relative misfit
+    of G′ and G″   [Baumgärtel & Winter 1989, Rheol. Acta 28, 511, for the aim; NNLS: Lawson &
+    Hanson 1974]. Grids of 1 to `most_modes` times are tried; moduli that come out zero are not
+    modes. Chosen is the spectrum with the fewest modes whose error is within the factor
+    `tolerance` of the smallest error found, or below 1 %, whichever is the larger.
+
+    Parameters
+    ----------
+    sweep
+        G′ and G″.
+    most_modes
+        Largest number of relaxation times tried.
+    tolerance
+        How much worse than the best a spectrum may be, as a factor of 1 or more.
+
+    Raises
+    ------
+    InputError
+        If the sweep is too short or an argument is out of range.
+    """
+    if len(sweep.angular_frequency) < 2:
+        raise InputError(
+            "A relaxation spectrum needs a sweep of at least 2 frequencies; got "
+            f"{len(sweep.angular_frequency)}."
+        )
+    if most_modes < 1 or tolerance < 1.0:
+        raise InputError(
+            f"most_modes must be at least 1 and tolerance at least 1; got {most_modes} and "
+            f"{tolerance}."
+        )
+    # more unknowns than data would fit the noise
+    most_modes = min(most_modes, len(sweep.angular_frequency))
+    trials = [
+        _fit(sweep, n, margin) for n in range(1, most_modes + 1) for margin in MARGINS[: 2 * n]
+    ]
+    best = min(error for _, _, error in trials)
+    errors: dict[int, float] = {}
+    for modulus, _, error in trials:
+        errors[len(modulus)] = min(error, errors.get(len(modulus), np.inf))
+    within = [trial for trial in trials if trial[2] <= max(tolerance * best, FLOOR)]
+    modulus, relaxation_time, error = min(within, key=lambda trial: (len(trial[0]), trial[2]))
+    return RelaxationSpectrum(modulus, relaxation_time, error, best, dict(sorted(errors.items())))
+
+
+def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndarray, float]:
+    frequency = sweep.angular_frequency
+    longest = 10.0**margin / frequency.min()
+    shortest = 10.0**-margin / frequency.max()
+    times = np.geomspace(shortest, longest, n) if n > 1 else np.array([(longest * shortest) ** 0.5])
+    x = frequency[:, None] * times
+    design = np.concatenate(
+        [
+            x**2 / (1 + x**2) / sweep.storage_modulus[:, None],
+            x / (1 + x**2) / sweep.loss_modulus[:, None],
+        ]
+    )
+    # columns of similar size: moduli may span many decades
+    scale = np.linalg.norm(design, axis=0)
+    modulus, _ = nnls(design / scale, np.ones(len(design)), maxiter=100 * n + 100)
+    modulus = modulus / scale
+    error = float(np.sqrt(np.mean((design @ modulus - 1.0) ** 2)))
+    keep = modulus > 0
+    return modulus[keep], times[keep], error

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
+from discover.errors import InputError
+
+
+def sweep_of(modulus, relaxation_time, frequency):
+    truth = RelaxationSpectrum(np.asarray(modulus), np.asarray(relaxation_time), 0.0, 0.0, {})
+    return LinearSweep(frequency, *truth.moduli(frequency))
+
+
+def test_a_single_mode_is_found_as_one_mode():
+    # the grid of one time sits in the middle of the sweep, where this mode is
+    frequency = np.geomspace(1e-2, 1e2, 41)
+    spectrum = relaxation_spectrum(sweep_of([100.0], [1.0], frequency))
+    np.testing.assert_allclose(spectrum.modulus, [100.0], rtol=1e-10)
+    np.testing.assert_allclose(spectrum.relaxation_time, [1.0], rtol=1e-10)
+
+
+def test_the_fitted_moduli_reproduce_a_broad_sweep():
+    frequency = np.geomspace(1e-3, 1e3, 61)
+    times = np.geomspace(1e-3, 1e3, 7)
+    sweep = sweep_of(1e4 * times**-0.3, times, frequency)
+    spectrum = relaxation_spectrum(sweep)
+    storage, loss = spectrum.moduli(frequency)
+    error = np.concatenate([storage / sweep.storage_modulus, loss / sweep.loss_modulus]) - 1
+    assert spectrum.relative_error == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert spectrum.relative_error < 0.05
+    assert np.all(spectrum.modulus > 0)
+
+
+def test_a_looser_rule_takes_fewer_modes_and_a_larger_error():
+    frequency = np.geomspace(1e-3, 1e3, 61)
+    # times off the grids that are tried, so that no grid fits exactly
+    times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
+    sweep = sweep_of(1e4 * times**-0.3, times, frequency)
+    noise = 1 + 0.03 * np.random.default_rng(0).standard_normal(61)
+    sweep = LinearSweep(frequency, sweep.storage_modulus * noise, sweep.loss_modulus)
+    tight, loose = relaxation_spectrum(sweep), relaxation_spectrum(sweep, tolerance=3.0)
+    assert len(loose) < len(tight)
+    assert loose.relative_error > tight.relative_error
+    assert loose.relative_error <= 3.0 * loose.best_error
+
+
+def test_a_sweep_of_one_frequency_is_refused():
+    one = np.ones(1)
+    with pytest.raises(InputError, match="at least 2 frequencies"):
+        relaxation_spectrum(LinearSweep(one, one, one))
+
+
+def test_the_melt_needs_a_dozen_modes_and_misses_its_sweep_by_under_4_percent(measured_data):
+    sweep = load_dataset(measured_data / "pi95k-startup").linear_sweep
+    assert sweep is not None
+    spectrum = relaxation_spectrum(sweep)
+    assert 10 <= len(spectrum) <= 16
+    assert spectrum.relative_error < 0.04

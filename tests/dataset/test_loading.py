@@ -1,0 +1,165 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.dataset import check_folder, load_dataset
+from discover.dataset.differentiation import differentiate
+from discover.errors import InputError
+
+GOOD = {
+    "runs.csv": "file,factor,label\na.csv,2.0,first\nb.csv,4.0,second\n",
+    "a.csv": "time_s,shear_rate_1_s,stress_Pa,N1_Pa\n1,0.5,2,0\n2,0.5,4,1\n3,0.5,5,2\n",
+    "b.csv": "time_s,shear_rate_1_s,stress_Pa\n0,0,0\n1,1,2\n2,2,3\n",
+    "lve.csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n10,50,5\n1,25,25\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    def write(**changes):
+        for name, text in (GOOD | {k.replace("__", "."): v for k, v in changes.items()}).items():
+            if text is not None:
+                (tmp_path / name).write_text(text)
+        return tmp_path
+
+    return write
+
+
+def test_a_constant_rate_is_a_start_up_and_a_varying_one_is_followed(folder):
+    data = load_dataset(folder(), clock_factor="factor")
+    steady, varying = data["a.csv"], data["b.csv"]
+    assert steady.clock_factor == 2.0
+    assert steady.metadata["label"] == "first"
+    # the flow starts at t = 0 although the first sample is at 1 s
+    assert float(steady.protocol.strain(jnp.asarray(1.0))) == pytest.approx(0.5)
+    assert float(varying.protocol.shear_rate(jnp.asarray(1.5))) == pytest.approx(1.5)
+    np.testing.assert_array_equal(steady.first_normal_stress_difference, [0.0, 1.0, 2.0])
+    assert varying.first_normal_stress_difference is None
+
+
+def test_the_sweep_is_sorted_by_frequency(folder):
+    sweep = load_dataset(folder()).linear_sweep
+    assert sweep is not None
+    np.testing.assert_array_equal(sweep.angular_frequency, [1.0, 10.0])
+    np.testing.assert_array_equal(sweep.storage_modulus, [25.0, 50.0])
+
+
+def test_units_in_column_names_are_converted(folder):
+    data = load_dataset(
+        folder(
+            a__csv="time_ms,shear_rate_1_min,stress_kPa,strain_percent\n0,60,0,0\n100,60,0.5,10\n",
+            lve__csv="omega_Hz,Gp_kPa,Gpp_dyn_cm2\n1,1,10\n",
+        )
+    )
+    run = data["a.csv"]
+    np.testing.assert_allclose(run.time, [0.0, 0.1])
+    np.testing.assert_allclose(run.shear_rate, 1.0)
+    np.testing.assert_allclose(run.shear_stress, [0.0, 500.0])
+    np.testing.assert_allclose(run.strain, [0.0, 0.1])
+    assert data.linear_sweep is not None
+    np.testing.assert_allclose(data.linear_sweep.angular_frequency, 2 * np.pi)
+    np.testing.assert_allclose(data.linear_sweep.loss_modulus, 1.0)  # 10 dyn/cm2 = 1 Pa
+
+
+def test_a_column_that_only_begins_like_a_quantity_is_not_taken_for_it(folder):
+    text = "time_s,shear_rate_1_s,stress_Pa,strain_since_first_sample\n0,1,0,7\n1,1,1,8\n"
+    assert load_dataset(folder(a__csv=text))["a.csv"].strain is None
+
+
+def test_the_rate_is_derived_from_strain_and_the_run_says_so(folder):
+    time = np.linspace(0, 6, 400)
+    rows = "\n".join(f"{t:.8f},{np.sin(t):.10f},1" for t in time)
+    run = load_dataset(folder(a__csv="time_s,strain,stress_Pa\n" + rows))["a.csv"]
+    # a cubic over 15 samples of 15 ms: truncation error below 1e-4 at the ends
+    np.testing.assert_allclose(run.shear_rate, np.cos(time), atol=1e-4)
+    assert "derived from strain" in str(run.metadata["shear_rate_source"])
+
+
+def test_smoothing_reduces_noise_and_keeps_a_cubic_on_uneven_samples():
+    generator = np.random.default_rng(0)
+    time = np.cumsum(generator.uniform(0.5, 1.5, 200)) * 1e-2
+    cubic = 1 + 2 * time - time**2 + time**3
+    slope = 2 - 2 * time + 3 * time**2
+    np.testing.assert_allclose(differentiate(time, cubic), slope, rtol=1e-9)
+    noisy = cubic + 1e-3 * generator.standard_normal(200)
+    rough = np.sqrt(np.mean((np.gradient(noisy, time) - slope)[8:-8] ** 2))
+    smooth = np.sqrt(np.mean((differentiate(time, noisy) - slope)[8:-8] ** 2))
+    assert smooth < 0.5 * rough
+
+
+BAD = [
+    ({"runs__csv": None}, "has no runs.csv"),
+    ({"runs__csv": "name\na.csv\n"}, "no column 'file'"),
+    ({"runs__csv": "file\n"}, "no rows"),
+    ({"runs__csv": ""}, "is empty"),
+    ({"runs__csv": "file\n../a.csv\n"}, "outside the folder"),
+    ({"runs__csv": "file\n/etc/passwd\n"}, "outside the folder"),
+    ({"runs__csv": "file\na.csv\na.csv\n"}, "names a.csv twice"),
+    ({"runs__csv": "file\nmissing.csv\n"}, "no file missing.csv"),
+    ({"a__csv": ""}, "a.csv is empty"),
+    ({"a__csv": "time_s,shear_rate_1_s\n0,1\n"}, "no column stress_Pa"),
+    ({"a__csv": "time_s,stress_Pa\n0,1\n"}, "no column shear_rate_1_s"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_s\n0,1,1\n"}, "not a unit of stress"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa,stress_kPa\n0,1,1,1\n"}, "Keep one"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n1,1,nan\n"}, "line 3 holds nan"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n1,1,\n"}, "line 3 holds nothing"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n1,1,__import__('os')\n"}, "__import__"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n2,1,1\n1,1,1\n"}, "line 4 holds 1 s"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n-1,1,1\n"}, "start at or after 0"),
+    ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n1,1,1,1,1\n"}, "not a comma-separated"),
+    ({"lve__csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n1,-5,5\n"}, "G' in lve.csv must be positive"),
+    ({"lve__csv": "omega_rad_s,Gp_Pa\n1,5\n"}, "no column Gpp_Pa"),
+]
+
+
+@pytest.mark.parametrize(("changes", "message"), BAD)
+def test_bad_input_gives_one_message_that_says_what_and_where(folder, changes, message):
+    root = folder(**changes)
+    with pytest.raises(InputError) as error:
+        load_dataset(root)
+    assert message in str(error.value)
+    assert any(message in problem for problem in check_folder(root))
+
+
+def test_a_sound_folder_has_only_the_problem_of_short_runs(folder):
+    rows = "".join(f"{t},1,{t}\n" for t in range(12))
+    text = "time_s,shear_rate_1_s,stress_Pa\n" + rows
+    assert check_folder(folder(a__csv=text, b__csv=text)) == []
+    assert "only 3 samples" in check_folder(folder())[0]
+
+
+def test_every_problem_is_listed_at_once(folder):
+    root = folder(a__csv="time_s\n0\n", lve__csv="omega_rad_s\n1\n")
+    problems = check_folder(root)
+    assert sum("no column" in problem for problem in problems) == 2
+
+
+@pytest.mark.parametrize(("text", "message"), [("0", "must be positive"), ("x", "finite numbers")])
+def test_a_bad_clock_factor_is_refused(folder, text, message):
+    root = folder(runs__csv=f"file,factor\na.csv,{text}\n")
+    with pytest.raises(InputError, match=message):
+        load_dataset(root, clock_factor="factor")
+    with pytest.raises(InputError, match="only file, factor"):
+        load_dataset(root, clock_factor="other")
+
+
+def test_a_relative_folder_is_found_through_the_variable(folder, monkeypatch):
+    root = folder()
+    monkeypatch.setenv("DISCOVER_DATA", str(root.parent))
+    assert load_dataset(root.name).names == ("a.csv", "b.csv")
+    with pytest.raises(InputError, match="no data folder 'nowhere'"):
+        load_dataset("nowhere")
+
+
+def test_the_measured_folders_load(measured_data):
+    melt = load_dataset(measured_data / "pi95k-startup", clock_factor="time_factor")
+    assert len(melt) == 11
+    assert melt["pi_Tm23_rate1.csv"].clock_factor == pytest.approx(14.771)
+    assert melt["pi_Tm10_rate0p01.csv"].time[0] > 0
+    gel = load_dataset(measured_data / "gel-laos")
+    assert "derived" in str(gel.runs[0].metadata["shear_rate_source"])
+    blood = load_dataset(measured_data / "blood-steps")
+    assert blood.linear_sweep is None
+    assert len(blood) == 6
+    for name in ("pi95k-startup", "gel-laos", "blood-steps"):
+        assert check_folder(measured_data / name) == []
