@@ -1,0 +1,310 @@
+"""The scikit-learn estimator: runs in, a sparse constitutive law out."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted
+
+from discover.dataset.run import ShearRun
+from discover.errors import InputError
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
+from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.tensor_sindy.intervals import standard_errors
+from discover.learners.tensor_sindy.optimisers import check_optimiser, solve_sparse
+from discover.learners.tensor_sindy.problem import as_runs, make_problem
+from discover.learners.tensor_sindy.refit import Fit
+from discover.learners.tensor_sindy.report import path_table, rival_table
+from discover.learners.tensor_sindy.search import SupportSearch
+from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
+from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
+from discover.simulate.solve import solve_batch
+from tensor_library.library import TermLibrary, build_library
+
+SELECTIONS = ("bic", "held_out")
+
+
+class TensorSINDy(RegressorMixin, BaseEstimator):
+    """Sparse regression on a frame-invariant library, from shear stress alone.
+
+    The normal stresses are integrated, never observed. Along a trial law's trajectory the data
+    give a linear sparse problem for the coefficients; a pysindy optimiser proposes supports, each
+    is refitted without penalty on the integrated trajectories, and forward, backward and swap
+    moves go on from the best until none helps. BIC or held-out runs choose among the sizes; among
+    supports that no observation distinguishes, the simplest.
+
+    Parameters
+    ----------
+    library
+        Candidate terms; by default the eight tensors with constant coefficients.
+    optimizer
+        ``"stlsq"``, ``"sr3"``, ``"ssr"``, ``"frols"``, or a pysindy optimiser.
+    modulus, relaxation_time
+        G in Pa and λ in s, numbers, or arrays with one value for each mode.
+    solvent_viscosity
+        η_s in Pa s.
+    known_relaxation
+        Whether −σ is known. If not, the learner has to find ``sigma`` too.
+    base_law
+        A known dimensionless law to which terms are added; by default UCM.
+    use_normal_stresses
+        Whether N1 and N2, where measured, join as observed rows.
+    selection
+        ``"bic"`` or ``"held_out"``.
+    max_terms
+        Largest support.
+    n_folds
+        Groups of runs for the held-out misfit, at most one for each run; below 2 for none.
+    misfit_floor
+        Relative misfit below which the data count as reproduced: what the fixed-step integration
+        can promise. Laws that differ by less are ties.
+    strain_step
+        Largest strain between steps of the integration.
+    random_state
+        Seed of the division of runs into folds.
+    progress
+        Called with a line of text, or None.
+
+    Attributes
+    ----------
+    result_ : LearnerResult
+        The law with its terms, path, rivals and seconds.
+    law_ : LibraryExpansion
+        The dimensionless law.
+    fluid_ : Fluid
+        The law with moduli and relaxation times.
+    terms_ : tuple of RecoveredTerm
+        The terms chosen.
+    library_ : TermLibrary
+        The library searched.
+    coefficients_ : ndarray of shape (n_terms,)
+        Coefficients over the library, zero where a term was left out.
+    inner_ : ndarray of shape (n_inner,)
+        Inner parameters of the library's closed forms.
+    path_ : list of Fit
+        The best fit of each size, from empty on.
+    search_ : SupportSearch
+        Every support that was refitted.
+    """
+
+    def __init__(
+        self,
+        library: TermLibrary | None = None,
+        optimizer: Any = "stlsq",
+        modulus: Any = 1.0,
+        relaxation_time: Any = 1.0,
+        solvent_viscosity: float = 0.0,
+        known_relaxation: bool = True,
+        base_law: Any = None,
+        use_normal_stresses: bool = False,
+        selection: str = "bic",
+        max_terms: int = 5,
+        n_folds: int = 8,
+        misfit_floor: float = 1e-5,
+        strain_step: float = 0.2,
+        random_state: int | None = 0,
+        progress: Any = None,
+    ):
+        self.library = library
+        self.optimizer = optimizer
+        self.modulus = modulus
+        self.relaxation_time = relaxation_time
+        self.solvent_viscosity = solvent_viscosity
+        self.known_relaxation = known_relaxation
+        self.base_law = base_law
+        self.use_normal_stresses = use_normal_stresses
+        self.selection = selection
+        self.max_terms = max_terms
+        self.n_folds = n_folds
+        self.misfit_floor = misfit_floor
+        self.strain_step = strain_step
+        self.random_state = random_state
+        self.progress = progress
+
+    def fit(self, X: Sequence[ShearRun], y=None) -> "TensorSINDy":
+        """Find the law of these runs.
+
+        Parameters
+        ----------
+        X
+            Runs.
+        y
+            Ignored: the observations are part of the runs.
+
+        Raises
+        ------
+        InputError
+            If a parameter or a run is unusable.
+        """
+        del y
+        started = time.perf_counter()
+        self._check_parameters()
+        library = build_library() if self.library is None else self.library
+        problem = make_problem(
+            X,
+            library,
+            self.modulus,
+            self.relaxation_time,
+            self.solvent_viscosity,
+            self.base_law,
+            self.known_relaxation,
+            self.use_normal_stresses,
+            self.strain_step,
+        )
+        search = SupportSearch(
+            problem, self.optimizer, self.max_terms, self.misfit_floor, self.progress
+        )
+        path = search.run()
+        n_runs = problem.target.shape[0]
+        held_out = None
+        if min(n_runs, self.n_folds) > 1:
+            folds = run_folds(n_runs, self.n_folds, self.random_state)
+            held_out = held_out_misfits(problem, path, folds, search.scale, search.slots)
+        criterion = np.array([search.criterion(fit) for fit in path])
+        if self.selection == "held_out":
+            if held_out is None:
+                raise InputError("selection='held_out' needs at least two runs and two folds.")
+            chosen = choose_by_held_out(held_out, self.misfit_floor)
+        else:
+            chosen = choose_by_bic(criterion)
+        fit = path[chosen]
+
+        self.search_ = search
+        self.path_ = path
+        self.library_ = library
+        self.n_features_in_ = 1
+        self.coefficients_ = fit.dense(len(library))
+        self.inner_ = fit.inner
+        self.law_ = self._law(library, fit)
+        self.fluid_ = Fluid(
+            self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
+        )
+        self.terms_ = self._terms(search, fit)
+        misfits = [misfit for _, misfit in search.history]
+        self.result_ = LearnerResult(
+            learner="tensor_sindy",
+            law=self.law_,
+            terms=self.terms_,
+            train_seconds=time.perf_counter() - started,
+            loss_history=(
+                np.arange(1, len(misfits) + 1),
+                np.minimum.accumulate(np.square(misfits)),
+            ),
+            details={
+                "path": path_table(search, path, criterion, held_out),
+                "chosen": chosen,
+                "selection": self.selection,
+                "rivals": rival_table(search, fit),
+                "iterations": len(misfits),
+                "optimizer": self.optimizer
+                if isinstance(self.optimizer, str)
+                else type(self.optimizer).__name__,
+                "misfit": fit.misfit,
+                "n_observations": problem.n_observations,
+            },
+            message=(
+                f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
+                f"{fit.misfit:.2g}; {len(search.fits)} supports were refitted."
+            ),
+        )
+        return self
+
+    def predict(self, X: Sequence[ShearRun]) -> Float[np.ndarray, " rows"]:
+        """Return σ12 in Pa at the samples of all runs, one run after the other."""
+        return np.concatenate(self._predict_runs(X))
+
+    def score(self, X: Sequence[ShearRun], y=None, sample_weight=None) -> float:
+        """Return one minus the relative error of σ12, averaged over runs.
+
+        The error of a run is the root-mean-square of prediction minus measurement over the
+        root-mean-square of the measurement. A law that runs away scores minus infinity.
+        """
+        del y, sample_weight
+        errors = [
+            np.sqrt(np.mean((p - run.shear_stress) ** 2) / np.mean(run.shear_stress**2))
+            for p, run in zip(self._predict_runs(X), as_runs(X), strict=True)
+        ]
+        error = float(np.mean(errors))
+        return 1.0 - error if np.isfinite(error) else -np.inf
+
+    def _predict_runs(self, X) -> list[Float[np.ndarray, " n"]]:
+        check_is_fitted(self, "fluid_")
+        runs = as_runs(X)
+        # the same padded layout as in the fit, so that folds share a compilation
+        problem = make_problem(runs, self.library_, strain_step=self.strain_step)
+        stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
+        return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
+
+    def _law(self, library: TermLibrary, fit: Fit) -> LibraryExpansion:
+        support = list(fit.support)
+        smaller = library.subset(support) if support else library.subset([0])
+        coefficients = fit.coefficients if support else np.zeros(1)
+        inner = [fit.inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
+        relaxes = (
+            self.known_relaxation if self.base_law is None else self.base_law.linear_relaxation
+        )
+        return LibraryExpansion(
+            jnp.asarray(coefficients), jnp.asarray(inner, float), smaller, relaxes, self.base_law
+        )
+
+    def _terms(self, search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...]:
+        problem, library = search.problem, search.problem.library
+        if not fit.support:
+            return ()
+        errors, _, factor = standard_errors(problem, fit)
+        model = search.model_at(fit)
+        solutions = {
+            s.support: s.coefficients
+            for s in solve_sparse(self.optimizer, model.design, model.target, search.slots)
+        }
+        penalised = solutions.get(fit.support)
+        if penalised is None:
+            # the optimiser left to itself stops elsewhere: what it says of these terms alone
+            support = list(fit.support)
+            alone = solve_sparse(
+                self.optimizer, model.design[:, support], model.target, len(support)
+            )
+            penalised = np.zeros(len(library))
+            if alone:
+                penalised[support] = max(alone, key=lambda s: len(s.support)).coefficients
+        terms = []
+        for position, (index, value) in enumerate(zip(fit.support, fit.coefficients, strict=True)):
+            term = library.terms[index]
+            half = factor * errors[position]
+            inner = {
+                form.inner_name: float(fit.inner[i])
+                for i, form in enumerate(library.forms)
+                if form.name == term.closed_form
+            }
+            terms.append(
+                RecoveredTerm(
+                    term=term.name,
+                    coefficient=float(value),
+                    coefficient_penalised=float(penalised[index]),
+                    ci95=(float(value - half), float(value + half)),
+                    inner=inner,
+                    latex=term.latex(),
+                )
+            )
+        return tuple(terms)
+
+    def _check_parameters(self) -> None:
+        check_optimiser(self.optimizer)
+        if self.selection not in SELECTIONS:
+            raise InputError(
+                f"selection must be one of {', '.join(SELECTIONS)}; got {self.selection!r}."
+            )
+        if self.library is not None and not isinstance(self.library, TermLibrary):
+            raise InputError(
+                "library must be a TermLibrary; got a "
+                f"{type(self.library).__name__}. Use tensor_library.build_library."
+            )
+        if self.max_terms < 1:
+            raise InputError(f"max_terms must be at least 1; got {self.max_terms}.")
+        if not self.misfit_floor > 0:
+            raise InputError(f"misfit_floor must be positive; got {self.misfit_floor}.")

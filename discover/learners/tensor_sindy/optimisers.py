@@ -1,0 +1,132 @@
+"""pysindy's sparse optimisers on a bare design matrix, swept from dense to empty."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+import pysindy
+from jaxtyping import Float
+from pysindy.optimizers import FROLS, SR3, SSR, STLSQ
+from sklearn.base import clone
+
+from discover.errors import InputError
+
+OPTIMISERS = ("stlsq", "sr3", "ssr", "frols")
+"""Optimisers that can be asked for by name; a pysindy optimiser may be given instead."""
+
+_STRENGTHS = np.geomspace(1e-3, 1.0, 13)
+_RIDGE = 1e-8  # columns have unit norm: enough to make collinear ones solvable, no more
+
+
+@dataclass(frozen=True)
+class SparseSolution:
+    """One solution of a sparse linear problem.
+
+    Attributes
+    ----------
+    support
+        Positions of the non-zero coefficients, increasing.
+    coefficients
+        All coefficients as the optimiser left them: thresholded or penalised, not refitted.
+    """
+
+    support: tuple[int, ...]
+    coefficients: Float[np.ndarray, " n"]
+
+
+def check_optimiser(optimizer) -> None:
+    """Raise InputError unless this is a known name or a pysindy optimiser."""
+    if isinstance(optimizer, str):
+        if optimizer.lower() not in OPTIMISERS:
+            raise InputError(
+                f"Unknown optimizer {optimizer!r}; write one of {', '.join(OPTIMISERS)}, or pass a "
+                "pysindy optimizer."
+            )
+    elif not isinstance(optimizer, pysindy.optimizers.BaseOptimizer):
+        raise InputError(
+            f"optimizer must be one of {', '.join(OPTIMISERS)} or a pysindy optimizer; got a "
+            f"{type(optimizer).__name__}."
+        )
+
+
+def solve_sparse(
+    optimizer,
+    design: Float[np.ndarray, "rows n"],
+    target: Float[np.ndarray, " rows"],
+    max_terms: int,
+) -> list[SparseSolution]:
+    """Return the solutions of an optimiser from its mildest to its strictest setting.
+
+    Columns are brought to unit norm and the target too, so that one threshold means the same in
+    every problem: the share of the signal that a term must carry.
+
+    Parameters
+    ----------
+    optimizer
+        A name of `OPTIMISERS`, or a pysindy optimiser, which is used as it is set.
+    design, target
+        The linear problem design @ c ≈ target.
+    max_terms
+        Largest support of interest to a forward method.
+
+    Returns
+    -------
+    Solutions with different, non-empty supports.
+    """
+    check_optimiser(optimizer)
+    norms = np.linalg.norm(design, axis=0)
+    usable = np.flatnonzero(norms > 1e-12 * max(np.max(norms, initial=0.0), 1e-300))
+    size = float(np.linalg.norm(target))
+    if usable.size == 0 or size == 0.0:
+        return []
+    matrix, right = design[:, usable] / norms[usable], target / size
+    solutions: dict[tuple[int, ...], SparseSolution] = {}
+    for normalised in _sweep(optimizer, matrix, right, max_terms):
+        coefficients = np.zeros(design.shape[1])
+        coefficients[usable] = normalised * size / norms[usable]
+        support = tuple(int(i) for i in np.flatnonzero(coefficients))
+        if support and np.all(np.isfinite(coefficients)):
+            solutions.setdefault(support, SparseSolution(support, coefficients))
+    return list(solutions.values())
+
+
+def _sweep(optimizer, matrix, right, max_terms):
+    """Yield normalised coefficients."""
+    n = matrix.shape[1]
+    if not isinstance(optimizer, str):
+        # a clone: pysindy's optimisers may change their own settings while they fit
+        yield from _fitted(clone(optimizer), matrix, right, history=False)
+        return
+    name = optimizer.lower()
+    if name == "stlsq":
+        for strength in _STRENGTHS:
+            yield from _fitted(
+                STLSQ(threshold=strength, alpha=_RIDGE, unbias=False), matrix, right, False
+            )
+    elif name == "sr3":
+        for strength in _STRENGTHS:
+            # L0 with relaxation ν thresholds at √(2 λ ν)
+            optimiser = SR3(
+                reg_weight_lam=0.5 * strength**2, relax_coeff_nu=1.0, max_iter=200, unbias=False
+            )
+            yield from _fitted(optimiser, matrix, right, False)
+    elif name == "ssr":
+        yield from _fitted(SSR(alpha=_RIDGE, max_iter=n, unbias=False), matrix, right, True)
+    else:
+        steps = min(max_terms + 1, n)
+        yield from _fitted(FROLS(alpha=_RIDGE, max_iter=steps, unbias=False), matrix, right, True)
+
+
+def _fitted(optimiser, matrix, right, history):
+    with warnings.catch_warnings():
+        # "eliminated all coefficients" and "did not converge" are ordinary ends of a sweep
+        warnings.simplefilter("ignore")
+        try:
+            optimiser.fit(matrix, right)
+        except (ValueError, np.linalg.LinAlgError):
+            return  # collinear columns at this setting; other settings and moves remain
+    if history:
+        for coefficients in optimiser.history_:
+            yield np.asarray(coefficients, dtype=float).reshape(-1)
+    else:
+        yield np.asarray(optimiser.coef_, dtype=float).reshape(-1)

@@ -1,0 +1,188 @@
+"""The data of a fit, laid out once on the host so that every trial law shares one compilation."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from discover.dataset.run import ShearRun
+from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.simulate.grid import IntegrationGrid, make_grids
+from tensor_library.library import TermLibrary
+
+OBSERVED = ("shear_stress", "first_normal_stress_difference", "second_normal_stress_difference")
+"""What may be observed, in the order of the observation axis: σ12, N1, N2."""
+
+_PADDED_SAMPLES = 16
+_PADDED_STEPS = 32
+
+
+class TrajectoryProblem(eqx.Module):
+    """Runs, known physics and library of a fit.
+
+    Attributes
+    ----------
+    library
+        Candidate terms of the unknown part.
+    base
+        The known law; the library's terms are added to its extra term.
+    modulus, relaxation_time
+        Of each mode, shape (k,), in Pa and s.
+    solvent_viscosity
+        In Pa s.
+    protocols, grids
+        Batched over runs.
+    target
+        Observed σ12, N1, N2, shape (runs, n, 3), zero where nothing was observed.
+    weight
+        Of each observation: one over the root-mean-square of its run and kind, over the square
+        root of the number of observations; zero where nothing was observed. A residual vector
+        thus has a norm equal to the relative misfit.
+    order_of_time
+        Time over the duration of the run, shape (runs, n).
+    """
+
+    library: TermLibrary = eqx.field(static=True)
+    base: AbstractConstitutiveLaw
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+    solvent_viscosity: Float[Array, ""]
+    protocols: ShearProtocol
+    grids: IntegrationGrid
+    target: Float[Array, "runs n 3"]
+    weight: Float[Array, "runs n 3"]
+    order_of_time: Float[Array, "runs n"]
+
+    @property
+    def n_observations(self) -> int:
+        """Number of values observed."""
+        return int(np.sum(np.asarray(self.weight) > 0))
+
+    @property
+    def run_of_row(self) -> Int[np.ndarray, " rows"]:
+        """Run to which each row of the flattened observations belongs."""
+        runs, samples, kinds = self.target.shape
+        return np.repeat(np.arange(runs), samples * kinds)
+
+
+def as_runs(runs: Sequence[ShearRun]) -> list[ShearRun]:
+    """Return the runs as a list, having checked that they are runs.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one is something else.
+    """
+    listed = list(runs)
+    if not listed:
+        raise InputError("A fit needs at least one run; got none.")
+    for run in listed:
+        if not isinstance(run, ShearRun):
+            raise InputError(
+                f"Runs must be discover.dataset.ShearRun objects; got a {type(run).__name__}. "
+                "Load a folder or make a synthetic data set."
+            )
+    return listed
+
+
+def make_problem(
+    runs: Sequence[ShearRun],
+    library: TermLibrary,
+    modulus: Float[np.ndarray, " k"] | float = 1.0,
+    relaxation_time: Float[np.ndarray, " k"] | float = 1.0,
+    solvent_viscosity: float = 0.0,
+    base: AbstractConstitutiveLaw | None = None,
+    known_relaxation: bool = True,
+    use_normal_stresses: bool = False,
+    strain_step: float = 0.1,
+) -> TrajectoryProblem:
+    """Return the problem of finding library terms from runs.
+
+    Parameters
+    ----------
+    runs
+        Measured or synthetic runs.
+    library
+        Candidate terms.
+    modulus, relaxation_time, solvent_viscosity
+        Known linear viscoelasticity, in Pa, s and Pa s.
+    base
+        Known law, by default UCM, with or without its linear relaxation.
+    known_relaxation
+        Whether −σ is known; ignored where `base` is given.
+    use_normal_stresses
+        Whether N1 and N2, where measured, are observed too.
+    strain_step
+        Largest strain between two steps of the integration.
+
+    Raises
+    ------
+    InputError
+        If runs or moduli are unusable.
+    """
+    runs = as_runs(runs)
+    modulus = np.atleast_1d(np.asarray(modulus, dtype=float))
+    relaxation_time = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
+    if modulus.shape != relaxation_time.shape or modulus.ndim != 1:
+        raise InputError(
+            "modulus and relaxation_time must have one value for each mode; got shapes "
+            f"{modulus.shape} and {relaxation_time.shape}."
+        )
+    for label, values in (("modulus", modulus), ("relaxation_time", relaxation_time)):
+        if not np.all(np.isfinite(values) & (values > 0)):
+            raise InputError(f"{label} must be positive and finite; got {values.tolist()}.")
+    longest = max(len(run) for run in runs)
+    padded = -(-longest // _PADDED_SAMPLES) * _PADDED_SAMPLES
+    target = np.zeros((len(runs), padded, 3))
+    weight = np.zeros_like(target)
+    order = np.full((len(runs), padded), np.inf)
+    for i, run in enumerate(runs):
+        order[i, : len(run)] = run.time / max(run.time[-1], np.finfo(float).tiny)
+        for kind, name in enumerate(OBSERVED):
+            values = getattr(run, name)
+            if values is None or (kind > 0 and not use_normal_stresses):
+                continue
+            scale = float(np.sqrt(np.mean(values**2)))
+            if scale == 0.0:
+                if kind == 0:
+                    raise InputError(
+                        f"The shear stress of the run {run.name!r} is zero throughout: it says "
+                        "nothing of the law. Leave the run out."
+                    )
+                continue  # a normal stress difference may vanish in truth, but sets no scale
+            target[i, : len(run), kind] = values
+            weight[i, : len(run), kind] = 1.0 / scale
+    grids = make_grids([r.protocol for r in runs], [r.time for r in runs], strain_step=strain_step)
+    return TrajectoryProblem(
+        library=library,
+        base=UpperConvectedMaxwell(known_relaxation) if base is None else base,
+        modulus=jnp.asarray(modulus),
+        relaxation_time=jnp.asarray(relaxation_time),
+        solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
+        protocols=stack_protocols([r.protocol for r in runs]),
+        grids=_pad_grids(grids, padded),
+        target=jnp.asarray(target),
+        weight=jnp.asarray(weight / np.sqrt(np.sum(weight > 0))),
+        order_of_time=jnp.asarray(order),
+    )
+
+
+def _pad_grids(grids: IntegrationGrid, n_samples: int) -> IntegrationGrid:
+    """Round the shapes up, so that folds of different runs often share a compilation."""
+    times = np.asarray(grids.times)
+    index = np.asarray(grids.sample_index)
+    mask = np.asarray(grids.sample_mask)
+    steps = -(-times.shape[1] // _PADDED_STEPS) * _PADDED_STEPS - times.shape[1]
+    spacing = (times[:, -1] - times[:, -2])[:, None]
+    times = np.concatenate([times, times[:, -1:] + spacing * np.arange(1, steps + 1)], axis=1)
+    samples = n_samples - index.shape[1]
+    return IntegrationGrid(
+        jnp.asarray(times),
+        jnp.asarray(np.pad(index, ((0, 0), (0, samples)), mode="edge")),
+        jnp.asarray(np.pad(mask, ((0, 0), (0, samples)))),
+    )

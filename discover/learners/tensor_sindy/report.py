@@ -1,0 +1,68 @@
+"""What a search says of its path and of rivals, as plain JSON-able tables."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.learners.tensor_sindy.refit import Fit
+from discover.learners.tensor_sindy.search import SupportSearch
+
+_CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
+
+
+def _describe(search: SupportSearch, fit: Fit) -> dict[str, Any]:
+    library = search.problem.library
+    used = {library.terms[i].closed_form for i in fit.support}
+    return {
+        "support": [library.names[i] for i in fit.support],
+        "coefficients": [float(c) for c in fit.coefficients],
+        "inner": {
+            form.inner_name: float(fit.inner[i])
+            for i, form in enumerate(library.forms)
+            if form.name in used
+        },
+        "misfit": fit.misfit,
+        "bic": search.criterion(fit),
+    }
+
+
+def path_table(
+    search: SupportSearch,
+    path: Sequence[Fit],
+    criterion: Float[np.ndarray, " path"],
+    held_out: Float[np.ndarray, "path folds"] | None,
+) -> list[dict[str, Any]]:
+    """Return one row for each member of the path: support, size, misfit, held-out misfit, BIC."""
+    rows = []
+    for i, fit in enumerate(path):
+        row = _describe(search, fit)
+        row["size"] = len(fit.support)
+        row["bic"] = float(criterion[i])
+        row["held_out"] = (
+            None if held_out is None else float(np.sqrt(np.mean(np.square(held_out[i]))))
+        )
+        rows.append(row)
+    return rows
+
+
+def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
+    """Return the supports met that the data do not rule out, closest first.
+
+    A rival is no larger than the chosen support. Its ``difference`` is the relative
+    root-mean-square difference of the two predictions; it is an ``exact`` tie where that is below
+    the floor.
+    """
+    rivals = []
+    limit = search.criterion(chosen) + _CLOSE
+    for fit in search.fits.values():
+        if fit.support == chosen.support or len(fit.support) > len(chosen.support):
+            continue
+        exact = search.indistinguishable(fit, chosen)
+        if exact or search.criterion(fit) < limit:
+            row = _describe(search, fit)
+            row["difference"] = float(np.linalg.norm(fit.predicted - chosen.predicted))
+            row["exact"] = exact
+            rivals.append(row)
+    return sorted(rivals, key=lambda row: row["difference"])

@@ -1,0 +1,245 @@
+"""Search of the support space: proposals of a sparse optimiser, then moves until none helps."""
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from discover.learners.tensor_sindy.linear_model import (
+    LinearModel,
+    additions,
+    all_of_size,
+    distinct,
+    removals,
+    swaps,
+)
+from discover.learners.tensor_sindy.optimisers import solve_sparse
+from discover.learners.tensor_sindy.problem import TrajectoryProblem
+from discover.learners.tensor_sindy.refit import LANES, POLISHING, SCREENING, Fit, refit
+from discover.learners.tensor_sindy.selection import extended_bic
+
+_HORIZONS = (0.2, 0.5)
+_ROUNDS = 3
+
+
+class SupportSearch:
+    """Every support that was refitted, and the moves between them.
+
+    Sparse proposals come from a linear model of the trajectory, which is good near the law at
+    which it was made. So each proposal is refitted on the integrated trajectories, the model is
+    made again at the best of them, and this goes on until no proposal is new. Early models are
+    made on the beginning of each run only, where even a wrong law has not strayed far.
+
+    Parameters
+    ----------
+    problem
+        Data, known physics and library.
+    optimizer
+        As in `solve_sparse`.
+    max_terms
+        Largest support.
+    floor
+        Relative misfit below which data are reproduced as well as the integration allows.
+    progress
+        Called with a line of text.
+    """
+
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        optimizer,
+        max_terms: int,
+        floor: float,
+        progress: Callable[[str], None] | None = None,
+    ):
+        self.problem = problem
+        self.optimizer = optimizer
+        self.n_terms = len(problem.library)
+        self.slots = min(max_terms, self.n_terms)
+        self.floor = floor
+        self.progress = progress or (lambda line: None)
+        self.fits: dict[tuple[int, ...], Fit] = {}
+        self.history: list[tuple[tuple[int, ...], float]] = []
+        self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
+        self._models: dict[tuple[int, ...], LinearModel] = {}
+        self._sparse: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
+
+    def complexity(self, support: tuple[int, ...]) -> tuple:
+        """Return the order in which indistinguishable supports are preferred.
+
+        Fewer terms, then lower complexity, then fewer invariants (a constant coefficient before
+        a state-dependent one), then the order of the library.
+        """
+        terms = [self.problem.library.terms[i] for i in support]
+        return (
+            len(terms),
+            sum(term.complexity for term in terms),
+            sum(term.degree for term in terms),
+            support,
+        )
+
+    def criterion(self, fit: Fit) -> float:
+        """Return the extended BIC of a fit."""
+        used = {self.problem.library.terms[i].closed_form for i in fit.support} - {None}
+        return extended_bic(
+            max(fit.misfit, self.floor),
+            self.problem.n_observations,
+            len(fit.support),
+            len(used),
+            self.n_terms,
+        )
+
+    def of_size(self, size: int) -> list[Fit]:
+        """Return the fits of one size, best first; exact ties in order of complexity."""
+        ranked = sorted(
+            (f for f in self.fits.values() if len(f.support) == size), key=lambda f: f.misfit
+        )
+        if not ranked:
+            return []
+        tied = [f for f in ranked if self.indistinguishable(f, ranked[0])]
+        tied.sort(key=lambda f: self.complexity(f.support))
+        return tied + [f for f in ranked if not self.indistinguishable(f, ranked[0])]
+
+    def indistinguishable(self, first: Fit, second: Fit) -> bool:
+        """Return whether two laws predict the same of every observation, to the floor."""
+        return float(np.linalg.norm(first.predicted - second.predicted)) <= self.floor
+
+    def run(self) -> list[Fit]:
+        """Return the path: the best fit of each size, from empty to as dense as is of use."""
+        empty = self._refit([()], {}, tolerance=POLISHING)[0]
+        seeds = self._grow_horizon(empty)
+        risen = 0
+        for size in range(1, self.slots + 1):
+            parents = self.of_size(size - 1)[:2]
+            self._try(size, parents, seeds.get(size, {}), limit=2 * LANES if size == 1 else LANES)
+            for _ in range(_ROUNDS):
+                before = self.of_size(size)[0].support
+                if not self._try(size, self.of_size(size)[:1], {}, limit=LANES):
+                    break
+                if self.of_size(size)[0].support == before:
+                    break
+            if size > 1:
+                # a redundant early pick leaves here
+                best = self.of_size(size)[0]
+                unseen = [s for s in removals(best.support) if s not in self.fits]
+                self._refit(unseen, {s: best for s in unseen})
+            best, previous = self.of_size(size)[0], self.of_size(size - 1)[0]
+            self.progress(
+                f"{size} terms: misfit {best.misfit:.3g}, "
+                + ", ".join(self.problem.library.names[i] for i in best.support)
+            )
+            risen = risen + 1 if self.criterion(best) >= self.criterion(previous) else 0
+            if best.misfit <= self.floor or risen == 2:
+                break
+        return self.polish()
+
+    def polish(self) -> list[Fit]:
+        """Refit the best of each size, and its near ties, to the tight tolerance."""
+        largest = max(len(s) for s in self.fits)
+        chosen: list[tuple[int, ...]] = []
+        for size in range(1, largest + 1):
+            ranked = self.of_size(size)
+            limit = max(1.02 * ranked[0].misfit, ranked[0].misfit + 10 * self.floor)
+            chosen += [f.support for f in ranked if f.misfit <= limit][:LANES]
+        self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
+        return [self.of_size(size)[0] for size in range(largest + 1)]
+
+    def model_at(self, fit: Fit) -> LinearModel:
+        """Return the linear model at a fit, made once."""
+        if fit.support not in self._models:
+            self._models[fit.support] = LinearModel.at(self.problem, fit)
+        return self._models[fit.support]
+
+    def _proposals(self, fit: Fit) -> list[tuple[int, ...]]:
+        """Return the supports that the sparse optimiser proposes near a fit, found once."""
+        if fit.support not in self._sparse:
+            model = self.model_at(fit)
+            solutions = solve_sparse(self.optimizer, model.design, model.target, self.slots)
+            self._sparse[fit.support] = [s.support for s in solutions]
+        return self._sparse[fit.support]
+
+    def _grow_horizon(self, empty: Fit) -> dict[int, dict[tuple[int, ...], Fit]]:
+        """Return supports found on the beginnings of the runs, with their fits, by size."""
+        order = np.asarray(self.problem.order_of_time)
+        seeds: dict[int, dict[tuple[int, ...], Fit]] = {}
+        current = empty
+        for horizon in (*_HORIZONS, 1.0):
+            keep = order <= horizon
+            model = LinearModel.at(self.problem, current, keep)
+            if current is empty:
+                norms = np.where(model.norms > 0, model.norms, 1.0)
+                self.scale = 1.0 / norms
+            candidates = self._ranked(model, 1, all_of_size(1, self.n_terms))[: LANES // 2]
+            candidates += self._ranked(model, 2, all_of_size(2, self.n_terms))[:2]
+            proposals = solve_sparse(self.optimizer, model.design, model.target, self.slots)
+            small = [p.support for p in proposals if len(p.support) <= self.slots]
+            candidates = distinct([*small, *candidates])[:LANES]
+            fits = self._refit(candidates, {s: empty for s in candidates}, keep=keep)
+            for fit in fits:
+                seeds.setdefault(len(fit.support), {})[fit.support] = fit
+            sane = [f for f in fits if f.misfit < 100.0]
+            if sane:
+                current = min(sane, key=self.criterion)
+            self.progress(f"first {horizon:.0%} of each run: misfit {current.misfit:.3g}")
+        return seeds
+
+    def _ranked(self, model: LinearModel, size: int, supports) -> list[tuple[int, ...]]:
+        if not supports or size > self.n_terms:
+            return []
+        scores = model.scores(supports)
+        return [supports[i] for i in np.argsort(scores, kind="stable")]
+
+    def _try(self, size: int, centres: list[Fit], seeds: dict, limit: int) -> bool:
+        """Refit the most promising unseen supports of a size; return whether there were any."""
+        starts: dict[tuple[int, ...], Fit] = dict(seeds)
+        candidates = [s for s in seeds if s not in self.fits]
+        share = max(2, (limit - len(candidates)) // max(len(centres), 1))
+        for centre in centres:
+            model = self.model_at(centre)
+            moves = additions if len(centre.support) < size else swaps
+            near = self._ranked(model, size, distinct(moves(centre.support, self.n_terms)))
+            far = self._ranked(model, size, all_of_size(size, self.n_terms)) if size <= 2 else []
+            sparse = [s for s in self._proposals(centre) if len(s) == size]
+            # by turns, so that no source of proposals crowds out another
+            wanted = distinct(
+                s for turn in zip(near, far[: len(near)] or near, strict=False) for s in turn
+            )
+            fresh = [s for s in distinct([*sparse, *wanted]) if s not in self.fits]
+            for support in fresh[:share]:
+                if support not in candidates:
+                    candidates.append(support)
+                    starts[support] = centre
+        self._refit(candidates, starts)
+        return bool(candidates)
+
+    def _refit(
+        self,
+        supports: list[tuple[int, ...]],
+        starts: dict[tuple[int, ...], Fit],
+        keep: Bool[np.ndarray, "runs n"] | None = None,
+        tolerance: float = SCREENING,
+    ) -> list[Fit]:
+        """Refit supports; remember those that were fitted on all samples."""
+        default = (np.zeros(self.n_terms), self.problem.library.inner_default)
+
+        def start_of(support):
+            known = starts.get(support)
+            return default if known is None else (known.dense(self.n_terms), known.inner)
+
+        fits = refit(
+            self.problem,
+            supports,
+            [start_of(s) for s in supports],
+            self.scale,
+            self.slots,
+            None if keep is None else [keep] * len(supports),
+            tolerance,
+        )
+        for fit in fits:
+            if keep is None:
+                old = self.fits.get(fit.support)
+                if old is None or fit.misfit <= old.misfit:
+                    self.fits[fit.support] = fit
+                    self._models.pop(fit.support, None)
+                self.history.append((fit.support, fit.misfit))
+        return fits

@@ -1,0 +1,60 @@
+"""Misfit of every member of a path on runs that its refit did not see."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from discover.learners.tensor_sindy.problem import TrajectoryProblem
+from discover.learners.tensor_sindy.refit import SCREENING, Fit, refit
+
+
+def run_folds(n_runs: int, n_folds: int, random_state: int | None) -> Int[np.ndarray, " runs"]:
+    """Return the fold of each run, dealt out evenly in a seeded random order."""
+    order = np.random.default_rng(random_state).permutation(n_runs)
+    folds = np.empty(n_runs, dtype=int)
+    folds[order] = np.arange(n_runs) % max(1, min(n_folds, n_runs))
+    return folds
+
+
+def held_out_misfits(
+    problem: TrajectoryProblem,
+    path: Sequence[Fit],
+    folds: Int[np.ndarray, " runs"],
+    scale: Float[np.ndarray, " n"],
+    slots: int,
+) -> Float[np.ndarray, "path folds"]:
+    """Return the relative misfit of each member on each fold, refitted on the other folds.
+
+    Parameters
+    ----------
+    problem, scale, slots
+        As in `refit`.
+    path
+        Fits on all runs; refits start from them.
+    folds
+        Fold of each run, from 0.
+    """
+    n_folds = int(np.max(folds)) + 1
+    n_terms = len(problem.library)
+    samples = problem.target.shape[1]
+    pairs = [(member, fold) for member in range(len(path)) for fold in range(n_folds)]
+    fits = refit(
+        problem,
+        [path[member].support for member, _ in pairs],
+        [(path[member].dense(n_terms), path[member].inner) for member, _ in pairs],
+        scale,
+        slots,
+        [np.repeat((folds != fold)[:, None], samples, axis=1) for _, fold in pairs],
+        tolerance=SCREENING**2,
+    )
+    target = np.asarray(problem.weight * problem.target).reshape(-1)
+    observed = np.asarray(problem.weight).reshape(-1) > 0
+    fold_of_row = folds[problem.run_of_row]
+    errors = np.empty((len(path), n_folds))
+    for (member, fold), fit in zip(pairs, fits, strict=True):
+        rows = observed & (fold_of_row == fold)
+        squares = np.sum((fit.predicted[rows] - target[rows]) ** 2)
+        # weights carry 1/√(all observations); here the mean is over this fold's
+        errors[member, fold] = np.sqrt(squares * problem.n_observations / max(np.sum(rows), 1))
+    return errors
