@@ -260,7 +260,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         model = search.model_at(fit)
         solutions = {
             s.support: s.coefficients
-            for s in solve_sparse(self.optimizer, model.design, model.target, search.slots)
+            for s in solve_sparse(self.optimizer, model.design, model.target, search.largest)
         }
         penalised = solutions.get(fit.support)
         if penalised is None:

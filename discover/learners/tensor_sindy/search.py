@@ -20,6 +20,7 @@ from discover.learners.tensor_sindy.selection import extended_bic
 
 _HORIZONS = (0.2, 0.5)
 _ROUNDS = 3
+_FEWEST_SLOTS = 5
 
 
 class SupportSearch:
@@ -55,7 +56,9 @@ class SupportSearch:
         self.problem = problem
         self.optimizer = optimizer
         self.n_terms = len(problem.library)
-        self.slots = min(max_terms, self.n_terms)
+        self.largest = min(max_terms, self.n_terms)
+        # never fewer, so that searches of small supports share a compilation
+        self.slots = max(self.largest, _FEWEST_SLOTS)
         self.floor = floor
         self.progress = progress or (lambda line: None)
         self.fits: dict[tuple[int, ...], Fit] = {}
@@ -109,7 +112,7 @@ class SupportSearch:
         empty = self._refit([()], {}, tolerance=POLISHING)[0]
         seeds = self._grow_horizon(empty)
         risen = 0
-        for size in range(1, self.slots + 1):
+        for size in range(1, self.largest + 1):
             parents = self.of_size(size - 1)[:2]
             self._try(size, parents, seeds.get(size, {}), limit=2 * LANES if size == 1 else LANES)
             for _ in range(_ROUNDS):
@@ -154,7 +157,7 @@ class SupportSearch:
         """Return the supports that the sparse optimiser proposes near a fit, found once."""
         if fit.support not in self._sparse:
             model = self.model_at(fit)
-            solutions = solve_sparse(self.optimizer, model.design, model.target, self.slots)
+            solutions = solve_sparse(self.optimizer, model.design, model.target, self.largest)
             self._sparse[fit.support] = [s.support for s in solutions]
         return self._sparse[fit.support]
 
@@ -170,9 +173,10 @@ class SupportSearch:
                 norms = np.where(model.norms > 0, model.norms, 1.0)
                 self.scale = 1.0 / norms
             candidates = self._ranked(model, 1, all_of_size(1, self.n_terms))[: LANES // 2]
-            candidates += self._ranked(model, 2, all_of_size(2, self.n_terms))[:2]
-            proposals = solve_sparse(self.optimizer, model.design, model.target, self.slots)
-            small = [p.support for p in proposals if len(p.support) <= self.slots]
+            if self.largest > 1:
+                candidates += self._ranked(model, 2, all_of_size(2, self.n_terms))[:2]
+            proposals = solve_sparse(self.optimizer, model.design, model.target, self.largest)
+            small = [p.support for p in proposals if len(p.support) <= self.largest]
             candidates = distinct([*small, *candidates])[:LANES]
             fits = self._refit(candidates, {s: empty for s in candidates}, keep=keep)
             for fit in fits:
