@@ -10,17 +10,32 @@ from tensor_library.algebra import Symmetric
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.invariants import scalar_invariants
 
+N_COEFFICIENTS = 8
+
 
 class TensorBasisNetwork(AbstractConstitutiveLaw):
     """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
 
+    The coefficients are gₙ = cₙ + mₙ MLPₙ(invariants): a constant, and a network for what varies.
+    The network of the paper has cₙ = 0 and takes the invariants as they are.
+
     Attributes
     ----------
     network
-        Eight invariants in, eight coefficients out.
+        Eight invariants in, eight numbers out.
+    constants
+        cₙ, shape (8,).
+    network_mask
+        mₙ, 0 or 1, shape (8,): which coefficients may vary.
+    invariant_scale
+        Typical size of each invariant, shape (8,); the network sees asinh(invariant/scale), which
+        is linear for small ones and tame for large ones. None for the bare invariants.
     """
 
     network: eqx.nn.MLP
+    constants: Float[Array, "8"]
+    network_mask: Float[Array, "8"]
+    invariant_scale: Float[Array, "8"] | None = None
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     @classmethod
@@ -28,12 +43,22 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        network = eqx.nn.MLP(8, 8, width, depth, jax.nn.tanh, key=key)
-        return cls(network=network, linear_relaxation=linear_relaxation)
+        network = eqx.nn.MLP(
+            N_COEFFICIENTS, N_COEFFICIENTS, width, depth, jax.nn.tanh, key=key
+        )
+        return cls(
+            network=network,
+            constants=jnp.zeros(N_COEFFICIENTS),
+            network_mask=jnp.ones(N_COEFFICIENTS),
+            linear_relaxation=linear_relaxation,
+        )
 
     def coefficients(self, stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
         """Return the coefficients gₙ at one state."""
-        return self.network(scalar_invariants(stress, rate))
+        invariants = scalar_invariants(stress, rate)
+        if self.invariant_scale is not None:
+            invariants = jnp.arcsinh(invariants / self.invariant_scale)
+        return self.constants + self.network_mask * self.network(invariants)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = Σ gₙ Tₙ."""

@@ -9,6 +9,7 @@ from discover.simulate.solve import (
     simulate_homogeneous_flow,
     solve_batch,
     solve_on_grid,
+    solve_states_on_grid,
 )
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 
@@ -24,5 +25,6 @@ __all__ = [
     "simulate_homogeneous_flow",
     "solve_batch",
     "solve_on_grid",
+    "solve_states_on_grid",
     "synthetic_dataset",
 ]

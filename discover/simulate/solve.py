@@ -171,6 +171,24 @@ def solve_on_grid(
     -------
     σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
+    return _solve_on_grid(fluid, protocol, grid, _observe, adjoint)
+
+
+def solve_states_on_grid(
+    fluid: Fluid,
+    protocol: ShearProtocol,
+    grid: IntegrationGrid,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Float[Array, "n k 4"]:
+    """Return the dimensionless stress of every mode at the samples of one grid.
+
+    As `solve_on_grid`, but before the modes are added.
+    """
+    return _solve_on_grid(fluid, protocol, grid, None, adjoint)
+
+
+def _solve_on_grid(fluid, protocol, grid, observe, adjoint):
+    saved = diffrax.SaveAt(t0=True, steps=True)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
         ExponentialRungeKutta4(_decay(fluid)),
@@ -179,7 +197,7 @@ def solve_on_grid(
         None,
         fluid.rest(),
         args=(fluid, protocol),
-        saveat=diffrax.SaveAt(t0=True, steps=True, fn=_observe),
+        saveat=saved if observe is None else diffrax.SaveAt(t0=True, steps=True, fn=observe),
         stepsize_controller=diffrax.StepTo(grid.times),
         adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
         max_steps=grid.times.shape[0] - 1,

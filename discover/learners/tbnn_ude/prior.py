@@ -1,0 +1,105 @@
+"""A preference for few and constant coefficients, which shear stress alone cannot supply.
+
+Different coefficient functions give the same σ12 in every shear flow but different normal
+stresses. What a network says of N2 is therefore decided by the prior and not by the data; this one
+prefers the law in which few tensors act and their coefficients do not vary. It reads
+
+    κ Σ_n w_n ⟨(g_n |T_n|)²⟩ + κ Σ_n v_n ⟨((g_n − ⟨g_n⟩) |T_n|)²⟩,
+
+averaged over states along the trajectories, with w_n and v_n the reciprocals of the root mean
+squares found in the previous round. At convergence it is κ times the sum of these root mean
+squares: a group penalty that removes whole tensors   [Yuan & Lin 2006; reweighting: Candès et al.
+2008].
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.simulate.solve import solve_states_on_grid
+from tensor_library.algebra import inner
+from tensor_library.integrity_basis import integrity_basis
+from tensor_library.kinematics import rate_of_deformation
+
+STATES_PER_RUN = 24
+_FLOOR = 1e-4
+"""Weights stop growing where a term is below 1e-4 of the stress: it is gone by then."""
+
+
+class Cloud(eqx.Module):
+    """States along the trajectories of a law, at which a network is looked at.
+
+    Attributes
+    ----------
+    stress
+        Dimensionless stress of a mode, shape (m, 4).
+    rate
+        Dimensionless rate of deformation, shape (m, 4).
+    size
+        Norm of each basis tensor, shape (m, 8).
+    """
+
+    stress: Float[Array, "m 4"]
+    rate: Float[Array, "m 4"]
+    size: Float[Array, "m 8"]
+
+    def coefficients(self, law: TensorBasisNetwork) -> Float[Array, "m 8"]:
+        """Return the coefficients of a law at these states."""
+        return jax.vmap(law.coefficients)(self.stress, self.rate)
+
+
+@eqx.filter_jit
+def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
+    """Return states evenly spread over the samples of every run and mode."""
+    fluid = problem.fluid(law)
+
+    def one(protocol, grid):
+        states = solve_states_on_grid(fluid, protocol, grid)
+        pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
+        times = grid.times[grid.sample_index][pick]
+        shear_rates = jax.vmap(protocol.shear_rate)(times)[:, None] * problem.relaxation_time
+        return states[pick], shear_rates
+
+    stress, shear_rate = jax.vmap(one)(problem.protocols, problem.grids)
+    stress, shear_rate = stress.reshape(-1, 4), shear_rate.reshape(-1)
+    rate = jax.vmap(rate_of_deformation)(shear_rate)
+    basis = jax.vmap(integrity_basis)(stress, rate)
+    size = jnp.sqrt(jax.vmap(jax.vmap(inner))(basis, basis))
+    return Cloud(stress, rate, size)
+
+
+class PriorWeights(eqx.Module):
+    """Weights w_n and v_n of the prior, each of shape (8,), times κ."""
+
+    amount: Float[Array, "8"]
+    variation: Float[Array, "8"]
+
+
+def parts(law: TensorBasisNetwork, cloud: Cloud) -> tuple[Float[Array, "m 8"], Float[Array, "m 8"]]:
+    """Return the size of every term and its departure from a constant coefficient, at each state."""
+    coefficients = cloud.coefficients(law)
+    mean = jnp.mean(coefficients, axis=0)
+    return coefficients * cloud.size, (coefficients - mean) * cloud.size
+
+
+def prior_residual(
+    law: TensorBasisNetwork, cloud: Cloud, weights: PriorWeights
+) -> Float[Array, " r"]:
+    """Return the prior as residuals whose squares sum to it."""
+    amount, variation = parts(law, cloud)
+    n = cloud.stress.shape[0]
+    rows = [jnp.sqrt(weights.amount / n) * amount, jnp.sqrt(weights.variation / n) * variation]
+    return jnp.concatenate([row.ravel() for row in rows])
+
+
+def reweighted(law: TensorBasisNetwork, cloud: Cloud, strength: float) -> PriorWeights:
+    """Return the weights of the next round, from the root mean squares of this one."""
+    amount, variation = parts(law, cloud)
+
+    def reciprocal(rows):
+        return strength / (jnp.sqrt(jnp.mean(rows**2, axis=0)) + _FLOOR)
+
+    return PriorWeights(reciprocal(amount), reciprocal(variation))

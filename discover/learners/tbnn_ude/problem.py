@@ -1,0 +1,101 @@
+"""The training data of a network, laid out for batched integration."""
+
+from collections.abc import Sequence
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.dataset.run import ShearRun
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.multimode import Fluid
+from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.solve import solve_on_grid
+
+
+class TrainingProblem(eqx.Module):
+    """Shear stress of several runs, and the modes that the network serves.
+
+    Attributes
+    ----------
+    protocols, grids
+        Flows and fixed time grids, with a leading axis of runs.
+    target
+        Measured σ12 over the sum of the moduli, shape (runs, n).
+    modulus, relaxation_time
+        Of each mode, shape (k,); the moduli sum to one.
+    """
+
+    protocols: ShearProtocol
+    grids: IntegrationGrid
+    target: Float[Array, "runs n"]
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+
+    def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
+        """Return the fluid of a trial law, in units of the total modulus."""
+        return Fluid(law, self.modulus, self.relaxation_time)
+
+    def residual(
+        self,
+        law: AbstractConstitutiveLaw,
+        adjoint: diffrax.AbstractAdjoint | None = None,
+    ) -> Float[Array, "runs n"]:
+        """Return predicted minus measured σ12, zero where a sample is padding."""
+        fluid = self.fluid(law)
+
+        def one(protocol, grid):
+            return solve_on_grid(fluid, protocol, grid, adjoint)[:, 3]
+
+        predicted = jax.vmap(one)(self.protocols, self.grids)
+        return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
+
+    def mean_squared_errors(
+        self,
+        law: AbstractConstitutiveLaw,
+        adjoint: diffrax.AbstractAdjoint | None = None,
+    ) -> Float[Array, " runs"]:
+        """Return the mean squared error of each run."""
+        residual = self.residual(law, adjoint)
+        return jnp.sum(residual**2, axis=1) / jnp.sum(self.grids.sample_mask, axis=1)
+
+
+def make_problem(
+    runs: Sequence[ShearRun],
+    modulus: Float[np.ndarray, " k"],
+    relaxation_time: Float[np.ndarray, " k"],
+    strain_step: float = 0.2,
+    phase_step: float = 0.15,
+) -> TrainingProblem:
+    """Return the training problem of some runs.
+
+    The default grid is that of the paper's series with a step of 0.1: its error, 4e-6 of the
+    stress, is far below what a network reaches.
+
+    Parameters
+    ----------
+    runs
+        Runs whose σ12 is learned.
+    modulus, relaxation_time
+        Modes, in Pa and s.
+    strain_step, phase_step
+        Step limits of `discover.simulate.make_grid`.
+    """
+    total = float(np.sum(modulus))
+    protocols = [run.protocol for run in runs]
+    grids = make_grids(
+        protocols, [run.time for run in runs], strain_step=strain_step, phase_step=phase_step
+    )
+    n = grids.sample_index.shape[1]
+    target = np.stack([np.pad(run.shear_stress, (0, n - len(run)), mode="edge") for run in runs])
+    return TrainingProblem(
+        stack_protocols(protocols),
+        grids,
+        jnp.asarray(target / total),
+        jnp.asarray(modulus / total),
+        jnp.asarray(relaxation_time),
+    )

@@ -1,0 +1,97 @@
+"""Trajectories together with their derivatives by every weight.
+
+The variational equation dS/dt = J S + ∂f/∂θ, with S = ∂σ/∂θ and J = ∂f/∂σ, is integrated beside the
+state as one ordinary differential equation. J is 4 × 4 and ∂f/∂θ takes four reverse passes through
+a tiny network, so the whole Jacobian of 1,600 samples by 550 weights costs about as much as a
+dozen gradients, where one forward pass per weight would cost hundreds.
+"""
+
+from collections.abc import Callable
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
+
+Rebuild = Callable[[Float[Array, " p"]], AbstractConstitutiveLaw]
+
+
+@eqx.filter_custom_jvp
+def residual_of_weights(
+    weights: Float[Array, " p"], *, rebuild: Rebuild, problem: TrainingProblem
+) -> Float[Array, "runs n"]:
+    """Return predicted minus measured σ12 of the law with these weights.
+
+    Differentiable in forward mode; the derivative is that of the variational equation.
+
+    Parameters
+    ----------
+    weights
+        All trainable numbers of the law in one vector.
+    rebuild
+        Makes the law from them.
+    problem
+        The training data.
+    """
+    return problem.residual(rebuild(weights))
+
+
+@residual_of_weights.def_jvp
+def _residual_jvp(primals, tangents, *, rebuild: Rebuild, problem: TrainingProblem):
+    (weights,), (direction,) = primals, tangents
+    residual, jacobian = residual_and_jacobian(weights, rebuild, problem)
+    return residual, jacobian @ direction
+
+
+def residual_and_jacobian(
+    weights: Float[Array, " p"], rebuild: Rebuild, problem: TrainingProblem
+) -> tuple[Float[Array, "runs n"], Float[Array, "runs n p"]]:
+    """Return the residual and its derivative by every weight."""
+    modulus, relaxation_time = problem.modulus, problem.relaxation_time
+    fluid = problem.fluid(rebuild(weights))
+    decay = jax.lax.stop_gradient(fluid.decay_rate())[:, None, None]
+    n_weights = weights.shape[0]
+
+    def one_mode(state, sensitivity, time_scale, shear_rate):
+        def change(s, w):
+            return rebuild(w).stress_rate(s, time_scale * shear_rate) / time_scale
+
+        by_state = jax.jacfwd(change, 0)(state, weights)
+        by_weight = jax.jacrev(change, 1)(state, weights)
+        return jnp.concatenate(
+            [change(state, weights)[:, None], by_state @ sensitivity + by_weight], axis=1
+        )
+
+    def field(t, y, protocol):
+        rate = protocol.shear_rate(t)
+        return jax.vmap(one_mode, (0, 0, 0, None))(y[..., 0], y[..., 1:], relaxation_time, rate)
+
+    def observe(t, y, protocol):
+        return jnp.tensordot(modulus, y[:, 3, :], axes=1)
+
+    def one_run(protocol, grid):
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(field),
+            ExponentialRungeKutta4(decay),
+            grid.times[0],
+            grid.times[-1],
+            None,
+            jnp.zeros((modulus.shape[0], 4, 1 + n_weights)),
+            args=protocol,
+            saveat=diffrax.SaveAt(t0=True, steps=True, fn=observe),
+            stepsize_controller=diffrax.StepTo(grid.times),
+            adjoint=diffrax.ForwardMode(),
+            max_steps=grid.times.shape[0] - 1,
+            throw=False,
+        )
+        return jnp.asarray(solution.ys)[grid.sample_index]
+
+    values = jax.vmap(one_run)(problem.protocols, problem.grids)
+    mask = problem.grids.sample_mask
+    residual = jnp.where(mask, values[..., 0] - problem.target, 0.0)
+    return residual, jnp.where(mask[..., None], values[..., 1:], 0.0)

@@ -1,0 +1,7 @@
+"""Studies: what a user asks for, checked, and what it means."""
+
+from discover.study.read import fingerprint, parse_study, read_study
+from discover.study.run_folder import RunFolder
+from discover.study.schema import Study
+
+__all__ = ["RunFolder", "Study", "fingerprint", "parse_study", "read_study"]

@@ -1,0 +1,189 @@
+"""From a study to its data, its split and its declared fluid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.load import load_dataset
+from discover.dataset.run import ShearDataset
+from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.multimode import Fluid
+from discover.laws.registry import LAWS, make_law
+from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
+from discover.study.schema import Study
+
+
+@dataclass(frozen=True)
+class StudyData:
+    """The data of a study, split.
+
+    Attributes
+    ----------
+    dataset
+        All runs.
+    fit, held_out
+        Runs that fits may see, and runs that only judge.
+    """
+
+    dataset: ShearDataset
+    fit: ShearDataset
+    held_out: ShearDataset
+
+    @property
+    def truth(self) -> Fluid | None:
+        """The fluid that made synthetic data, or None."""
+        return self.dataset.truth if isinstance(self.dataset, SyntheticDataset) else None
+
+
+@dataclass(frozen=True)
+class DeclaredModel:
+    """The declared law with starting values for what is to be fitted.
+
+    Attributes
+    ----------
+    law
+        The dimensionless law.
+    law_name, parameters
+        As declared, with numbers for those to be fitted.
+    modulus, relaxation_time
+        Of each mode, shape (k,), in Pa and s.
+    free
+        Names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
+    spectrum
+        Where the modes come from, if from a linear sweep.
+    solvent_viscosity
+        In Pa s.
+    """
+
+    law: AbstractConstitutiveLaw
+    law_name: str
+    parameters: dict[str, float]
+    modulus: np.ndarray
+    relaxation_time: np.ndarray
+    free: tuple[str, ...]
+    spectrum: RelaxationSpectrum | None
+    solvent_viscosity: float = 0.0
+
+    @property
+    def fluid(self) -> Fluid:
+        """The declared fluid."""
+        return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)
+
+
+def load_study_data(study: Study, seed: int | None = None) -> StudyData:
+    """Return the data of a study, split into runs to fit and runs held out.
+
+    Parameters
+    ----------
+    study
+        The study.
+    seed
+        Overrides the seed of synthetic noise.
+
+    Raises
+    ------
+    InputError
+        If a file is wrong or a named run does not exist.
+    """
+    data = study.data
+    if data.synthetic is not None:
+        made = data.synthetic
+        dataset: ShearDataset = synthetic_dataset(
+            made.law,
+            made.parameters,
+            made.protocol,
+            made.noise,
+            made.seed if seed is None else seed,
+            made.samples,
+        )
+    else:
+        base = None if study.path is None else study.path.parent
+        dataset = load_dataset(
+            str(data.folder), data.clock_factor, base, rate_is_measured=data.rate == "measured"
+        )
+    held_out = dataset.select(data.held_out)
+    fit_names = data.fit or tuple(name for name in dataset.names if name not in data.held_out)
+    if not fit_names:
+        raise InputError("Every run is held out; leave at least one run to fit.")
+    return StudyData(dataset, dataset.select(fit_names), held_out)
+
+
+def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
+    """Return the declared law of a study, with its modes.
+
+    Raises
+    ------
+    InputError
+        If a parameter is wrong, or modes are asked of data without a linear sweep.
+    """
+    model = study.model
+    name = "ucm" if model.law == "learned" else model.law
+    free = [key for key, value in model.parameters.items() if value == "fit"]
+    parameters = {
+        key: _start(name, key) if value == "fit" else float(value)
+        for key, value in model.parameters.items()
+    }
+    if not model.known_relaxation and name != "ucm":
+        raise InputError(
+            "known_relaxation = false leaves the linear term to the learner, so the declared law "
+            f"must be ucm; got {name}."
+        )
+    law = make_law(name, parameters)
+    if not model.known_relaxation:
+        from discover.laws.maxwell import UpperConvectedMaxwell
+
+        law = UpperConvectedMaxwell(linear_relaxation=False)
+    spectrum = None
+    if model.modes == "lve":
+        if dataset.linear_sweep is None:
+            raise InputError(
+                f'modes = "lve" needs a linear sweep, but {dataset.name!r} has no lve.csv. Give '
+                "modulus_Pa and relaxation_time_s, or add the file."
+            )
+        spectrum = relaxation_spectrum(dataset.linear_sweep)
+        modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
+    else:
+        start = _linear_start(dataset)
+        modulus, relaxation_time = (
+            np.array([start[key] if value == "fit" else float(value)])
+            for key, value in (
+                ("modulus_Pa", model.modulus_Pa),
+                ("relaxation_time_s", model.relaxation_time_s),
+            )
+        )
+        free += [key for key in start if getattr(model, key) == "fit"]
+    return DeclaredModel(
+        law,
+        name,
+        parameters,
+        modulus,
+        relaxation_time,
+        tuple(free),
+        spectrum,
+        model.solvent_viscosity_Pa_s,
+    )
+
+
+def _start(law: str, parameter: str) -> float:
+    if parameter not in LAWS[law].parameters:
+        return 0.1  # make_law says what is wrong
+    low, high = LAWS[law].parameters[parameter]
+    return 100.0 if high > 1e3 else min(max(0.1, low), high)
+
+
+def _linear_start(dataset: ShearDataset) -> dict[str, float]:
+    """Return a modulus and relaxation time of the right order from the runs themselves.
+
+    The relaxation time is that of the slowest change a run can show, a tenth of the median
+    duration; the modulus follows from the largest stress over rate times that.
+    """
+    time = 0.1 * float(np.median([run.time[-1] for run in dataset]))
+    viscosity = np.median(
+        [
+            np.max(np.abs(run.shear_stress)) / max(float(np.max(np.abs(run.shear_rate))), 1e-300)
+            for run in dataset
+        ]
+    )
+    return {"modulus_Pa": float(viscosity / max(time, 1e-300)), "relaxation_time_s": time}

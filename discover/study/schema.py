@@ -1,0 +1,139 @@
+"""The study file: what may be written in it, and nothing else."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+SyntheticLaw = Literal[
+    "ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential", "fene_p"
+]
+LawName = Literal[
+    "ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential", "fene_p", "learned"
+]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Synthetic(_Section):
+    """Data computed from a known law instead of measured."""
+
+    law: SyntheticLaw
+    parameters: dict[str, float] = {}
+    protocol: Literal["paper"] = "paper"
+    noise: Annotated[float, Field(ge=0, le=10)] = 0.0
+    seed: Annotated[int, Field(ge=0)] = 0
+    samples: Annotated[int, Field(ge=10, le=100_000)] = 201
+
+
+class Data(_Section):
+    """Where the runs come from and which of them no fit may see."""
+
+    folder: str | None = None
+    synthetic: Synthetic | None = None
+    fit: tuple[str, ...] | None = None
+    held_out: tuple[str, ...] = ()
+    clock_factor: str | None = None
+    rate: Literal["commanded", "measured"] = "commanded"
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        if (self.folder is None) == (self.synthetic is None):
+            raise ValueError("write either folder = \"...\" or synthetic = {...}, not both or none")
+        both = set(self.fit or ()) & set(self.held_out)
+        if both:
+            raise ValueError(f"the run {sorted(both)[0]!r} is both in fit and in held_out")
+        return self
+
+
+class Model(_Section):
+    """The declared law: the known part of what is to be found."""
+
+    law: LawName = "ucm"
+    modulus_Pa: Positive | Literal["fit"] = 1.0
+    relaxation_time_s: Positive | Literal["fit"] = 1.0
+    modes: Literal["lve"] | None = None
+    solvent_viscosity_Pa_s: Annotated[float, Field(ge=0)] = 0.0
+    parameters: dict[str, float | Literal["fit"]] = {}
+    known_relaxation: bool = True
+
+
+class Loop(_Section):
+    """How far the closed loop may go."""
+
+    max_effects: Annotated[int, Field(ge=0, le=10)] = 3
+    strain: tuple[float, float] | None = None
+    effects: tuple[str, ...] | None = None
+    noise: Annotated[float, Field(gt=0, le=1)] | None = None
+
+    @model_validator(mode="after")
+    def _window(self):
+        if self.strain is not None and not 0 <= self.strain[0] < self.strain[1]:
+            raise ValueError(f"strain must be [low, high] with 0 <= low < high; got {self.strain}")
+        return self
+
+
+class Library(_Section):
+    """Candidate terms: tensors × invariants up to a degree, plus closed forms."""
+
+    degree: Annotated[int, Field(ge=0, le=2)] = 1
+    closed_forms: tuple[Literal["exp", "saturating"], ...] = ()
+
+
+class Sweep(_Section):
+    """The same comparison again over laws and values of one parameter, as synthetic data.
+
+    The paper's study of linear and exponential PTT over the extensibility is one.
+    """
+
+    laws: Annotated[tuple[SyntheticLaw, ...], Field(min_length=1)]
+    parameter: str
+    values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
+
+
+class Compare(_Section):
+    """Which learners, which candidate terms, which flows they are judged on."""
+
+    learners: tuple[Literal["tensor_sindy", "tbnn_ude"], ...] = ("tensor_sindy", "tbnn_ude")
+    library: Library = Library()
+    test: Literal["paper"] = "paper"
+    optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"
+    selection: Literal["bic", "held_out"] = "bic"
+    max_terms: Annotated[int, Field(ge=1, le=12)] = 5
+    recipe: Literal["default", "paper"] = "default"
+    iterations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    use_normal_stresses: bool = False
+    high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
+    sweep: Sweep | None = None
+    distillation: bool = False
+
+    @model_validator(mode="after")
+    def _at_least_one(self):
+        if not self.learners or len(set(self.learners)) != len(self.learners):
+            raise ValueError("name each learner once, and at least one")
+        return self
+
+
+class Study(_Section):
+    """One study: data, declared model, and what to do with them."""
+
+    data: Data
+    model: Model = Model()
+    loop: Loop = Loop()
+    compare: Compare = Compare()
+    _path: Path | None = PrivateAttr(default=None)
+
+    @property
+    def path(self) -> Path | None:
+        """The file that the study was read from."""
+        return self._path
+
+    @property
+    def name(self) -> str:
+        """Name for titles: the study file's, or the data's."""
+        if self._path is not None:
+            return self._path.stem
+        return self.data.folder or f"synthetic {self.data.synthetic.law}"  # type: ignore[union-attr]
