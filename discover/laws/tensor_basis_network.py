@@ -30,6 +30,8 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
     invariant_scale
         Typical size of each invariant, shape (8,); the network sees asinh(invariant/scale), which
         is linear for small ones and tame for large ones. None for the bare invariants.
+    base
+        A known law whose extra term is added, or None.
     """
 
     network: eqx.nn.MLP
@@ -37,15 +39,14 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
     network_mask: Float[Array, "8"]
     invariant_scale: Float[Array, "8"] | None = None
     linear_relaxation: bool = eqx.field(static=True, default=True)
+    base: AbstractConstitutiveLaw | None = None
 
     @classmethod
     def initialise(
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        network = eqx.nn.MLP(
-            N_COEFFICIENTS, N_COEFFICIENTS, width, depth, jax.nn.tanh, key=key
-        )
+        network = eqx.nn.MLP(N_COEFFICIENTS, N_COEFFICIENTS, width, depth, jax.nn.tanh, key=key)
         return cls(
             network=network,
             constants=jnp.zeros(N_COEFFICIENTS),
@@ -61,5 +62,8 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         return self.constants + self.network_mask * self.network(invariants)
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h = Σ gₙ Tₙ."""
-        return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)
+        """Return h = Σ gₙ Tₙ, plus the base law's."""
+        extra = jnp.tensordot(
+            self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1
+        )
+        return extra if self.base is None else extra + self.base.extra_term(stress, rate)

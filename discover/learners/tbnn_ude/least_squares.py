@@ -72,9 +72,7 @@ def _start(weights, objective):
 
 @eqx.filter_jit
 def _step(weights, objective, state):
-    weights, state, aux = _SOLVER.step(
-        residual_rows, weights, objective, {}, state, frozenset()
-    )
+    weights, state, aux = _SOLVER.step(residual_rows, weights, objective, {}, state, frozenset())
     return weights, state, aux
 
 

@@ -79,7 +79,7 @@ class PriorWeights(eqx.Module):
 
 
 def parts(law: TensorBasisNetwork, cloud: Cloud) -> tuple[Float[Array, "m 8"], Float[Array, "m 8"]]:
-    """Return the size of every term and its departure from a constant coefficient, at each state."""
+    """Return the size of every term, and of its departure from a constant coefficient."""
     coefficients = cloud.coefficients(law)
     mean = jnp.mean(coefficients, axis=0)
     return coefficients * cloud.size, (coefficients - mean) * cloud.size
@@ -95,11 +95,23 @@ def prior_residual(
     return jnp.concatenate([row.ravel() for row in rows])
 
 
-def reweighted(law: TensorBasisNetwork, cloud: Cloud, strength: float) -> PriorWeights:
-    """Return the weights of the next round, from the root mean squares of this one."""
+def reweighted(
+    law: TensorBasisNetwork, cloud: Cloud, strength: float, variation_share: float = 1.0
+) -> PriorWeights:
+    """Return the weights of the next round, from the root mean squares of this one.
+
+    Parameters
+    ----------
+    law, cloud
+        The law of this round and where it is looked at.
+    strength
+        κ.
+    variation_share
+        Strength of the second sum over that of the first.
+    """
     amount, variation = parts(law, cloud)
 
     def reciprocal(rows):
         return strength / (jnp.sqrt(jnp.mean(rows**2, axis=0)) + _FLOOR)
 
-    return PriorWeights(reciprocal(amount), reciprocal(variation))
+    return PriorWeights(reciprocal(amount), variation_share * reciprocal(variation))

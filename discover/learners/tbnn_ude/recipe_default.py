@@ -24,6 +24,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.least_squares import Objective, data_misfit, minimise
 from discover.learners.tbnn_ude.prior import Cloud, parts, reweighted, sample_states
@@ -44,6 +45,8 @@ class DefaultRecipe:
         Neurons in each of two hidden layers.
     constant_strengths, network_strengths
         Strength of the prior in the rounds of each stage, relative to the squared stress.
+    variation_share
+        Strength of the preference for constant coefficients over that for few.
     steps
         Levenberg–Marquardt steps a round.
     polish_steps
@@ -55,8 +58,9 @@ class DefaultRecipe:
     """
 
     width: int = 16
-    constant_strengths: tuple[float, ...] = (1e-2, 1e-3, 1e-4)
+    constant_strengths: tuple[float, ...] = (1e-3, 1e-4)
     network_strengths: tuple[float, ...] = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+    variation_share: float = 1.0
     steps: int = 8
     polish_steps: int = 40
     removed_below: float = 2e-3
@@ -92,10 +96,15 @@ class Trained:
 
 
 def initial_law(
-    key: PRNGKeyArray, width: int, linear_relaxation: bool, invariant_scale: Float[Array, "8"]
+    key: PRNGKeyArray,
+    width: int,
+    linear_relaxation: bool,
+    invariant_scale: Float[Array, "8"],
+    base_law: AbstractConstitutiveLaw | None = None,
 ) -> TensorBasisNetwork:
     """Return a law with h = 0: the last layer starts at zero, the hidden ones at random."""
     law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
+    law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
     last = law.network.layers[-1]
     law = eqx.tree_at(
         lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
@@ -154,7 +163,12 @@ class _Session:
         cloud = sample_states(law, self.problem)
         if not bool(jnp.all(jnp.isfinite(cloud.stress))):
             return law
-        objective = Objective(self.problem, rebuild, cloud, reweighted(law, cloud, strength))
+        objective = Objective(
+            self.problem,
+            rebuild,
+            cloud,
+            reweighted(law, cloud, strength, self.recipe.variation_share),
+        )
         weights = minimise(
             weights_of(law), objective, steps, self.record, target=0.1 * self.recipe.exact
         )
@@ -183,6 +197,7 @@ def train_default(
     linear_relaxation: bool,
     recipe: DefaultRecipe | None = None,
     progress: Progress | None = None,
+    base_law: AbstractConstitutiveLaw | None = None,
 ) -> Trained:
     """Return a law trained by the default recipe.
 
@@ -198,10 +213,12 @@ def train_default(
         Settings.
     progress
         Called after every step with step, total number of steps (at most) and misfit.
+    base_law
+        Known law to which the network is added.
     """
     recipe = recipe or DefaultRecipe()
     session = _Session(problem, recipe, progress)
-    law = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS))
+    law = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
     law = session.anneal(law, recipe.constant_strengths, network=False)
     penalised = law
     law = _without_empty_terms(law, sample_states(law, problem), recipe.removed_below)
@@ -211,7 +228,7 @@ def train_default(
         return _finish(session, law, penalised, False, "eight constants suffice")
 
     scale = invariant_sizes(sample_states(law, problem))
-    start = initial_law(key, recipe.width, linear_relaxation, scale)
+    start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
     start = eqx.tree_at(lambda tree: tree.constants, start, penalised.constants)
     law = session.anneal(start, recipe.network_strengths, network=True)
     penalised = law

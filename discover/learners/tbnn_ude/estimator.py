@@ -1,0 +1,274 @@
+"""The scikit-learn estimator: runs in, a trained network law out."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+from jaxtyping import Float
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted
+
+from discover.dataset.run import ShearRun
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.tbnn_ude.prior import Cloud, sample_states
+from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
+from discover.learners.tbnn_ude.projection import Projection, project
+from discover.learners.tbnn_ude.recipe_default import DefaultRecipe, Trained, train_default
+from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
+from discover.simulate.solve import solve_batch
+from tensor_library.integrity_basis import TENSOR_NAMES
+from tensor_library.library import TermLibrary, build_library
+
+RECIPES = ("default", "paper")
+
+
+class TBNNUDE(RegressorMixin, BaseEstimator):
+    """A tensor-basis neural network inside the differential equation, from shear stress alone.
+
+    Parameters
+    ----------
+    recipe
+        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"paper"``
+        (Adam, 7,200 iterations; see `recipe_paper`), or a `DefaultRecipe` or `PaperRecipe`.
+    modulus, relaxation_time
+        G in Pa and λ in s, numbers, or arrays with one value for each mode.
+    known_relaxation
+        Whether −σ is known. If not, the network has to find it too.
+    base_law
+        A known dimensionless law to which the network is added; by default UCM.
+    n_members
+        Networks trained from different initial weights; the one with the smallest misfit is
+        taken, and all are reported.
+    projection_library
+        Candidate terms in which the network is put into words; by default tensors with
+        coefficients up to degree one.
+    quick
+        Fewer steps, for demonstrations.
+    random_state
+        Seed of the initial weights.
+    progress
+        Called with step, total number of steps (at most) and loss, or None.
+
+    Attributes
+    ----------
+    result_ : LearnerResult
+        The law, its projection on the library, coefficients along trajectories, seconds.
+    law_ : TensorBasisNetwork
+        The dimensionless law.
+    fluid_ : Fluid
+        The law with moduli and relaxation times.
+    terms_ : tuple of RecoveredTerm
+        The projection.
+    members_ : list of TensorBasisNetwork
+        Every trained member.
+    """
+
+    def __init__(
+        self,
+        recipe: Any = "default",
+        modulus: Any = 1.0,
+        relaxation_time: Any = 1.0,
+        known_relaxation: bool = True,
+        base_law: Any = None,
+        n_members: int = 1,
+        projection_library: TermLibrary | None = None,
+        quick: bool = False,
+        random_state: int = 0,
+        progress: Any = None,
+    ):
+        self.recipe = recipe
+        self.modulus = modulus
+        self.relaxation_time = relaxation_time
+        self.known_relaxation = known_relaxation
+        self.base_law = base_law
+        self.n_members = n_members
+        self.projection_library = projection_library
+        self.quick = quick
+        self.random_state = random_state
+        self.progress = progress
+
+    def fit(self, X: Sequence[ShearRun], y=None) -> "TBNNUDE":
+        """Train on σ12 of these runs.
+
+        Parameters
+        ----------
+        X
+            Runs.
+        y
+            Ignored: the observations are part of the runs.
+
+        Raises
+        ------
+        InputError
+            If a parameter or a run is unusable.
+        """
+        del y
+        started = time.perf_counter()
+        runs = _as_runs(X)
+        recipe = self._recipe()
+        problem = self._problem(runs)
+        if self.n_members < 1:
+            raise InputError(f"n_members must be at least 1; got {self.n_members}.")
+        keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
+        members = [self._train(problem, key, recipe) for key in keys]
+        best = min(members, key=lambda member: _or_infinite(member.misfit))
+
+        self.n_features_in_ = 1
+        self.members_ = [member.law for member in members]
+        self.law_ = best.law
+        total = float(np.sum(np.atleast_1d(np.asarray(self.modulus, dtype=float))))
+        self.fluid_ = Fluid(best.law, problem.modulus * total, problem.relaxation_time)
+        cloud = sample_states(best.law, problem)
+        library = self.projection_library or build_library(degree=1)
+        projection = project(best.law, cloud, library)
+        self.terms_ = _terms(projection, best, cloud)
+        losses = np.asarray(best.misfits)
+        self.result_ = LearnerResult(
+            learner="tbnn_ude",
+            law=self.law_,
+            terms=self.terms_,
+            train_seconds=time.perf_counter() - started,
+            loss_history=(np.arange(1, losses.size + 1), losses),
+            details={
+                "recipe": type(recipe).__name__,
+                "misfit": best.misfit,
+                "coefficients": _coefficient_table(best.law, cloud),
+                "coefficients_vary": best.varies,
+                "projection_misfit": projection.misfit,
+                "members": [
+                    {
+                        "misfit": member.misfit,
+                        "coefficients": _coefficient_table(
+                            member.law, sample_states(member.law, problem)
+                        ),
+                    }
+                    for member in members
+                ],
+            },
+            message=best.message,
+        )
+        return self
+
+    def predict(self, X: Sequence[ShearRun]) -> Float[np.ndarray, " rows"]:
+        """Return σ12 in Pa at the samples of all runs, one run after the other."""
+        return np.concatenate(self._predict_runs(X))
+
+    def score(self, X: Sequence[ShearRun], y=None, sample_weight=None) -> float:
+        """Return one minus the relative error of σ12, averaged over runs.
+
+        The error of a run is the root-mean-square of prediction minus measurement over the
+        root-mean-square of the measurement. A law that runs away scores minus infinity.
+        """
+        del y, sample_weight
+        errors = [
+            np.sqrt(np.mean((p - run.shear_stress) ** 2) / np.mean(run.shear_stress**2))
+            for p, run in zip(self._predict_runs(X), _as_runs(X), strict=True)
+        ]
+        error = float(np.mean(errors))
+        return 1.0 - error if np.isfinite(error) else -np.inf
+
+    def _predict_runs(self, X) -> list[Float[np.ndarray, " n"]]:
+        check_is_fitted(self, "fluid_")
+        runs = _as_runs(X)
+        problem = self._problem(runs)
+        stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
+        return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
+
+    def _problem(self, runs: Sequence[ShearRun]) -> TrainingProblem:
+        modulus, relaxation_time = (
+            np.atleast_1d(np.asarray(value, dtype=float))
+            for value in (self.modulus, self.relaxation_time)
+        )
+        bad = modulus.shape != relaxation_time.shape or modulus.ndim != 1
+        if bad or not (np.all(modulus > 0) and np.all(relaxation_time > 0)):
+            raise InputError(
+                "modulus and relaxation_time must be positive, with one value for each mode; got "
+                f"{self.modulus!r} and {self.relaxation_time!r}."
+            )
+        return make_problem(runs, modulus, relaxation_time)
+
+    def _recipe(self) -> DefaultRecipe | PaperRecipe:
+        if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
+            return self.recipe
+        if self.recipe == "default":
+            recipe = DefaultRecipe()
+            quick = {"network_strengths": (1e-3, 1e-4), "steps": 6, "polish_steps": 30, "width": 8}
+            return replace(recipe, **quick) if self.quick else recipe
+        if self.recipe == "paper":
+            return PaperRecipe(iterations_per_series=100 if self.quick else 900)
+        raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
+
+    def _train(self, problem: TrainingProblem, key, recipe) -> Trained:
+        relaxes = (
+            self.known_relaxation if self.base_law is None else self.base_law.linear_relaxation
+        )
+        if isinstance(recipe, DefaultRecipe):
+            return train_default(problem, key, relaxes, recipe, self.progress, self.base_law)
+        law, losses = train_paper(
+            problem, key, relaxes, recipe, self.progress, base_law=self.base_law
+        )
+        errors = np.asarray(eqx.filter_jit(TrainingProblem.mean_squared_errors)(problem, law))
+        squares = np.asarray(problem.target) ** 2
+        scale = np.mean(squares, axis=1)
+        misfit = float(np.sqrt(np.mean(errors / np.where(scale > 0, scale, 1.0))))
+        message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
+        return Trained(law, law, losses, misfit, True, message)
+
+
+def _as_runs(X) -> list[ShearRun]:
+    runs = list(X)
+    for run in runs:
+        if not isinstance(run, ShearRun):
+            raise InputError(
+                f"The learner takes a sequence of ShearRun; got a {type(run).__name__}."
+            )
+    if not runs:
+        raise InputError("The learner needs at least one run; got none.")
+    return runs
+
+
+def _or_infinite(value: float) -> float:
+    return value if np.isfinite(value) else np.inf
+
+
+def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:
+    """Return mean and spread of every coefficient along the trajectories, by tensor."""
+    values = np.asarray(cloud.coefficients(law))
+    return {
+        name: {"mean": float(np.mean(column)), "spread": float(np.std(column))}
+        for name, column in zip(TENSOR_NAMES, values.T, strict=True)
+    }
+
+
+def _terms(projection: Projection, trained: Trained, cloud: Cloud) -> tuple[RecoveredTerm, ...]:
+    library = projection.library
+    if library is None:
+        return ()
+    # the same terms in the law as the prior left it
+    shrunk = project(trained.penalised_law, cloud, library, max_terms=len(library))
+    penalised = (
+        {}
+        if shrunk.library is None
+        else dict(zip(shrunk.library.names, shrunk.coefficients, strict=True))
+    )
+    inner = {
+        form.inner_name: float(value)
+        for form, value in zip(library.forms, projection.inner, strict=True)
+    }
+    return tuple(
+        RecoveredTerm(
+            term=term.name,
+            coefficient=float(coefficient),
+            coefficient_penalised=float(penalised.get(term.name, 0.0)),
+            inner={name: inner[name] for name in term.inner_names},
+            latex=term.latex(),
+        )
+        for term, coefficient in zip(library.terms, projection.coefficients, strict=True)
+    )

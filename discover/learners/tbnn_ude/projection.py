@@ -1,0 +1,129 @@
+"""What a network says in symbols: its extra term projected on a library."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import minimize_scalar
+
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude.prior import Cloud
+from tensor_library.library import TermLibrary
+
+ENOUGH = 1e-3
+"""Relative misfit of the extra term below which more terms say nothing."""
+
+SIMILAR = 1.05
+"""Of candidates whose misfits differ by less than this factor, the simplest is taken."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A sparse expansion of a network's extra term.
+
+    Attributes
+    ----------
+    library
+        The terms chosen.
+    coefficients
+        Their least-squares coefficients, shape (n,).
+    inner
+        Inner parameters of the chosen terms' closed forms.
+    misfit
+        Norm of what is left over that of the extra term, all four components, over the states
+        that training visited.
+    """
+
+    library: TermLibrary | None
+    coefficients: Float[np.ndarray, " n"]
+    inner: Float[np.ndarray, " m"]
+    misfit: float
+
+
+def project(
+    law: TensorBasisNetwork, cloud: Cloud, library: TermLibrary, max_terms: int = 5
+) -> Projection:
+    """Return the few library terms that best stand for a law's extra term.
+
+    Forward selection with backward elimination on the value of h at the states of `cloud`. The
+    result describes the network; it is not fitted to the data.
+
+    Parameters
+    ----------
+    law
+        The trained law.
+    cloud
+        States that training visited.
+    library
+        Candidate terms.
+    max_terms
+        Largest number of terms.
+    """
+    target = np.asarray(jax.vmap(law.extra_term)(cloud.stress, cloud.rate)).ravel()
+    norm = float(np.linalg.norm(target))
+    if norm < 1e-12 or not np.isfinite(norm):
+        return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
+
+    def design(inner):
+        values = jax.vmap(lambda s, g: library.evaluate(s, g, jnp.asarray(inner)))
+        return (
+            np.asarray(values(cloud.stress, cloud.rate))
+            .transpose(0, 2, 1)
+            .reshape(target.size, len(library))
+        )
+
+    inner = np.array(library.inner_default)
+    for i, (low, high) in enumerate(library.inner_bounds):
+        columns = [j for j, t in enumerate(library.terms) if t.form is library.forms[i]]
+
+        def misfit_of(log_value, i=i, columns=columns):
+            trial = inner.copy()
+            trial[i] = np.exp(log_value)
+            # beside the plain tensor, so that the form explains only what varies
+            plain = [j for j, t in enumerate(library.terms) if not t.degree and t.form is None]
+            return _misfit(design(trial)[:, sorted({*columns, *plain})], target, norm)
+
+        inner[i] = np.exp(
+            minimize_scalar(misfit_of, bounds=(np.log(low), np.log(high)), method="bounded").x
+        )
+    matrix = design(inner)
+    support: list[int] = []
+    misfit = 1.0
+    while misfit > ENOUGH and len(support) < max_terms:
+        trials = {
+            j: _misfit(matrix[:, [*support, j]], target, norm)
+            for j in range(len(library))
+            if j not in support
+        }
+        best = min(trials.values())
+        if best > 0.9 * misfit:  # not worth a term
+            break
+        near = [j for j, value in trials.items() if value <= SIMILAR * best + 1e-9]
+        support.append(min(near, key=lambda j: (library.complexities[j], j)))
+        misfit = trials[support[-1]]
+    while len(support) > 1:  # a first pick may have become redundant
+        without = {
+            j: _misfit(matrix[:, [k for k in support if k != j]], target, norm) for j in support
+        }
+        weakest = min(without, key=lambda j: without[j])
+        if without[weakest] > max(ENOUGH, SIMILAR * misfit):
+            break
+        support.remove(weakest)
+        misfit = without[weakest]
+    if not support:
+        return Projection(None, np.zeros(0), np.zeros(0), misfit)
+    chosen = library.subset(support)
+    kept = [inner[i] for i, form in enumerate(library.forms) if form in chosen.forms]
+    return Projection(chosen, _solve(matrix[:, support], target), np.array(kept), misfit)
+
+
+def _solve(matrix: np.ndarray, target: np.ndarray) -> np.ndarray:
+    scale = np.linalg.norm(matrix, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    return np.linalg.lstsq(matrix / scale, target, rcond=1e-10)[0] / scale
+
+
+def _misfit(matrix: np.ndarray, target: np.ndarray, norm: float) -> float:
+    return float(np.linalg.norm(matrix @ _solve(matrix, target) - target) / norm)
