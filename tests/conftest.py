@@ -10,9 +10,12 @@ from jaxtyping import install_import_hook
 # the packages are imported.
 install_import_hook(["tensor_library", "discover"], "beartype.beartype")
 
+from discover.compilation_cache import enable_compilation_cache  # noqa: E402
 from discover.precision import enable_x64  # noqa: E402
 
 enable_x64()
+# shared by the workers of one test run, and by the next run
+enable_compilation_cache(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
 
 
 @pytest.fixture(scope="session")

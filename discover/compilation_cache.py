@@ -1,0 +1,37 @@
+"""Keep compiled programs between runs of the software."""
+
+import os
+from pathlib import Path
+
+
+def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
+    """Let JAX keep what it compiled, so that a second start does not compile again.
+
+    Called by the command line and by the tests' ``conftest``; importing the library alone changes
+    no global setting.
+
+    Parameters
+    ----------
+    folder
+        Where to keep it; by default ``discover/compiled`` in the user's cache folder. Set
+        ``DISCOVER_NO_CACHE`` to any value to keep nothing.
+
+    Returns
+    -------
+    The folder, or None where nothing can be kept.
+    """
+    import jax
+
+    if os.environ.get("DISCOVER_NO_CACHE"):
+        return None
+    if folder is None:
+        root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(root) / "discover" / "compiled"
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None  # a home that cannot be written to costs time, not the run
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    return folder
