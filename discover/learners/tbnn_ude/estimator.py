@@ -199,8 +199,9 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
             return self.recipe
         if self.recipe == "default":
             recipe = DefaultRecipe()
-            quick = {"network_strengths": (1e-3, 1e-4), "steps": 6, "polish_steps": 30, "width": 8}
-            return replace(recipe, **quick) if self.quick else recipe
+            if not self.quick:
+                return recipe
+            return replace(recipe, width=8, steps=6, polish_steps=30, max_tensors=1)
         if self.recipe == "paper":
             return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")

@@ -10,6 +10,7 @@ import numpy as np
 import optimistix
 from jaxtyping import Array, Float
 
+from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import residual_of_weights
@@ -77,10 +78,9 @@ def _step(weights, objective, state):
 
 
 @eqx.filter_jit
-def data_misfit(weights: Float[Array, " p"], objective: Objective) -> Float[Array, "runs n"]:
-    """Return the data's residuals, whose norm is the relative misfit."""
-    residual = objective.problem.residual(objective.rebuild(weights))
-    return residual * data_scale(objective.problem)
+def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
+    """Return the data's residuals under a law; their norm is the relative misfit."""
+    return problem.residual(law) * data_scale(problem)
 
 
 def minimise(

@@ -1,18 +1,20 @@
-"""The default recipe: constants first, then a network, by Levenberg–Marquardt.
+"""The default recipe: few tensors, constants before functions, by Levenberg–Marquardt.
 
 Gradient descent needs thousands of passes because the trajectories make the weights very unequal:
 a few directions decide almost all of the stress. The Jacobian from the variational equation costs
 little more than a gradient, and a few dozen Gauss–Newton steps with it reach a misfit that Adam
 does not reach in 7,200.
 
-Two stages, each with a prior that prefers few and constant coefficients (see `prior`) and that is
-relaxed until the residual is white or the relaxation ends:
+Shear stress cannot tell apart laws that differ in tensors nobody measured, so the recipe asks for
+the smallest law that explains it, in this order:
 
-1. the eight constants c_n alone;
-2. if the residual they leave has structure, the whole network on top of them.
+1. the eight constants c_n alone, with a penalty that empties tensors (see `prior`) and is then
+   taken away;
+2. if what they leave has structure, coefficient functions on one tensor, tried for each of the
+   eight; then on one more tensor beside the best, while the misfit is above what a rheometer
+   resolves.
 
-Then terms that the prior has emptied are removed and the rest is polished without it, so that what
-is reported is not shrunk.
+The last training of each stage is without penalty, or nearly: what is reported is not shrunk.
 """
 
 from collections.abc import Callable
@@ -26,7 +28,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import Objective, data_misfit, minimise
+from discover.learners.tbnn_ude.least_squares import Objective, law_misfit, minimise
 from discover.learners.tbnn_ude.prior import Cloud, parts, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild, trainable_mask, weights_of
@@ -43,27 +45,29 @@ class DefaultRecipe:
     ----------
     width
         Neurons in each of two hidden layers.
-    constant_strengths, network_strengths
-        Strength of the prior in the rounds of each stage, relative to the squared stress.
-    variation_share
-        Strength of the preference for constant coefficients over that for few.
+    strengths
+        Strength of the penalty in the rounds of the first stage, relative to the squared stress.
     steps
-        Levenberg–Marquardt steps a round.
+        Levenberg–Marquardt steps a round, and for each tensor tried.
     polish_steps
-        Steps after the prior is gone.
+        Steps after the penalty is gone.
+    max_tensors
+        Most tensors with coefficients that vary.
     removed_below
         A term whose root mean square is below this part of the largest is removed.
+    resolved
+        Relative misfit below which no further tensor is asked for: less than rheometers resolve.
     exact
         Relative misfit at which data count as fitted exactly: the error of integration.
     """
 
     width: int = 16
-    constant_strengths: tuple[float, ...] = (1e-3, 1e-4)
-    network_strengths: tuple[float, ...] = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
-    variation_share: float = 1.0
-    steps: int = 8
+    strengths: tuple[float, ...] = (1e-3, 1e-4)
+    steps: int = 10
     polish_steps: int = 40
+    max_tensors: int = 3
     removed_below: float = 2e-3
+    resolved: float = 5e-4
     exact: float = 1e-5
 
 
@@ -132,13 +136,15 @@ def is_white(residual: Float[np.ndarray, "runs n"], mask: np.ndarray) -> bool:
 
 
 class _Session:
-    """State shared by the rounds of one training: the data, the history, the progress."""
+    """What the rounds of one training share: the data, the history, the progress."""
 
     def __init__(self, problem: TrainingProblem, recipe: DefaultRecipe, progress: Progress | None):
         self.problem, self.recipe, self.progress = problem, recipe, progress
         self.misfits: list[float] = []
-        rounds = len(recipe.constant_strengths) + len(recipe.network_strengths)
-        self.total = rounds * recipe.steps + 2 * recipe.polish_steps
+        first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
+        trials = N_COEFFICIENTS * _START_STEPS + _MOST_TRIALS * recipe.steps
+        search = recipe.max_tensors * (trials + recipe.polish_steps)
+        self.total = first + search
 
     def record(self, misfit: float) -> None:
         self.misfits.append(misfit)
@@ -146,49 +152,90 @@ class _Session:
             self.progress(min(len(self.misfits), self.total), self.total, misfit)
 
     def residual(self, law: TensorBasisNetwork) -> np.ndarray:
-        rebuild = Rebuild(law, trainable_mask(law, np.ones(N_COEFFICIENTS, bool), True))
-        cloud = sample_states(law, self.problem)
-        objective = Objective(self.problem, rebuild, cloud, reweighted(law, cloud, 0.0))
-        return np.asarray(data_misfit(weights_of(law), objective))
+        return np.asarray(law_misfit(law, self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
-        return float(np.sqrt(np.sum(self.residual(law) ** 2)))
+        misfit = float(np.sqrt(np.sum(self.residual(law) ** 2)))
+        return misfit if np.isfinite(misfit) else np.inf
 
     def round(
-        self, law: TensorBasisNetwork, strength: float, constants: np.ndarray, network: bool,
+        self, law: TensorBasisNetwork, strength: float, tensors: np.ndarray, network: bool,
         steps: int,
     ) -> TensorBasisNetwork:  # fmt: skip
-        """Return a law trained for one round with the prior reweighted at its start."""
-        rebuild = Rebuild(law, trainable_mask(law, constants, network))
+        """Return a law trained for one round, with the prior reweighted at its start."""
+        rebuild = Rebuild(law, trainable_mask(law, tensors, network))
         cloud = sample_states(law, self.problem)
         if not bool(jnp.all(jnp.isfinite(cloud.stress))):
             return law
-        objective = Objective(
-            self.problem,
-            rebuild,
-            cloud,
-            reweighted(law, cloud, strength, self.recipe.variation_share),
-        )
-        weights = minimise(
-            weights_of(law), objective, steps, self.record, target=0.1 * self.recipe.exact
-        )
-        return rebuild(jnp.asarray(weights))
+        prior = reweighted(law, cloud, strength)
+        objective = Objective(self.problem, rebuild, cloud, prior)
+        target = 0.1 * self.recipe.exact
+        weights = minimise(weights_of(law), objective, steps, self.record, target)
+        trained = rebuild(jnp.asarray(weights))
+        # a law that runs away in some run is no progress
+        return trained if np.isfinite(self.misfit(trained)) else law
 
-    def anneal(
-        self, law: TensorBasisNetwork, strengths: tuple[float, ...], network: bool
-    ) -> TensorBasisNetwork:
-        """Return a law trained with an ever weaker prior, until its residual is noise."""
-        everything = np.ones(N_COEFFICIENTS, bool)
-        for strength in strengths:
-            law = self.round(law, strength, everything, network, self.recipe.steps)
-            if is_white(self.residual(law), np.asarray(self.problem.grids.sample_mask)):
-                break
-        return law
+    def white(self, law: TensorBasisNetwork) -> bool:
+        return is_white(self.residual(law), np.asarray(self.problem.grids.sample_mask))
 
     def settled(self, law: TensorBasisNetwork) -> bool:
-        residual = self.residual(law)
-        small = np.sqrt(np.sum(residual**2)) < self.recipe.exact
-        return small or is_white(residual, np.asarray(self.problem.grids.sample_mask))
+        return self.misfit(law) < self.recipe.exact or self.white(law)
+
+    def constants(self, law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+        """Return the best law of few constants, before and after the penalty is taken away."""
+        everything = np.ones(N_COEFFICIENTS, bool)
+        for strength in self.recipe.strengths:
+            law = self.round(law, strength, everything, False, self.recipe.steps)
+            if self.white(law):
+                break
+        penalised = law
+        law = _without_empty_terms(law, sample_states(law, self.problem), self.recipe.removed_below)
+        kept = np.asarray(law.constants) != 0.0
+        return penalised, self.round(law, 0.0, kept, False, self.recipe.polish_steps)
+
+    def functions(self, start: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+        """Return the best law of few tensors with varying coefficients, before and after polish."""
+        chosen = np.zeros(N_COEFFICIENTS, bool)
+        law, misfit = start, np.inf
+        penalised = law
+        for _ in range(self.recipe.max_tensors):
+            # first the best constant on each tensor: from h = 0 a whole network's first step
+            # overshoots, and the few best constants show which functions are worth a training
+            starts = []
+            for tensor in np.flatnonzero(~chosen):
+                tensors = chosen.copy()
+                tensors[tensor] = True
+                start = self.round(_with_tensors(law, tensors), 0.0, tensors, False, _START_STEPS)
+                starts.append((self.misfit(start), int(tensor), start, tensors))
+            trials = []
+            for _, tensor, start, tensors in sorted(starts, key=lambda s: s[:2])[:_MOST_TRIALS]:
+                trial = self.round(start, _PRIOR_SHARE, tensors, True, self.recipe.steps)
+                trials.append((self.misfit(trial), tensor, trial))
+            found = min(trials, key=lambda trial: trial[:2])
+            if not found[0] < misfit:
+                break
+            chosen[found[1]] = True
+            law = penalised = found[2]
+            if not self.settled(law):
+                share = _PRIOR_SHARE * min(1.0, found[0]) ** 2
+                law = self.round(law, share, chosen, True, self.recipe.polish_steps)
+            misfit = self.misfit(law)
+            if misfit < self.recipe.resolved or self.settled(law):
+                break
+        return penalised, law
+
+
+_START_STEPS = 6
+_MOST_TRIALS = 4
+
+_PRIOR_SHARE = 1e-6
+"""Strength of the prior while functions are learned. It only settles what the data leave open."""
+
+
+def _with_tensors(law: TensorBasisNetwork, tensors: np.ndarray) -> TensorBasisNetwork:
+    """Return the law in which the coefficients of these tensors may vary."""
+    mask = jnp.asarray(tensors, dtype=law.network_mask.dtype)
+    return eqx.tree_at(lambda tree: tree.network_mask, law, mask)
 
 
 def train_default(
@@ -218,27 +265,18 @@ def train_default(
     """
     recipe = recipe or DefaultRecipe()
     session = _Session(problem, recipe, progress)
-    law = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
-    law = session.anneal(law, recipe.constant_strengths, network=False)
-    penalised = law
-    law = _without_empty_terms(law, sample_states(law, problem), recipe.removed_below)
-    kept = np.asarray(law.constants) != 0.0
-    law = session.round(law, 0.0, kept, False, recipe.polish_steps)
-    if session.settled(law):
-        return _finish(session, law, penalised, False, "eight constants suffice")
-
+    start = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
+    penalised, law = session.constants(start)
+    if session.settled(law) or recipe.max_tensors == 0:
+        return _finish(session, law, penalised, False, "constant coefficients")
+    # the invariants as the data's own stresses have them, from the best law so far
     scale = invariant_sizes(sample_states(law, problem))
     start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
-    start = eqx.tree_at(lambda tree: tree.constants, start, penalised.constants)
-    law = session.anneal(start, recipe.network_strengths, network=True)
-    penalised = law
-    law = _without_empty_terms(law, sample_states(law, problem), recipe.removed_below)
-    kept = np.asarray(law.constants) != 0.0
-    # Hundreds of weights would fit noise: polish without prior only where there is none
-    noisy = is_white(session.residual(penalised), np.asarray(problem.grids.sample_mask))
-    final = recipe.network_strengths[-1] if not noisy else recipe.network_strengths[0]
-    law = session.round(law, 0.1 * final, kept, True, recipe.polish_steps)
-    return _finish(session, law, penalised, True, "coefficients vary with the invariants")
+    penalised_functions, functions = session.functions(start)
+    if session.misfit(functions) > 0.9 * session.misfit(law):
+        return _finish(session, law, penalised, False, "constant coefficients, no function better")
+    what = "coefficients that vary with the invariants"
+    return _finish(session, functions, penalised_functions, True, what)
 
 
 def _without_empty_terms(

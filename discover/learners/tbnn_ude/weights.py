@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 
@@ -47,7 +47,7 @@ class Rebuild(eqx.Module):
 
 
 def trainable_mask(
-    law: TensorBasisNetwork, constants: Bool[Array, "8"], network: bool
+    law: TensorBasisNetwork, constants: Bool[ArrayLike, "8"], network: bool
 ) -> Bool[Array, " p"]:
     """Return which weights may move: some constants, and all or none of the network."""
     dynamic, _ = split_law(law)

@@ -1,0 +1,154 @@
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import KFold, cross_val_score
+
+import tensor_library as tl
+from discover.errors import InputError
+from discover.laws import TensorBasisNetwork
+from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe, load_law, save_law
+from discover.learners.tbnn_ude.prior import sample_states
+from discover.learners.tbnn_ude.problem import make_problem
+from discover.learners.tbnn_ude.projection import project
+from discover.learners.tbnn_ude.recipe_default import initial_law
+from discover.protocols import oscillatory_shear
+from discover.simulate import synthetic_dataset
+
+FLOWS = {
+    "laos_1_0.5": oscillatory_shear(1.0, 0.5),
+    "laos_2_0.5": oscillatory_shear(2.0, 0.5),
+    "laos_2_1": oscillatory_shear(2.0, 1.0),
+}
+SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
+TINY = PaperRecipe(width=3, iterations_per_series=50)
+
+
+@pytest.fixture(scope="module")
+def data():
+    return synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
+
+
+@pytest.fixture(scope="module")
+def model(data):
+    return TBNNUDE(recipe=SMALL, n_members=2).fit(data.runs)
+
+
+def test_the_result_says_in_words_what_was_learned(model):
+    (term,) = model.terms_
+    assert term.term == "sigma.sigma"
+    assert term.coefficient == pytest.approx(0.3, abs=1e-4)
+    assert term.coefficient_penalised is not None
+    assert abs(term.coefficient_penalised - 0.3) > 1e-5
+
+
+def test_coefficients_along_trajectories_are_reported_with_their_spread(model):
+    table = model.result_.details["coefficients"]
+    assert set(table) == set(tl.TENSOR_NAMES)
+    assert table["sigma.sigma"]["mean"] == pytest.approx(0.3, abs=1e-4)
+    assert table["sigma.sigma"]["spread"] < 1e-9
+
+
+def test_every_member_of_an_ensemble_is_reported(model):
+    members = model.result_.details["members"]
+    assert len(members) == len(model.members_) == 2
+    assert model.result_.details["misfit"] == min(m["misfit"] for m in members)
+
+
+def test_predictions_follow_the_runs_and_their_order(model, data):
+    together = model.predict(data.runs)
+    assert together.shape == (3 * 51,)
+    np.testing.assert_allclose(together[51:102], data.runs[1].shear_stress, atol=1e-4)
+    assert model.score(data.runs) > 0.9999
+
+
+def test_units_come_in_through_modulus_and_relaxation_time(data):
+    slow = [
+        replace(
+            run,
+            time=4.0 * run.time,
+            shear_rate=run.shear_rate / 4,
+            shear_stress=50 * run.shear_stress,
+            protocol=oscillatory_shear(wi / 4, de / 4),
+        )
+        for run, (wi, de) in zip(data.runs, [(1, 0.5), (2, 0.5), (2, 1.0)], strict=True)
+    ]
+    model = TBNNUDE(recipe=SMALL, modulus=50.0, relaxation_time=4.0).fit(slow)
+    assert float(model.law_.constants[3]) == pytest.approx(0.3, abs=1e-4)
+    assert model.score(slow) > 0.9999
+
+
+def test_it_is_a_scikit_learn_estimator(data):
+    model = TBNNUDE(recipe=TINY, random_state=3)
+    copy = clone(model)
+    assert copy.get_params()["random_state"] == 3
+    assert not hasattr(copy, "law_")
+    scores = cross_val_score(model, list(data.runs), cv=KFold(3), error_score="raise")
+    assert scores.shape == (3,)
+    assert np.all(scores < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"recipe": "secret"}, "recipe must be one of"),
+        ({"modulus": -1.0}, "must be positive"),
+        ({"modulus": [1.0, 2.0]}, "one value for each mode"),
+        ({"n_members": 0}, "at least 1"),
+    ],
+)
+def test_a_wrong_setting_is_refused(data, options, message):
+    with pytest.raises(InputError, match=message):
+        TBNNUDE(**options).fit(data.runs)
+
+
+def test_runs_of_another_kind_are_refused():
+    with pytest.raises(InputError, match="sequence of ShearRun"):
+        TBNNUDE().fit([np.zeros(3)])
+
+
+@pytest.fixture(scope="module")
+def cloud(data):
+    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
+    return sample_states(law, make_problem(data.runs, np.ones(1), np.ones(1)))
+
+
+def constant_law(constants):
+    import equinox as eqx
+
+    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
+    return eqx.tree_at(lambda tree: tree.constants, law, jnp.asarray(constants, float))
+
+
+def test_projection_finds_the_two_tensors_of_a_known_network(cloud):
+    law = constant_law([0, 0, 0.1, 0, 0, 0.2, 0, 0])
+    projection = project(law, cloud, tl.build_library(degree=1))
+    assert projection.library is not None
+    found = dict(zip(projection.library.names, projection.coefficients, strict=True))
+    assert found == pytest.approx({"gammadot": 0.1, "sigma.gammadot+gammadot.sigma": 0.2}, abs=1e-8)
+    assert projection.misfit < 1e-8
+
+
+def test_projection_of_nothing_is_nothing(cloud):
+    assert project(constant_law(np.zeros(8)), cloud, tl.build_library(degree=1)).library is None
+
+
+def test_a_stored_network_comes_back_the_same(tmp_path):
+    law = initial_law(jax.random.key(4), 6, False, jnp.arange(1.0, 9.0))
+    save_law(law, tmp_path / "law.net")
+    back = load_law(tmp_path / "law.net")
+    assert isinstance(back, TensorBasisNetwork)
+    assert back.linear_relaxation is False
+    for one, two in zip(jax.tree.leaves(law), jax.tree.leaves(back), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}\n", b"not json", b'{"format": 3}\nxx'])
+def test_another_file_is_refused_and_never_unpickled(tmp_path, content):
+    path = tmp_path / "law.net"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="does not hold a trained network"):
+        load_law(path)

@@ -1,0 +1,175 @@
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.laws import Giesekus
+from discover.learners.tbnn_ude.least_squares import Objective, minimise
+from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
+from discover.learners.tbnn_ude.problem import make_problem
+from discover.learners.tbnn_ude.recipe_default import (
+    DefaultRecipe,
+    initial_law,
+    is_white,
+    train_default,
+)
+from discover.learners.tbnn_ude.recipe_paper import (
+    PaperRecipe,
+    make_network,
+    paper_loss,
+    train_paper,
+)
+from discover.learners.tbnn_ude.variational import residual_and_jacobian
+from discover.learners.tbnn_ude.weights import Rebuild, trainable_mask, weights_of
+from discover.protocols import oscillatory_shear
+from discover.simulate import synthetic_dataset
+
+FLOWS = {
+    "laos_1_0.5": oscillatory_shear(1.0, 0.5),
+    "laos_2_0.5": oscillatory_shear(2.0, 0.5),
+    "laos_2_1": oscillatory_shear(2.0, 1.0),
+}
+SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
+
+
+def problem_of(law, parameters, **options):
+    data = synthetic_dataset(law, parameters, FLOWS, duration=10.0, n_samples=51, **options)
+    return make_problem(data.runs, np.ones(1), np.ones(1))
+
+
+@pytest.fixture(scope="module")
+def giesekus_problem():
+    return problem_of("giesekus", {"alpha": 0.3})
+
+
+@pytest.fixture(scope="module")
+def trained(giesekus_problem):
+    return train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+
+
+def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
+    law = make_network(jax.random.key(1), 3, True)
+    weights = weights_of(law)
+    rebuild = Rebuild(law, jnp.ones(weights.shape, bool))
+    _, jacobian = eqx.filter_jit(residual_and_jacobian)(weights, rebuild, giesekus_problem)
+    direction = jax.random.normal(jax.random.key(2), weights.shape)
+    residual = eqx.filter_jit(lambda w, p: p.residual(rebuild(w)))
+    step = 1e-5  # truncation of order step², rounding of order 1e-16/step
+    expected = (
+        residual(weights + step * direction, giesekus_problem)
+        - residual(weights - step * direction, giesekus_problem)
+    ) / (2 * step)
+    np.testing.assert_allclose(
+        jacobian @ direction, expected, atol=1e-7 * float(jnp.max(jnp.abs(expected)))
+    )
+
+
+def test_constants_alone_recover_the_mobility_from_shear_stress(trained):
+    assert not trained.varies
+    # integration on the training grid errs by 4e-6 of the stress
+    np.testing.assert_allclose(trained.law.constants, [0, 0, 0, 0.3, 0, 0, 0, 0], atol=1e-4)
+    assert trained.misfit < 1e-5
+
+
+def test_the_penalty_shrinks_what_the_polish_restores(trained):
+    shrunk = float(trained.penalised_law.constants[3])
+    assert abs(shrunk - 0.3) > 1e-5
+    assert abs(float(trained.law.constants[3]) - 0.3) < abs(shrunk - 0.3)
+
+
+def test_maxwell_data_leave_nothing_to_learn():
+    # negative control: with −σ known there is no extra term, and none may be invented
+    trained = train_default(problem_of("ucm", {}), jax.random.key(0), True, SMALL)
+    assert float(jnp.max(jnp.abs(trained.law.constants))) < 1e-6
+    assert not trained.varies
+
+
+def test_the_network_is_called_in_when_constants_leave_structure():
+    problem = problem_of("ptt_linear", {"epsilon": 0.4})
+    trained = train_default(problem, jax.random.key(0), True, SMALL)
+    assert trained.varies
+    # one tensor, the stress itself, with a coefficient that varies: N2 stays exactly zero
+    np.testing.assert_array_equal(trained.law.network_mask, [0, 1, 0, 0, 0, 0, 0, 0])
+    constants = dataclasses.replace(SMALL, max_tensors=0)
+    alone = train_default(problem, jax.random.key(0), True, constants)
+    assert trained.misfit < 0.5 * alone.misfit
+
+
+def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
+    again = train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+    np.testing.assert_array_equal(again.misfits, trained.misfits)
+    for one, two in zip(jax.tree.leaves(again.law), jax.tree.leaves(trained.law), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_a_start_that_runs_away_neither_crashes_nor_gives_nan(giesekus_problem):
+    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
+    good = law
+    law = eqx.tree_at(lambda tree: tree.constants, law, jnp.zeros(8).at[3].set(-8.0))
+    rebuild = Rebuild(law, trainable_mask(law, np.ones(8, bool), False))
+    cloud = sample_states(good, giesekus_problem)
+    objective = Objective(giesekus_problem, rebuild, cloud, reweighted(good, cloud, 1e-3))
+    weights = minimise(weights_of(law), objective, 3)
+    assert np.all(np.isfinite(weights))
+
+
+def test_the_prior_is_the_sum_of_root_mean_squares_at_its_fixed_point(giesekus_problem):
+    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
+    law = eqx.tree_at(lambda tree: tree.constants, law, jnp.array([0, 0.5, 0.0, 0.3, 0, 0, 0, 0]))
+    cloud = sample_states(law, giesekus_problem)
+    value = float(jnp.sum(prior_residual(law, cloud, reweighted(law, cloud, 0.01)) ** 2))
+    amount, variation = parts(law, cloud)
+    expected = 0.01 * float(jnp.sum(jnp.sqrt(jnp.mean(amount**2, axis=0))))
+    assert float(jnp.max(jnp.abs(variation))) < 1e-12  # constants do not vary
+    assert value == pytest.approx(expected, rel=2e-3)  # the floor of 1e-4 in the weights
+
+
+@pytest.mark.parametrize(("seed", "kind"), [(0, "white"), (1, "walk")])
+def test_whiteness_tells_noise_from_structure(seed, kind):
+    noise = np.random.default_rng(seed).standard_normal((4, 200))
+    mask = np.ones((4, 200), bool)
+    if kind == "white":
+        assert is_white(noise, mask)
+    else:
+        assert not is_white(noise.cumsum(axis=1), mask)
+
+
+def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
+    law = make_network(jax.random.key(3), 5, True)
+    active = jnp.array([True, False, True])
+    loss = float(paper_loss(law.network, law, giesekus_problem, active, 0.01))
+    residual = np.asarray(giesekus_problem.residual(law))
+    weights = sum(
+        float(np.abs(w).sum())
+        for w in jax.tree.leaves(eqx.filter(law.network, eqx.is_inexact_array))
+    )
+    expected = np.mean(residual[0] ** 2) + np.mean(residual[2] ** 2) + 0.01 * weights
+    assert loss == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus_problem):
+    recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=3e-3)
+    _, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    assert losses.shape == (150,)
+    for series in range(3):
+        assert losses[50 * series + 49] < losses[50 * series]
+    assert losses[50] > losses[49]  # the peak of a series added
+
+
+def test_an_absurd_learning_rate_is_survived(giesekus_problem):
+    recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=50.0)
+    law, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    assert not np.all(np.isfinite(losses))  # some trials did run away
+    assert all(
+        bool(jnp.all(jnp.isfinite(w))) for w in jax.tree.leaves(eqx.filter(law, eqx.is_array))
+    )
+
+
+def test_the_network_stands_on_a_known_base_law():
+    data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
+    problem = make_problem(data.runs, np.ones(1), np.ones(1))
+    trained = train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
+    assert float(trained.law.constants[3]) == pytest.approx(0.2, abs=1e-4)  # the rest of 0.3
