@@ -42,7 +42,7 @@ class Data(_Section):
     @model_validator(mode="after")
     def _one_source(self):
         if (self.folder is None) == (self.synthetic is None):
-            raise ValueError("write either folder = \"...\" or synthetic = {...}, not both or none")
+            raise ValueError('write either folder = "..." or synthetic = {...}, not both or none')
         both = set(self.fit or ()) & set(self.held_out)
         if both:
             raise ValueError(f"the run {sorted(both)[0]!r} is both in fit and in held_out")
@@ -104,7 +104,9 @@ class Compare(_Section):
     selection: Literal["bic", "held_out"] = "bic"
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     recipe: Literal["default", "paper"] = "default"
-    iterations: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    quick: bool = False
+    members: Annotated[int, Field(ge=1, le=64)] = 1
+    seed: Annotated[int, Field(ge=0)] = 0
     use_normal_stresses: bool = False
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
     sweep: Sweep | None = None

@@ -1,0 +1,206 @@
+"""Both learners on identical data, part by part, so that a run that was stopped can go on."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.flows import Flow, comparison_flows, predict
+from discover.comparison.identifiability import find_rivals, undetermined_quantities
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.training import Progress, require_numbers, silent, train
+from discover.comparison.truth import TrueTerm, true_terms
+from discover.errors import InputError
+from discover.laws.registry import LAWS
+from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
+from discover.study.schema import Study
+
+
+class Store(Protocol):
+    """Where finished parts are kept; `discover.study.RunFolder` is one."""
+
+    def load(self, part: str) -> dict[str, Any] | None:
+        """Return a finished part, or None."""
+        ...
+
+    def save(self, part: str, content: Mapping[str, Any]) -> None:
+        """Keep a finished part."""
+        ...
+
+
+def compare(
+    study: Study,
+    seed: int | None = None,
+    progress: Progress = silent,
+    store: Store | None = None,
+) -> Comparison:
+    """Run a study's learners on identical data and look at what each found.
+
+    Parameters
+    ----------
+    study
+        The study.
+    seed
+        Overrides the study's seeds, of the noise and of the learners.
+    progress
+        Called with what is going on and the fraction done.
+    store
+        Where finished learners are kept and found again.
+
+    Raises
+    ------
+    InputError
+        If the study asks for something that its data cannot give.
+    """
+    options = study.compare
+    data = load_study_data(study, seed)
+    model = declared_model(study, data.dataset)
+    require_numbers(model)
+    flows = comparison_flows(data, options.high_deborah)
+    learner_seed = options.seed if seed is None else seed
+    sweep = _sweep_studies(study)
+    n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
+    done = 0
+
+    def step(title: str) -> Progress:
+        return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
+
+    outcomes = {}
+    for learner in options.learners:
+        outcomes[learner] = _outcome(
+            learner, learner, study, model, data, flows, learner_seed, step(learner), store
+        )
+        done += 1
+    points = []
+    for law, value, other in sweep:
+        other_data = load_study_data(other, seed)
+        flow = comparison_flows(other_data, ())[len(other_data.fit)]
+        found = {}
+        for learner in options.learners:
+            part = f"sweep_{law}_{value:g}_{learner}"
+            found[learner] = _outcome(
+                part, learner, other, model, other_data, [flow], learner_seed, step(part), store
+            )
+            done += 1
+        assert options.sweep is not None
+        points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
+    progress("rivals: simulating laws that the data do not rule out", done / n_parts)
+    chosen = outcomes.get("tensor_sindy")
+    rivals = []
+    if chosen is not None:
+        rivals = find_rivals(chosen.terms, chosen.details.get("rivals", ()), model, flows)
+    distillations = _distil(study, data, store, step("distillation"))
+    progress("done", 1.0)
+    return Comparison(
+        name=study.name,
+        data_summary=_summary(data, study),
+        known_part=_known_part(model, study),
+        flows=flows,
+        before={flow.key: predict(model.fluid, flow) for flow in flows},
+        outcomes=outcomes,
+        truth=_truth(study, model),
+        noise=None if study.data.synthetic is None else study.data.synthetic.noise,
+        rivals=rivals,
+        statements=undetermined_quantities(flows, options.use_normal_stresses, rivals),
+        sweep=points,
+        distillations=distillations,
+        seed=learner_seed,
+    )
+
+
+def _outcome(
+    part: str,
+    learner: str,
+    study: Study,
+    model: DeclaredModel,
+    data: StudyData,
+    flows: list[Flow],
+    seed: int,
+    progress: Callable[[str, float], None],
+    store: Store | None,
+) -> LearnerOutcome:
+    kept = None if store is None else store.load(part)
+    if kept is not None:
+        return LearnerOutcome.from_state(kept)
+    progress("starting", 0.0)
+    result, fluid = train(learner, study, model, data.fit.runs, seed, progress)
+    outcome = LearnerOutcome.of(result, fluid, flows)
+    if store is not None:
+        store.save(part, outcome.to_state())
+        # the same route as after an interruption, so that both give the same files
+        return LearnerOutcome.from_state(outcome.to_state())
+    return outcome
+
+
+def _sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
+    sweep, synthetic = study.compare.sweep, study.data.synthetic
+    if sweep is None:
+        return []
+    if synthetic is None:
+        raise InputError(
+            "compare.sweep makes synthetic data, so [data] must say synthetic = {...} too."
+        )
+    studies = []
+    for law in sweep.laws:
+        if sweep.parameter not in LAWS[law].parameters:
+            wanted = ", ".join(LAWS[law].parameters) or "none"
+            raise InputError(
+                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}; its "
+                f"parameters are: {wanted}."
+            )
+        for value in sweep.values:
+            made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
+            data = study.data.model_copy(update={"synthetic": made})
+            studies.append((law, value, study.model_copy(update={"data": data})))
+    return studies
+
+
+def _distil(study: Study, data: StudyData, store: Store | None, progress: Progress):
+    if not study.compare.distillation:
+        return []
+    if data.truth is None or study.data.synthetic is None:
+        raise InputError(
+            "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
+            "{...}. Use discover distil for laws by name."
+        )
+    kept = None if store is None else store.load("distillation")
+    if kept is not None:
+        return kept["rows"]
+    from discover.learners.distillation import STUDENTS, distil
+
+    teacher = study.data.synthetic.law
+    students = [name for name in STUDENTS if name != teacher]
+    rows = []
+    for i, student in enumerate(students):
+        progress(f"{teacher} teaches {student}", i / len(students))
+        rows.append({"teacher": teacher, **distil(data.truth, student).as_dict()})
+    if store is not None:
+        store.save("distillation", {"rows": rows})
+    return rows
+
+
+def _truth(study: Study, model: DeclaredModel) -> tuple[TrueTerm, ...] | None:
+    synthetic = study.data.synthetic
+    if synthetic is None or model.law_name != "ucm":
+        return None
+    return true_terms(synthetic.law, synthetic.parameters, study.model.known_relaxation)
+
+
+def _summary(data: StudyData, study: Study) -> str:
+    samples = sum(len(run) for run in data.fit)
+    runs = f"σ12 of {len(data.fit)} runs ({samples} samples)"
+    made = study.data.synthetic
+    if made is None:
+        return f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+    values = ", ".join(f"{key} = {value:g}" for key, value in made.parameters.items())
+    law = LAWS[made.law].title + (f" ({values})" if values else "")
+    noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
+    return f"{runs} computed from the {law} law, {noise}"
+
+
+def _known_part(model: DeclaredModel, study: Study) -> str:
+    if not study.model.known_relaxation:
+        return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
+    values = ", ".join(f"{key} = {value:g}" for key, value in model.parameters.items())
+    title = LAWS[model.law_name].title + (f" ({values})" if values else "")
+    modes = len(model.modulus)
+    return title if modes == 1 else f"{title}, {modes} relaxation modes from the linear sweep"

@@ -1,0 +1,154 @@
+"""The result of comparing two learners on identical data."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from discover.comparison.flows import Flow, Stresses, relative_errors
+from discover.comparison.identifiability import Rival, Statement
+from discover.comparison.outcome import LearnerOutcome, plain
+from discover.comparison.truth import TrueTerm
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One data set of a sweep over laws and a parameter.
+
+    Attributes
+    ----------
+    law, parameter, value
+        What made the data.
+    flow
+        The test flow.
+    outcomes
+        By learner.
+    """
+
+    law: str
+    parameter: str
+    value: float
+    flow: Flow
+    outcomes: Mapping[str, LearnerOutcome]
+
+    def errors(self) -> dict[str, dict[str, float | None]]:
+        """Return the errors of each learner in the test flow."""
+        return {
+            name: relative_errors(outcome.predictions[self.flow.key], self.flow.reference)
+            for name, outcome in self.outcomes.items()
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Both learners beside the known part alone, in the same flows.
+
+    Attributes
+    ----------
+    name
+        Of the study.
+    data_summary, known_part
+        The data and the known part, in words.
+    flows
+        Every flow looked at.
+    before
+        Predictions of the known part alone, by flow.
+    outcomes
+        By learner.
+    truth
+        The terms a perfect learner would find, or None.
+    noise
+        Relative noise of synthetic data, or None.
+    rivals, statements
+        What the data leave open.
+    sweep
+        The same again over a parameter.
+    distillations
+        What simpler laws learn from the true one, JSON-able rows.
+    seed
+        Seed of the learners.
+    """
+
+    name: str
+    data_summary: str
+    known_part: str
+    flows: Sequence[Flow]
+    before: Mapping[str, Stresses | None]
+    outcomes: Mapping[str, LearnerOutcome]
+    truth: Sequence[TrueTerm] | None
+    noise: float | None
+    rivals: Sequence[Rival]
+    statements: Sequence[Statement]
+    sweep: Sequence[SweepPoint] = ()
+    distillations: Sequence[Mapping[str, Any]] = ()
+    seed: int = 0
+
+    def flows_of(self, kind: str) -> list[Flow]:
+        """Return the flows of one kind."""
+        return [flow for flow in self.flows if flow.kind == kind]
+
+    @property
+    def judged(self) -> list[Flow]:
+        """Flows that no learner saw and in which something is known."""
+        return [flow for flow in self.flows if flow.kind in ("test", "held_out")]
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Quantities that the data do not decide."""
+        return [s.quantity for s in self.statements if s.undetermined]
+
+    def errors(self, who: str, flow: Flow) -> dict[str, float | None]:
+        """Return the errors of a learner, or of ``"before"``, in a flow."""
+        predictions = self.before if who == "before" else self.outcomes[who].predictions
+        return relative_errors(predictions[flow.key], flow.reference)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the comparison as ``comparison.json`` holds it."""
+        learners = {}
+        for name, outcome in self.outcomes.items():
+            learners[name] = {
+                "terms": [
+                    {
+                        "term": t.term,
+                        "coefficient": t.coefficient,
+                        "ci95": None if t.ci95 is None else list(t.ci95),
+                        "coefficient_penalised": t.coefficient_penalised,
+                        "inner": dict(t.inner),
+                        "latex": t.latex,
+                    }
+                    for t in outcome.terms
+                ],
+                "errors": self._errors(name, self.judged),
+                "training_errors": self._errors(name, self.flows_of("training")),
+                "train_seconds": outcome.train_seconds,
+                "message": outcome.message,
+                "details": outcome.details,
+            }
+        content = {
+            "study": self.name,
+            "data": self.data_summary,
+            "known_part": self.known_part,
+            "seed": self.seed,
+            "learners": learners,
+            "before": {"errors": self._errors("before", self.judged)},
+            "truth": None
+            if self.truth is None
+            else [
+                {"term": t.term, "coefficient": t.coefficient, "inner": dict(t.inner)}
+                for t in self.truth
+            ],
+            "rivals": [rival.to_json() for rival in self.rivals],
+            "undetermined": self.undetermined,
+            "statements": [
+                {"quantity": s.quantity, "undetermined": s.undetermined, "text": s.text}
+                for s in self.statements
+            ],
+            "sweep": [
+                {"law": p.law, "parameter": p.parameter, "value": p.value, "errors": p.errors()}
+                for p in self.sweep
+            ],
+            "distillation": list(self.distillations),
+        }
+        return plain(content)
+
+    def _errors(self, who: str, flows: Sequence[Flow]) -> dict[str, dict[str, float | None]]:
+        return {flow.name: self.errors(who, flow) for flow in flows}

@@ -1,0 +1,217 @@
+"""The flows on which learned laws are looked at, with what is known of the truth in each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.run import ShearRun
+from discover.laws.multimode import Fluid
+from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
+from discover.protocols.shear import ShearProtocol, oscillatory_shear
+from discover.simulate.solve import ShearStress, SimulationError, simulate
+from discover.simulate.synthetic import SyntheticDataset
+from discover.study.build import StudyData
+
+QUANTITIES = ("sigma12", "N1", "N2")
+"""What is compared, as spelled in JSON."""
+
+Stresses = Mapping[str, Float[np.ndarray, " n"]]
+"""Some of `QUANTITIES`, each of shape (n,)."""
+
+HIGH_DEBORAH_AMPLITUDE = 3.0
+"""Wi of the paper's curves that become elliptical."""
+
+_BUCKET = 401
+
+FlowKind = Literal["training", "held_out", "test", "high_deborah"]
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A flow, when to look at it, and what is known of the stresses.
+
+    Attributes
+    ----------
+    name
+        Name of the run or of the protocol.
+    kind
+        What it is for. Only ``training`` was seen by the learners.
+    protocol
+        The shear rate.
+    times, shear_rate
+        Samples, shape (n,), in s and 1/s.
+    reference
+        The truth where the law is known, the measurement otherwise; not every quantity.
+    measured
+        σ12 that the learners saw, noise included, for training flows.
+    is_truth
+        Whether `reference` is exact and not a measurement.
+    training_end
+        Last time of the training series, beyond which a prediction extrapolates in time; or
+        None.
+    oscillatory
+        Whether Lissajous curves make sense.
+    """
+
+    name: str
+    kind: FlowKind
+    protocol: ShearProtocol
+    times: Float[np.ndarray, " n"]
+    shear_rate: Float[np.ndarray, " n"]
+    reference: Stresses
+    measured: Float[np.ndarray, " n"] | None = None
+    is_truth: bool = False
+    training_end: float | None = None
+    oscillatory: bool = False
+
+    @property
+    def key(self) -> str:
+        """Unique name: a test may repeat a training flow past its last time."""
+        return self.name if self.kind == "test" else f"{self.kind}/{self.name}"
+
+    @property
+    def title(self) -> str:
+        """The flow in the field's notation."""
+        amplitudes = np.asarray(self.protocol.amplitudes)
+        frequencies = np.asarray(self.protocol.frequencies)
+        rates = np.asarray(self.protocol.table_rates)
+        if self.oscillatory and np.count_nonzero(amplitudes) == 1:
+            i = int(np.flatnonzero(amplitudes)[0])
+            return f"γ̇ = {amplitudes[i]:g} cos({frequencies[i]:g} t)"
+        if not np.any(amplitudes) and rates.size == 1:
+            return f"start-up at γ̇ = {rates[0]:g}"
+        return self.name
+
+
+def comparison_flows(data: StudyData, high_deborah: tuple[float, ...]) -> list[Flow]:
+    """Return the flows of a comparison: training, held out, tests and high Deborah numbers.
+
+    The last two need a known law.
+
+    Parameters
+    ----------
+    data
+        The data of the study.
+    high_deborah
+        De of the flows γ̇ = 3 cos(De t).
+    """
+    flows = [run_flow(run, "training", data) for run in data.fit]
+    flows += [run_flow(run, "held_out", data) for run in data.held_out]
+    truth = data.truth
+    if truth is None:
+        return flows
+    for name, protocol in paper_test_protocols().items():
+        times = np.linspace(0.0, TEST_DURATION, 401)
+        flows.append(_truth_flow(name, "test", protocol, times, truth))
+    for deborah in high_deborah:
+        protocol = oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
+        period = 2.0 * np.pi / deborah
+        # twelve relaxation times for the transient to die out, then one cycle
+        start = np.ceil(12.0 / period) * period
+        times = np.concatenate([[0.0], start + np.linspace(0.0, period, 121)])
+        flows.append(
+            _truth_flow(f"high_deborah_{deborah:g}", "high_deborah", protocol, times, truth)
+        )
+    return flows
+
+
+def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
+    """Return the flow of a run of the data set."""
+    dataset = data.dataset
+    exact = dataset.exact if isinstance(dataset, SyntheticDataset) else None
+    if exact is not None:
+        reference = stresses(exact[run.name])
+    else:
+        candidates = {
+            "sigma12": run.shear_stress,
+            "N1": run.first_normal_stress_difference,
+            "N2": run.second_normal_stress_difference,
+        }
+        reference = {key: value for key, value in candidates.items() if value is not None}
+    return Flow(
+        run.name,
+        kind,
+        run.protocol,
+        run.time,
+        run.shear_rate,
+        reference,
+        run.shear_stress if kind == "training" else None,
+        is_truth=exact is not None,
+        training_end=float(run.time[-1]) if kind == "training" else None,
+        oscillatory=_oscillates(run.protocol, run.shear_rate),
+    )
+
+
+def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
+    rates = np.asarray(jax.vmap(protocol.shear_rate)(jnp.asarray(times)))
+    return Flow(
+        name,
+        kind,
+        protocol,
+        times,
+        rates,
+        _exactly(truth, protocol, times),
+        is_truth=True,
+        training_end=TRAINING_DURATION if kind == "test" else None,
+        oscillatory=_oscillates(protocol, rates),
+    )
+
+
+def _exactly(truth: Fluid, protocol: ShearProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
+    solution = stresses(simulate(truth, protocol, _padded(times)))
+    return {quantity: values[: times.size] for quantity, values in solution.items()}
+
+
+def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
+    changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
+    return bool(np.any(np.asarray(protocol.amplitudes))) or changes >= 3
+
+
+def stresses(stress: ShearStress) -> dict[str, np.ndarray]:
+    """Return the compared quantities of a solution."""
+    return {
+        "sigma12": stress.shear_stress,
+        "N1": stress.first_normal_stress_difference,
+        "N2": stress.second_normal_stress_difference,
+    }
+
+
+def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
+    """Return what a fluid does in a flow, or None if its stress runs away."""
+    n = flow.times.size
+    try:
+        solution = simulate(fluid, flow.protocol, _padded(flow.times))
+    except SimulationError:
+        return None
+    return {quantity: values[:n] for quantity, values in stresses(solution).items()}
+
+
+def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+    """Return the times with a few more after the end, so that flows share one compilation."""
+    missing = -times.size % _BUCKET
+    step = 1e-6 * max(float(times[-1]), 1e-12)
+    return np.concatenate([times, times[-1] + step * np.arange(1, missing + 1)])
+
+
+def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[str, float | None]:
+    """Return the relative L2 error of each quantity; None where it cannot be said.
+
+    N2's is relative to N1's norm, since N2 may vanish.
+    """
+    errors: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+    if prediction is None:
+        return errors
+    for quantity in QUANTITIES:
+        scale = reference.get("N1" if quantity == "N2" else quantity)
+        if quantity not in reference or scale is None:
+            continue
+        norm = float(np.linalg.norm(scale))
+        if norm > 0:
+            difference = np.linalg.norm(prediction[quantity] - reference[quantity])
+            errors[quantity] = float(difference / norm)
+    return errors

@@ -1,0 +1,147 @@
+"""What one learner found and predicts, in a form that can be kept in a file."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.comparison.flows import Flow, Stresses, predict
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
+from discover.learners.result import LearnerResult, RecoveredTerm
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+
+@dataclass(frozen=True)
+class LearnerOutcome:
+    """A learner's result with its predictions in every flow of the comparison.
+
+    Attributes
+    ----------
+    learner
+        Name of the learner.
+    terms
+        The law term by term.
+    train_seconds
+        Wall-clock time of the fit.
+    loss_history
+        Iterations and losses, both of shape (m,).
+    details
+        What else the learner says; JSON-able.
+    message
+        One sentence on how the fit ended.
+    predictions
+        By the key of the flow; None where the law runs away.
+    """
+
+    learner: str
+    terms: tuple[RecoveredTerm, ...]
+    train_seconds: float
+    loss_history: tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    details: Mapping[str, Any] = field(default_factory=dict)
+    message: str = ""
+    predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
+        """Return the outcome of a fit, with the fluid it found simulated in every flow."""
+        return cls(
+            result.learner,
+            result.terms,
+            result.train_seconds,
+            result.loss_history,
+            result.details,
+            result.message,
+            {flow.key: predict(fluid, flow) for flow in flows},
+        )
+
+    def to_state(self) -> dict[str, Any]:
+        """Return everything as JSON-able values; `from_state` undoes it exactly."""
+        return {
+            "learner": self.learner,
+            "terms": [asdict(term) for term in self.terms],
+            "train_seconds": self.train_seconds,
+            "loss_history": [np.asarray(part).tolist() for part in self.loss_history],
+            "details": plain(self.details),
+            "message": self.message,
+            "predictions": {
+                name: None if p is None else {q: v.tolist() for q, v in p.items()}
+                for name, p in self.predictions.items()
+            },
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
+        """Return the outcome that was kept."""
+        terms = tuple(
+            RecoveredTerm(**{**t, "ci95": None if t["ci95"] is None else tuple(t["ci95"])})
+            for t in state["terms"]
+        )
+        iterations, losses = (np.asarray(part, dtype=float) for part in state["loss_history"])
+        predictions = {
+            name: None if p is None else {q: np.asarray(v, dtype=float) for q, v in p.items()}
+            for name, p in state["predictions"].items()
+        }
+        return cls(
+            state["learner"],
+            terms,
+            float(state["train_seconds"]),
+            (iterations, losses),
+            state["details"],
+            state["message"],
+            predictions,
+        )
+
+
+def law_of_terms(
+    names: list[str],
+    coefficients: list[float],
+    inner: Mapping[str, float],
+    linear_relaxation: bool,
+    base: AbstractConstitutiveLaw | None = None,
+) -> LibraryExpansion:
+    """Return the law h = Σ c term from the canonical spelling of its terms.
+
+    Parameters
+    ----------
+    names, coefficients
+        The terms; none means h = 0.
+    inner
+        Inner parameters by name.
+    linear_relaxation
+        Whether −σ is part of the known law.
+    base
+        A known law whose extra term is added.
+    """
+    pairs = list(zip(names, coefficients, strict=True)) or [("sigma", 0.0)]
+    library = TermLibrary(tuple(parse_term(name) for name, _ in pairs))
+    values = [
+        inner.get(name, default)
+        for name, default in zip(library.inner_names, library.inner_default, strict=True)
+    ]
+    return LibraryExpansion(
+        np.array([c for _, c in pairs], dtype=float),  # pyright: ignore[reportArgumentType]
+        np.array(values, dtype=float),  # pyright: ignore[reportArgumentType]
+        library,
+        linear_relaxation,
+        base,
+    )
+
+
+def plain(value: Any) -> Any:
+    """Return nested details with numpy values as plain ones and what is not finite as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,110 @@
+"""From a study to trained learners."""
+
+from collections.abc import Callable, Sequence
+
+from discover.dataset.run import ShearRun
+from discover.errors import InputError
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.multimode import Fluid
+from discover.learners.result import LearnerResult
+from discover.study.build import DeclaredModel
+from discover.study.schema import Study
+from tensor_library.library import build_library
+
+Progress = Callable[[str, float], None]
+"""Called with what is going on and the fraction done, 0 to 1."""
+
+
+def silent(label: str, fraction: float) -> None:
+    """Report nothing."""
+    del label, fraction
+
+
+def require_numbers(model: DeclaredModel) -> None:
+    """Check that nothing of the declared law is left to be fitted.
+
+    Raises
+    ------
+    InputError
+        If something is.
+    """
+    if model.free:
+        raise InputError(
+            f"compare needs a known part without free parameters, but {', '.join(model.free)} in "
+            '[model] is "fit". Write a number, or modes = "lve" for a spectrum from lve.csv; '
+            "discover close-loop fits them."
+        )
+
+
+def train(
+    learner: str,
+    study: Study,
+    model: DeclaredModel,
+    runs: Sequence[ShearRun],
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[LearnerResult, Fluid]:
+    """Return what one learner finds in these runs, and the fluid that it makes.
+
+    Parameters
+    ----------
+    learner
+        ``"tensor_sindy"`` or ``"tbnn_ude"``.
+    study
+        The study, for the learner's settings.
+    model
+        The known part.
+    runs
+        Runs to learn from.
+    seed
+        Seed of the learner.
+    progress
+        Called as it goes.
+    """
+    options = study.compare
+    plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
+    shared = {
+        "modulus": model.modulus,
+        "relaxation_time": model.relaxation_time,
+        "known_relaxation": study.model.known_relaxation,
+        "base_law": None if plain_maxwell else model.law,
+        "random_state": seed,
+    }
+    library = build_library(
+        degree=options.library.degree, closed_forms=options.library.closed_forms
+    )
+    if learner == "tensor_sindy":
+        from discover.learners.tensor_sindy import TensorSINDy
+
+        estimator = TensorSINDy(
+            library=library,
+            optimizer=options.optimizer,
+            selection=options.selection,
+            max_terms=options.max_terms,
+            use_normal_stresses=options.use_normal_stresses,
+            solvent_viscosity=model.solvent_viscosity,
+            progress=lambda text: progress(text, 0.5),
+            **shared,
+        )
+    elif learner == "tbnn_ude":
+        from discover.learners.tbnn_ude import TBNNUDE
+
+        if model.solvent_viscosity:
+            raise InputError(
+                "The network takes no solvent viscosity yet; leave solvent_viscosity_Pa_s out, or "
+                'write learners = ["tensor_sindy"].'
+            )
+        estimator = TBNNUDE(
+            recipe=options.recipe,
+            n_members=options.members,
+            quick=options.quick,
+            projection_library=library,
+            progress=lambda step, total, loss: progress(
+                f"step {step} of at most {total}, loss {loss:.2g}", step / max(total, 1)
+            ),
+            **shared,
+        )
+    else:
+        raise InputError(f"Unknown learner {learner!r}; write tensor_sindy or tbnn_ude.")
+    estimator.fit(list(runs))
+    return estimator.result_, estimator.fluid_
