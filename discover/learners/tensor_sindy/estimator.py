@@ -1,7 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import jax.numpy as jnp
@@ -10,7 +10,6 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
@@ -94,7 +93,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        library: TermLibrary | None = None,
+        library: Any = None,
         optimizer: Any = "stlsq",
         modulus: Any = 1.0,
         relaxation_time: Any = 1.0,
@@ -126,13 +125,13 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.progress = progress
 
-    def fit(self, X: Sequence[ShearRun], y=None) -> "TensorSINDy":
+    def fit(self, X: Iterable[Any], y=None) -> "TensorSINDy":
         """Find the law of these runs.
 
         Parameters
         ----------
         X
-            Runs.
+            Runs (`ShearRun`), or a data set.
         y
             Ignored: the observations are part of the runs.
 
@@ -156,19 +155,23 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
             self.use_normal_stresses,
             self.strain_step,
         )
+        n_runs = problem.target.shape[0]
+        validates = min(n_runs, self.n_folds) > 1
+        if self.selection == "held_out" and not validates:
+            raise InputError(
+                f"selection='held_out' needs at least two runs and two folds; got {n_runs} and "
+                f"{self.n_folds}. Use selection='bic'."
+            )
         search = SupportSearch(
             problem, self.optimizer, self.max_terms, self.misfit_floor, self.progress
         )
         path = search.run()
-        n_runs = problem.target.shape[0]
         held_out = None
-        if min(n_runs, self.n_folds) > 1:
+        if validates:
             folds = run_folds(n_runs, self.n_folds, self.random_state)
             held_out = held_out_misfits(problem, path, folds, search.scale, search.slots)
         criterion = np.array([search.criterion(fit) for fit in path])
-        if self.selection == "held_out":
-            if held_out is None:
-                raise InputError("selection='held_out' needs at least two runs and two folds.")
+        if self.selection == "held_out" and held_out is not None:
             chosen = choose_by_held_out(held_out, self.misfit_floor)
         else:
             chosen = choose_by_bic(criterion)
@@ -192,7 +195,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
             loss_history=(
-                np.arange(1, len(misfits) + 1),
+                np.arange(1.0, len(misfits) + 1.0),
                 np.minimum.accumulate(np.square(misfits)),
             ),
             details={
@@ -214,11 +217,11 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         )
         return self
 
-    def predict(self, X: Sequence[ShearRun]) -> Float[np.ndarray, " rows"]:
+    def predict(self, X: Iterable[Any]) -> Float[np.ndarray, " rows"]:
         """Return σ12 in Pa at the samples of all runs, one run after the other."""
         return np.concatenate(self._predict_runs(X))
 
-    def score(self, X: Sequence[ShearRun], y=None, sample_weight=None) -> float:
+    def score(self, X: Iterable[Any], y=None, sample_weight=None) -> float:
         """Return one minus the relative error of σ12, averaged over runs.
 
         The error of a run is the root-mean-square of prediction minus measurement over the

@@ -17,9 +17,9 @@ from tensor_library.library import TermLibrary
 
 
 def derivative_problem(
-    times: Sequence[Float[np.ndarray, " n"]],
-    stresses: Sequence[Float[np.ndarray, "n 4"]],
-    shear_rates: Sequence[Float[np.ndarray, " n"]],
+    times: Sequence[np.ndarray],
+    stresses: Sequence[np.ndarray],
+    shear_rates: Sequence[np.ndarray],
     library: TermLibrary,
     known: AbstractConstitutiveLaw | None = None,
     differentiation: BaseDifferentiation | None = None,
@@ -33,7 +33,8 @@ def derivative_problem(
     Parameters
     ----------
     times, stresses, shear_rates
-        For each run: dimensionless times, σ11, σ22, σ33, σ12 and shear rates at its samples.
+        For each run: dimensionless times, shape (n,), σ11, σ22, σ33, σ12, shape (n, 4), and shear
+        rates, shape (n,).
     library
         Candidate terms; closed forms are taken at their default inner parameters.
     known
@@ -70,9 +71,9 @@ def derivative_problem(
 
 
 def regress_full_stress(
-    times: Sequence[Float[np.ndarray, " n"]],
-    stresses: Sequence[Float[np.ndarray, "n 4"]],
-    shear_rates: Sequence[Float[np.ndarray, " n"]],
+    times: Sequence[np.ndarray],
+    stresses: Sequence[np.ndarray],
+    shear_rates: Sequence[np.ndarray],
     library: TermLibrary,
     optimizer="stlsq",
     max_terms: int = 5,

@@ -39,7 +39,10 @@ class LinearModel:
 
     @classmethod
     def at(
-        cls, problem: TrajectoryProblem, fit: Fit, keep: Bool[np.ndarray, "runs n"] | None = None
+        cls,
+        problem: TrajectoryProblem,
+        fit: Fit,
+        keep: Bool[np.ndarray, "runs samples"] | None = None,
     ) -> "LinearModel":
         """Return the model at a fitted law, over the samples to keep.
 

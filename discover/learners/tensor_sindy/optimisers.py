@@ -114,6 +114,10 @@ def _sweep(optimizer, matrix, right, max_terms):
         yield from _fitted(SSR(alpha=_RIDGE, max_iter=n, unbias=False), matrix, right, True)
     else:
         steps = min(max_terms + 1, n)
+        # FROLS orthogonalises, and stops with an error where columns depend on one another, as
+        # those of twins do: the ridge as further rows makes them independent
+        matrix = np.vstack([matrix, np.sqrt(_RIDGE) * np.eye(n)])
+        right = np.concatenate([right, np.zeros(n)])
         yield from _fitted(FROLS(alpha=_RIDGE, max_iter=steps, unbias=False), matrix, right, True)
 
 

@@ -1,6 +1,7 @@
 """The data of a fit, laid out once on the host so that every trial law shares one compilation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -70,7 +71,7 @@ class TrajectoryProblem(eqx.Module):
         return np.repeat(np.arange(runs), samples * kinds)
 
 
-def as_runs(runs: Sequence[ShearRun]) -> list[ShearRun]:
+def as_runs(runs: Iterable[Any]) -> list[ShearRun]:
     """Return the runs as a list, having checked that they are runs.
 
     Raises
@@ -91,10 +92,10 @@ def as_runs(runs: Sequence[ShearRun]) -> list[ShearRun]:
 
 
 def make_problem(
-    runs: Sequence[ShearRun],
+    runs: Iterable[Any],
     library: TermLibrary,
-    modulus: Float[np.ndarray, " k"] | float = 1.0,
-    relaxation_time: Float[np.ndarray, " k"] | float = 1.0,
+    modulus: Any = 1.0,
+    relaxation_time: Any = 1.0,
     solvent_viscosity: float = 0.0,
     base: AbstractConstitutiveLaw | None = None,
     known_relaxation: bool = True,
@@ -110,7 +111,8 @@ def make_problem(
     library
         Candidate terms.
     modulus, relaxation_time, solvent_viscosity
-        Known linear viscoelasticity, in Pa, s and Pa s.
+        Known linear viscoelasticity, in Pa, s and Pa s; the first two numbers, or one for each
+        mode.
     base
         Known law, by default UCM, with or without its linear relaxation.
     known_relaxation

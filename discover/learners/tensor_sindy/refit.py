@@ -19,7 +19,7 @@ LANES = 8
 _MAX_STEPS = 40
 SCREENING = 1e-3
 """Relative tolerance that ranks candidates."""
-POLISHING = 1e-10
+POLISHING = 1e-9
 """Relative tolerance of reported coefficients."""
 
 # The residual is scaled so that the solver's first damping, one, is small beside the curvature of
@@ -99,27 +99,31 @@ def _residual_and_jacobian(parameters, problem: TrajectoryProblem, lane: _Lane):
     sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
     # A constant residual of runaway size is an increase, which the solver rejects.
     size = _AMPLIFICATION * _RUNAWAY / jnp.sqrt(1.0 * residual.size)
+    everywhere = jnp.where(problem.weight > 0, problem.weight * predicted, 0.0)
+    everywhere = jnp.where(sane, everywhere, size)
     residual = jnp.where(sane, residual, size)
     columns = jnp.where(sane, columns, 0.0)
-    return residual.reshape(-1), columns.reshape(residual.size, -1)
+    return residual.reshape(-1), columns.reshape(residual.size, -1), everywhere.reshape(-1)
 
 
 @eqx.filter_custom_jvp
 def _residual(parameters, problem, lane):
-    return _residual_and_jacobian(parameters, problem, lane)[0]
+    residual, _, everywhere = _residual_and_jacobian(parameters, problem, lane)
+    return residual, everywhere
 
 
 @_residual.def_jvp
 def _residual_jvp(primals, tangents):
-    residual, jacobian = _residual_and_jacobian(*primals)
-    return residual, jacobian @ tangents[0]
+    residual, jacobian, everywhere = _residual_and_jacobian(*primals)
+    # the prediction is handed on beside the residual and never differentiated
+    return (residual, everywhere), (jacobian @ tangents[0], jnp.zeros_like(everywhere))
 
 
 @eqx.filter_jit
 def _refit_lanes(
     problem: TrajectoryProblem,
     lanes: _Lane,
-    start: Float[Array, "lanes q+m"],
+    start: Float[Array, "lanes parameters"],
     tolerance: Float[Array, ""],
 ):
     # a traced tolerance, so that screening and polishing share one program
@@ -131,12 +135,11 @@ def _refit_lanes(
             solver,
             parameters,
             args=(problem, lane),
+            has_aux=True,
             max_steps=_MAX_STEPS,
             throw=False,
         )
-        everywhere = eqx.tree_at(lambda x: x.keep, lane, jnp.ones_like(lane.keep))
-        final = _residual(solution.value, problem, everywhere)
-        return solution.value, final
+        return solution.value, solution.aux
 
     return jax.vmap(one)(lanes, start)
 
@@ -147,7 +150,7 @@ def refit(
     starts: Sequence[tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]],
     scale: Float[np.ndarray, " n"],
     slots: int,
-    keeps: Sequence[Bool[np.ndarray, "runs n"]] | None = None,
+    keeps: Sequence[Bool[np.ndarray, "runs samples"]] | None = None,
     tolerance: float = POLISHING,
 ) -> list[Fit]:
     """Return the least-squares fits of several supports by Levenberg–Marquardt.
@@ -165,7 +168,7 @@ def refit(
     slots
         Largest size of a support; sets the shape of the compiled program.
     keeps
-        For each, which samples to fit, shape (runs, n); all by default.
+        For each, which samples to fit, shape (runs, samples); all by default.
     tolerance
         Relative tolerance of the solver.
 
@@ -196,10 +199,11 @@ def refit(
             if keeps is not None:
                 keep[lane] = keeps[i]
         lanes = _Lane(*(jnp.asarray(a) for a in (active, occupied, scale[active], keep)))
-        parameters, residual = _refit_lanes(
+        parameters, predicted = _refit_lanes(
             problem, lanes, jnp.asarray(start), jnp.asarray(tolerance)
         )
-        parameters, residual = np.asarray(parameters), np.asarray(residual) / _AMPLIFICATION
+        parameters, predicted = np.asarray(parameters), np.asarray(predicted)
+        residual = predicted - target
         for lane, i in enumerate(batch):
             support = list(supports[i])
             coefficients = parameters[lane, : len(support)] * scale[support]
@@ -213,7 +217,7 @@ def refit(
                     coefficients,
                     inner,
                     float(np.sqrt(kept)),
-                    residual[lane] + target,
+                    predicted[lane],
                 )
             )
     return fits

@@ -93,9 +93,14 @@ class SupportSearch:
         )
 
     def of_size(self, size: int) -> list[Fit]:
-        """Return the fits of one size, best first; exact ties in order of complexity."""
+        """Return the fits of one size, best first; exact ties in order of complexity.
+
+        Best by the criterion and not by the misfit: a closed form has an inner parameter more
+        than its polynomial limit, and so always fits as well.
+        """
         ranked = sorted(
-            (f for f in self.fits.values() if len(f.support) == size), key=lambda f: f.misfit
+            (f for f in self.fits.values() if len(f.support) == size),
+            key=lambda f: (self.criterion(f), f.misfit),
         )
         if not ranked:
             return []
@@ -142,8 +147,9 @@ class SupportSearch:
         chosen: list[tuple[int, ...]] = []
         for size in range(1, largest + 1):
             ranked = self.of_size(size)
-            limit = max(1.02 * ranked[0].misfit, ranked[0].misfit + 10 * self.floor)
-            chosen += [f.support for f in ranked if f.misfit <= limit][:LANES]
+            # what may turn out an exact tie once both are at their minimum
+            limit = 1.001 * ranked[0].misfit + 10.0 * self.floor
+            chosen += [f.support for f in ranked if f.misfit <= limit][: LANES if size == 1 else 4]
         self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
         return [self.of_size(size)[0] for size in range(largest + 1)]
 
@@ -220,7 +226,7 @@ class SupportSearch:
         self,
         supports: list[tuple[int, ...]],
         starts: dict[tuple[int, ...], Fit],
-        keep: Bool[np.ndarray, "runs n"] | None = None,
+        keep: Bool[np.ndarray, "runs samples"] | None = None,
         tolerance: float = SCREENING,
     ) -> list[Fit]:
         """Refit supports; remember those that were fitted on all samples."""

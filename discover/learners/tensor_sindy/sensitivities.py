@@ -25,17 +25,20 @@ from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from tensor_library.kinematics import rate_of_deformation
 
 
-def _mode_rates(problem, active, coefficients, inner, state, rate):
+# Compiled as a part of the whole either way; as a unit of its own it is traced once and not once
+# for every stage of the integration.
+@partial(jax.jit, static_argnums=0)
+def _mode_rates(library, base, active, coefficients, inner, state, rate):
     """Return d/dt of one mode's augmented state (4, 1 + q + m), dimensionless."""
     stress = state[:, 0]
 
     def stress_rate(stress, inner):
-        terms = evaluate_active(problem.library, active, stress, rate_of_deformation(rate), inner)
-        known = problem.base.stress_rate(stress, rate)
+        terms = evaluate_active(library, active, stress, rate_of_deformation(rate), inner)
+        known = base.stress_rate(stress, rate)
         change = known - jnp.tensordot(coefficients, terms, axes=1)
         return change, (change, terms)
 
-    if problem.library.inner_names:
+    if library.inner_names:
         (jacobian, inner_columns), (change, terms) = jax.jacfwd(
             stress_rate, argnums=(0, 1), has_aux=True
         )(stress, inner)
@@ -49,7 +52,8 @@ def _mode_rates(problem, active, coefficients, inner, state, rate):
 def _vector_field(t, state, args):
     problem, protocol, active, coefficients, inner = args
     rate = problem.relaxation_time * protocol.shear_rate(t)
-    rates = jax.vmap(partial(_mode_rates, problem, active, coefficients, inner))(state, rate)
+    mode = partial(_mode_rates, problem.library, problem.base, active, coefficients, inner)
+    rates = jax.vmap(mode)(state, rate)
     return rates / problem.relaxation_time[:, None, None]
 
 

@@ -1,0 +1,188 @@
+import json
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from shared_flows import LIBRARY, small_dataset, with_normal_stresses
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_val_score
+
+from discover.dataset import ShearRun
+from discover.errors import InputError
+from discover.laws import Fluid, Giesekus, LibraryExpansion
+from discover.learners.tensor_sindy import OPTIMISERS, TensorSINDy
+from discover.simulate import simulate
+
+EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
+
+
+def found(model):
+    return {term.term: term.coefficient for term in model.terms_}
+
+
+@pytest.fixture(scope="module")
+def giesekus():
+    return TensorSINDy(LIBRARY).fit(small_dataset("giesekus", {"alpha": 0.2}))
+
+
+def test_giesekus_comes_back_alone(giesekus):
+    assert set(found(giesekus)) == {"sigma.sigma"}
+    # the fixed-step integration is good to 1e-6 of the stress
+    assert found(giesekus)["sigma.sigma"] == pytest.approx(0.2, abs=1e-5)
+    assert giesekus.score(small_dataset("giesekus", {"alpha": 0.2})) > 1.0 - 1e-5
+
+
+def test_normal_stresses_that_were_never_seen_are_predicted(giesekus):
+    dataset = small_dataset("giesekus", {"alpha": 0.2})
+    name = dataset.names[-1]
+    predicted = simulate(giesekus.fluid_, dataset[name].protocol, dataset[name].time)
+    exact = dataset.exact[name]
+    assert np.max(np.abs(predicted.components - exact.components)) < 1e-4
+
+
+@pytest.mark.parametrize("optimizer", OPTIMISERS)
+def test_every_optimiser_finds_linear_ptt_in_noise(optimizer):
+    # The library holds the exponential form too, which with a small ε imitates the linear one:
+    # its inner parameter has to be paid for
+    dataset = small_dataset("ptt_linear", {"epsilon": 0.4}, noise=0.02, seed=3)
+    model = TensorSINDy(LIBRARY, optimizer, selection="held_out").fit(dataset)
+    assert set(found(model)) == {"tr(sigma)*sigma"}
+    term = model.terms_[0]
+    # 260 samples at 2 %: a standard error of about 0.004
+    assert term.coefficient == pytest.approx(0.4, abs=0.016)
+    assert term.ci95[0] < term.coefficient < term.ci95[1]
+    assert term.ci95[1] - term.ci95[0] < 0.04
+    assert term.coefficient_penalised == pytest.approx(0.4, rel=0.2)
+
+
+def test_noise_alone_brings_in_no_term():
+    model = TensorSINDy(LIBRARY).fit(small_dataset("ucm", noise=0.02, seed=1))
+    assert model.terms_ == ()
+    assert model.result_.details["chosen"] == 0
+
+
+def test_twins_in_shear_stress_are_listed_and_the_simplest_is_chosen():
+    dataset = small_dataset("johnson_segalman", {"xi": 0.4})
+    model = TensorSINDy(LIBRARY).fit(dataset)
+    assert set(found(model)) == {"sigma.gammadot+gammadot.sigma"}
+    assert found(model)["sigma.gammadot+gammadot.sigma"] == pytest.approx(0.2, abs=1e-5)
+    ties = {r["support"][0]: r for r in model.result_.details["rivals"] if r["exact"]}
+    # ξ(1 − ξ/2) = 0.32
+    assert ties["tr(sigma)*gammadot"]["coefficients"][0] == pytest.approx(0.32, abs=1e-4)
+
+    # N2 is −(ξ/2) N1 in one and 0 in the other: measured, it ends the tie
+    observed = with_normal_stresses(dataset)
+    informed = TensorSINDy(LIBRARY, use_normal_stresses=True).fit(observed)
+    assert set(found(informed)) == {"sigma.gammadot+gammadot.sigma"}
+    assert informed.result_.details["n_observations"] == 3 * model.result_.details["n_observations"]
+    assert not any(r["exact"] for r in informed.result_.details["rivals"])
+
+
+def test_a_law_without_twins_in_the_library_lists_none(giesekus):
+    assert not any(r["exact"] for r in giesekus.result_.details["rivals"])
+
+
+def test_exponential_ptt_comes_back_with_its_inner_parameter():
+    model = TensorSINDy(LIBRARY).fit(small_dataset("ptt_exponential", {"epsilon": 0.4}))
+    assert set(found(model)) == {EXPONENTIAL}
+    assert found(model)[EXPONENTIAL] == pytest.approx(1.0, abs=1e-3)
+    assert model.terms_[0].inner["epsilon"] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_redundant_first_pick_leaves():
+    # Of single terms tr(σ)σ imitates this law best, but it is no part of it
+    index = [LIBRARY.names.index(name) for name in ("sigma", "tr(sigma)^2*sigma")]
+    law = LibraryExpansion(jnp.array([0.2, 0.15]), jnp.zeros(0), LIBRARY.subset(index))
+    runs = [
+        replace(
+            run,
+            shear_stress=simulate(Fluid.dimensionless(law), run.protocol, run.time).shear_stress,
+        )
+        for run in small_dataset("ucm")
+    ]
+    polynomials = TensorSINDy(LIBRARY, max_terms=4).fit(runs)
+    assert polynomials.path_[1].support != tuple(index[:1])
+    assert set(found(polynomials)) == {"sigma", "tr(sigma)^2*sigma"}
+    assert found(polynomials)["sigma"] == pytest.approx(0.2, abs=1e-4)
+
+
+def test_modes_share_one_law_of_which_not_even_the_relaxation_is_known():
+    modulus, relaxation_time = [30.0, 10.0], [0.5, 3.0]
+    truth = Fluid(Giesekus(0.3), modulus, relaxation_time)
+    runs = [
+        replace(run, shear_stress=simulate(truth, run.protocol, run.time).shear_stress)
+        for run in small_dataset("ucm")
+    ]
+    model = TensorSINDy(
+        LIBRARY, modulus=modulus, relaxation_time=relaxation_time, known_relaxation=False
+    ).fit(runs)
+    assert set(found(model)) == {"sigma", "sigma.sigma"}
+    assert found(model)["sigma"] == pytest.approx(1.0, abs=1e-4)
+    assert found(model)["sigma.sigma"] == pytest.approx(0.3, abs=1e-4)
+    assert not model.law_.linear_relaxation
+
+
+def test_result_is_json_and_the_path_runs_from_empty(giesekus):
+    details = json.loads(json.dumps(giesekus.result_.details))
+    assert [row["size"] for row in details["path"]] == list(range(len(details["path"])))
+    assert details["path"][0]["support"] == []
+    assert details["path"][details["chosen"]]["support"] == ["sigma.sigma"]
+    assert {"support", "size", "misfit", "held_out", "bic"} <= set(details["path"][1])
+    iterations, loss = giesekus.result_.loss_history
+    assert iterations.shape == loss.shape
+    assert np.all(np.diff(loss) <= 0)
+
+
+def test_scikit_learn_splits_by_run():
+    dataset = small_dataset("giesekus", {"alpha": 0.2})
+    model = TensorSINDy(LIBRARY, max_terms=1)
+    copy = clone(model)
+    assert copy is not model
+    assert copy.get_params() == model.get_params()
+    runs = list(dataset)
+    by_group = cross_val_score(copy, runs, groups=[0, 1, 0, 1], cv=LeaveOneGroupOut())
+    assert np.all(by_group > 0.9999)
+    grid = GridSearchCV(model, {"misfit_floor": [1e-5, 10.0]}, cv=KFold(2)).fit(runs)
+    # a floor above everything accepts the empty law, which predicts worse
+    assert grid.best_params_ == {"misfit_floor": 1e-5}
+    assert not hasattr(model, "law_")
+
+
+def test_refitting_forgets(giesekus):
+    model = clone(giesekus)
+    model.fit(small_dataset("giesekus", {"alpha": 0.2}))
+    model.fit(small_dataset("ucm"))
+    assert model.terms_ == ()
+    assert model.predict(small_dataset("ucm")).shape == (4 * 65,)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"optimizer": "magic"}, "Unknown optimizer"),
+        ({"selection": "taste"}, "selection must be"),
+        ({"modulus": -1.0}, "modulus must be positive"),
+        ({"modulus": [1.0, 2.0]}, "one value for each mode"),
+        ({"library": ["sigma"]}, "TermLibrary"),
+        ({"max_terms": 0}, "max_terms"),
+        ({"misfit_floor": 0.0}, "misfit_floor"),
+    ],
+)
+def test_bad_parameters_give_one_clear_error(parameters, message):
+    with pytest.raises(InputError, match=message):
+        TensorSINDy(**parameters).fit(small_dataset("ucm"))
+
+
+def test_bad_runs_give_one_clear_error():
+    with pytest.raises(InputError, match="at least one run"):
+        TensorSINDy().fit([])
+    with pytest.raises(InputError, match="ShearRun"):
+        TensorSINDy().fit([1.0, 2.0])
+    run = next(iter(small_dataset("ucm")))
+    silent = replace(run, shear_stress=np.zeros_like(run.shear_stress))
+    assert isinstance(silent, ShearRun)
+    with pytest.raises(InputError, match="zero throughout"):
+        TensorSINDy().fit([silent])
+    with pytest.raises(InputError, match="two runs"):
+        TensorSINDy(LIBRARY, selection="held_out", max_terms=1).fit([run])
