@@ -252,7 +252,11 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
             self.known_relaxation if self.base_law is None else self.base_law.linear_relaxation
         )
         return LibraryExpansion(
-            jnp.asarray(coefficients), jnp.asarray(inner, float), smaller, relaxes, self.base_law
+            coefficients=jnp.asarray(coefficients),
+            inner=jnp.asarray(inner, float),
+            library=smaller,
+            linear_relaxation=relaxes,
+            base=self.base_law,
         )
 
     def _terms(self, search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...]:

@@ -64,7 +64,7 @@ def derivative_problem(
                 f"many shear rates; got {stress.shape} and {shear_rate.shape}."
             )
         terms, rates = jax.vmap(at_sample)(jnp.asarray(stress), jnp.asarray(shear_rate))
-        change = np.asarray(differentiation(stress, time))
+        change = np.asarray(differentiation(stress, time))  # pyright: ignore[reportArgumentType]
         designs.append(np.moveaxis(np.asarray(terms), 1, 2).reshape(time.size * 4, -1))
         targets.append((np.asarray(rates) - change).reshape(-1))
     return np.concatenate(designs), np.concatenate(targets)

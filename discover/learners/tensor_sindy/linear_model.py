@@ -64,7 +64,8 @@ class LinearModel:
             target = target - basis @ (basis.T @ target)
             design = design - basis @ (basis.T @ design)
         stacked = np.column_stack([design, target])
-        triangular = np.linalg.qr(stacked[np.any(stacked != 0.0, axis=1)], mode="r")
+        rows = stacked[np.any(stacked != 0.0, axis=1)]
+        triangular = np.asarray(np.linalg.qr(rows, mode="r"))
         return cls(triangular[:, :-1], triangular[:, -1], np.linalg.norm(design, axis=0))
 
     @cached_property

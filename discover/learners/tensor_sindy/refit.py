@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -127,7 +128,8 @@ def _refit_lanes(
     tolerance: Float[Array, ""],
 ):
     # a traced tolerance, so that screening and polishing share one program
-    solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance)
+    traced: Any = tolerance
+    solver = optx.LevenbergMarquardt(rtol=traced, atol=traced)
 
     def one(lane, parameters):
         solution = optx.least_squares(

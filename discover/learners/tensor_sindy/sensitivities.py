@@ -84,6 +84,7 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
         max_steps=grid.times.shape[0] - 1,
         throw=False,
     )
+    assert solution.ys is not None  # SaveAt asks for it
     return solution.ys[grid.sample_index]
 
 
