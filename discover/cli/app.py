@@ -1,0 +1,48 @@
+"""All commands in one place; nothing heavy is imported before a command runs."""
+
+from typing import Annotated
+
+import typer
+
+from discover import __version__
+from discover.cli.data_commands import data_app
+from discover.cli.distil_command import distil
+from discover.cli.study_commands import batch, close_loop, compare, demo
+
+app = typer.Typer(
+    name="discover",
+    help="Find the constitutive equation of a viscoelastic fluid from shear rheometry, and say "
+    "what the data can and cannot tell. Start with: discover demo",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"discover {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and leave.", callback=_print_version),
+    ] = False,
+) -> None:
+    del version
+
+
+app.command("demo")(demo)
+app.command("compare")(compare)
+app.command("close-loop")(close_loop)
+app.command("batch")(batch)
+app.command("distil")(distil)
+app.add_typer(data_app, name="data")
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

@@ -1,0 +1,109 @@
+"""Commands on data folders: list, show, check."""
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discover.cli.guard import guarded
+from discover.cli.options import JsonOption
+from discover.errors import InputError
+
+data_app = typer.Typer(help="Look at data folders.", no_args_is_help=True)
+
+FolderArgument = Annotated[
+    str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
+]
+
+
+@data_app.command("list")
+@guarded
+def list_data(as_json: JsonOption = False) -> None:
+    """List the data sets under DISCOVER_DATA."""
+    from discover.dataset.load import DATA_VARIABLE, INDEX_FILE
+
+    root = os.environ.get(DATA_VARIABLE)
+    if not root:
+        raise InputError(
+            f"The environment variable {DATA_VARIABLE} is not set. Set it to the folder that holds "
+            "your data folders."
+        )
+    if not Path(root).is_dir():
+        raise InputError(f"{DATA_VARIABLE} names {root}, which is not a folder.")
+    rows = []
+    for folder in sorted(Path(root).iterdir()):
+        index = folder / INDEX_FILE
+        if index.is_file():
+            lines = index.read_text("utf-8", "replace").splitlines()
+            runs = sum(1 for line in lines[1:] if line.strip())
+            rows.append({"name": folder.name, "runs": runs, "lve": (folder / "lve.csv").is_file()})
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    if not rows:
+        typer.echo(f"No data folder under {root}: none of its folders has a {INDEX_FILE}.")
+    for row in rows:
+        sweep = "linear sweep" if row["lve"] else "no linear sweep"
+        typer.echo(f"{row['name']:<24} {row['runs']:>4} runs  {sweep}")
+
+
+@data_app.command("show")
+@guarded
+def show(name: FolderArgument, as_json: JsonOption = False) -> None:
+    """Show the runs of a data set."""
+    import numpy as np
+
+    from discover.dataset.load import load_dataset
+
+    dataset = load_dataset(name)
+    rows = [
+        {
+            "run": run.name,
+            "samples": len(run),
+            "duration_s": float(run.time[-1]),
+            "largest_rate_1_s": float(np.max(np.abs(run.shear_rate))),
+            "largest_stress_Pa": float(np.max(np.abs(run.shear_stress))),
+            "N1": run.first_normal_stress_difference is not None,
+            "N2": run.second_normal_stress_difference is not None,
+        }
+        for run in dataset
+    ]
+    sweep = dataset.linear_sweep
+    n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
+    if as_json:
+        typer.echo(json.dumps({"name": dataset.name, "runs": rows, "lve_points": n_sweep}, indent=2))
+        return
+    typer.echo(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
+    typer.echo(f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  also")
+    for row in rows:
+        also = " ".join(key for key in ("N1", "N2") if row[key])
+        typer.echo(
+            f"{row['run']:<32}{row['samples']:>8}{row['duration_s']:>12.4g}"
+            f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {also}"
+        )
+
+
+@data_app.command("check")
+@guarded
+def check(
+    folder: FolderArgument,
+    clock_factor: Annotated[
+        str | None, typer.Option("--clock-factor", help="Column of runs.csv to check as well.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say everything that is wrong with a data folder; exit code 2 if anything is."""
+    from discover.dataset.check import check_folder
+
+    problems = check_folder(folder, clock_factor)
+    if as_json:
+        typer.echo(json.dumps({"folder": folder, "problems": problems}, indent=2))
+    elif not problems:
+        typer.echo(f"{folder}: nothing wrong was found.")
+    else:
+        for problem in problems:
+            typer.echo(problem, err=True)
+    if problems:
+        raise typer.Exit(2)

@@ -1,0 +1,51 @@
+"""What a command does when something goes wrong: one line, and an exit code that says whose fault.
+
+0 done; 2 the user's input is wrong; 1 anything else.
+"""
+
+import functools
+import os
+from collections.abc import Callable
+
+import typer
+
+from discover.errors import InputError
+
+DEBUG_VARIABLE = "DISCOVER_DEBUG"
+"""Environment variable that lets tracebacks through, for those who mend the software."""
+
+
+def guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Return the command with its errors turned into a message and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args, **kwargs) -> None:
+        try:
+            command(*args, **kwargs)
+        except (typer.Exit, typer.Abort):
+            raise
+        except InputError as error:
+            _fail(str(error), 2)
+        except KeyboardInterrupt:
+            _fail("interrupted; run again to resume", 1)
+        except OSError as error:
+            if os.environ.get(DEBUG_VARIABLE):
+                raise
+            place = f" ({error.filename})" if error.filename else ""
+            _fail(f"{error.strerror or error}{place}", 1)
+        except Exception as error:
+            if os.environ.get(DEBUG_VARIABLE):
+                raise
+            first = (str(error).splitlines() or [""])[0]
+            _fail(
+                f"{type(error).__name__}: {first} (not your input's fault; set {DEBUG_VARIABLE}=1 "
+                "for the traceback)",
+                1,
+            )
+
+    return run
+
+
+def _fail(message: str, code: int) -> None:
+    typer.echo(f"discover: {message}", err=True)
+    raise typer.Exit(code)

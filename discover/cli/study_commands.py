@@ -1,0 +1,114 @@
+"""Commands that run studies: demo, compare, close-loop, batch."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discover.cli.console import progress_bar
+from discover.cli.guard import guarded
+from discover.cli.options import (
+    JsonOption,
+    OutOption,
+    OverwriteOption,
+    QuietOption,
+    SeedOption,
+    StudyArgument,
+)
+
+
+@guarded
+def compare(
+    study: StudyArgument,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Run both learners on identical data and write a comparison report."""
+    from discover.batch.tasks import run_compare
+
+    _run_task(run_compare, study, out, seed, quiet, as_json, overwrite)
+
+
+@guarded
+def close_loop(
+    study: StudyArgument,
+    out: OutOption = None,
+    seed: SeedOption = None,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Fit, find what the model lacks, add it, and judge on runs that no fit saw."""
+    from discover.batch.tasks import run_close_loop
+
+    _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite)
+
+
+@guarded
+def batch(
+    studies: Annotated[list[Path], typer.Argument(help="Study files.", show_default=False)],
+    out: OutOption = None,
+    workers: Annotated[
+        int, typer.Option("--workers", min=1, help="Processes on this machine.")
+    ] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option("--scheduler", help="Address of a dask scheduler, host:port.")
+    ] = None,
+    seed: SeedOption = None,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Run many studies; those that fail are listed with their reason while the rest go on."""
+    from discover.batch.run import run_batch
+
+    folder = out or Path("results") / "batch"
+    with progress_bar(quiet) as report:
+        result = run_batch(studies, folder, workers, scheduler, seed, overwrite, report)
+    if as_json:
+        typer.echo(json.dumps(result.to_json(), indent=2))
+    elif not quiet:
+        typer.echo(result.text())
+    if result.failed:
+        raise typer.Exit(2 if all(s.input_error for s in result.failed) else 1)
+
+
+@guarded
+def demo(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="Folder for the results.")
+    ] = Path("discover-demo"),
+    seed: SeedOption = None,
+    quiet: QuietOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Show everything on small synthetic data, in about two minutes."""
+    from discover.batch.demo import run_demo
+
+    with progress_bar(quiet) as report:
+        pages = run_demo(out, seed, overwrite, report)
+    if not quiet:
+        for title, page in pages.items():
+            typer.echo(f"{title}: {page.resolve()}")
+        typer.echo("Open them in a browser.")
+
+
+def _run_task(
+    task, study: Path, out: Path | None, seed: int | None, quiet: bool, as_json: bool, over: bool
+) -> None:
+    folder = out or Path("results") / study.stem
+    with progress_bar(quiet) as report:
+        result = task(study, folder, seed, over, report)
+    if as_json:
+        typer.echo(result.json_file.read_text("utf-8"))
+        return
+    if quiet:
+        return
+    if result.was_complete:
+        typer.echo(f"{folder} is complete; use --overwrite to start afresh.")
+    typer.echo(result.text)
+    typer.echo(f"Report: {result.report.resolve()}")
