@@ -155,8 +155,8 @@ def _twins(chosen: Mapping[str, float]) -> list[tuple[dict[str, float], str]]:
     twins.append(
         (
             parasite,
-            "The added pair acts on σ33 only, so N2 changes while σ12 and N1 do not; any size of it "
-            "fits the data as well.",
+            "The added pair acts on σ33 only, so N2 changes while σ12 and N1 do not; any size "
+            "of it fits the data as well.",
         )
     )
     return twins
@@ -224,8 +224,8 @@ def undetermined_quantities(
             None,
         )
         text = (
-            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act on σ33 "
-            "alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law that fits."
+            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act on "
+            "σ33 alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law that fits."
         )
         if example is not None:
             text += (
@@ -240,8 +240,8 @@ def undetermined_quantities(
             Statement(
                 "N1",
                 False,
-                "N1 was not measured. It follows from the upper convected derivative that the model "
-                "assumes together with the terms found, and is as good as that assumption.",
+                "N1 was not measured. It follows from the upper convected derivative that the "
+                "model assumes together with the terms found, and is as good as that assumption.",
             )
         )
     return statements

@@ -1,0 +1,1 @@
+"""Studies as tasks: one folder each, resumable, alone or many at a time."""

@@ -1,0 +1,166 @@
+"""The report on a comparison: page, figures, JSON and LaTeX."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.outcome import LearnerOutcome
+from discover.learners.result import RecoveredTerm
+from discover.report.equations import equations_tex
+from discover.report.mathml import law_element, term_element, term_mathml
+from discover.report.page import render
+from discover.report.plots.flows import flow_picture, start_up_picture, training_picture
+from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
+from discover.report.plots.style import LEARNER_TITLES, Picture
+from discover.report.wording import comparison_verdict
+from discover.study.run_folder import RunFolder
+
+_COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
+
+
+def write_comparison(
+    comparison: Comparison, folder: RunFolder, linear_relaxation: bool, study_text: str = ""
+) -> Path:
+    """Write ``report.html``, ``comparison.json``, ``equations.tex`` and ``figures/*.svg``.
+
+    Parameters
+    ----------
+    comparison
+        What to report.
+    folder
+        Where to.
+    linear_relaxation
+        Whether −σ was part of the known law.
+    study_text
+        The study file, shown at the end.
+
+    Returns
+    -------
+    The page.
+    """
+    pictures, training = comparison_pictures(comparison)
+    for drawn in [*pictures, *training]:
+        folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
+    content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
+    folder.write("comparison.json", content + "\n")
+    folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
+    page = render(
+        "comparison.html",
+        comparison=comparison,
+        verdict=comparison_verdict(comparison),
+        columns=[
+            {"title": "before"},
+            *({"title": LEARNER_TITLES[name]} for name in comparison.outcomes),
+        ],
+        error_rows=_error_rows(comparison),
+        laws=[_law(outcome, linear_relaxation) for outcome in comparison.outcomes.values()],
+        term_rows=_term_rows(comparison),
+        coefficients=_coefficients(comparison),
+        pictures=pictures,
+        training_pictures=training,
+        rivals=[_rival(rival) for rival in comparison.rivals],
+        study_text=study_text,
+    )
+    return folder.write("report.html", page)
+
+
+def comparison_pictures(comparison: Comparison) -> tuple[list[Picture], list[Picture]]:
+    """Return the pictures of predictions, and those of training."""
+    pictures: list[Picture | None] = [
+        flow_picture(comparison, flow) if flow.oscillatory else start_up_picture(comparison, flow)
+        for flow in comparison.judged
+    ]
+    pictures += [high_deborah_picture(comparison), sweep_picture(comparison)]
+    training = [training_picture(comparison), loss_picture(comparison)]
+    return [p for p in pictures if p is not None], training
+
+
+def safe_name(name: str) -> str:
+    """Return a file name without anything that a file system could take amiss."""
+    return "".join(c if c.isalnum() or c in "._-" else "_" for c in name)[:100]
+
+
+def _error_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    rows = []
+    for flow in comparison.judged:
+        cells = []
+        for who in ("before", *comparison.outcomes):
+            cells += comparison.errors(who, flow).values()
+        rows.append({"title": flow.title, "cells": cells})
+    return rows
+
+
+def _law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
+    return {
+        "title": LEARNER_TITLES[outcome.learner],
+        "colour": _COLOURS[outcome.learner],
+        "math": law_element(outcome.terms, linear_relaxation),
+        "message": (outcome.message[:1].upper() + outcome.message[1:]).rstrip("."),
+        "seconds": outcome.train_seconds,
+        "intervals": any(term.ci95 for term in outcome.terms),
+    }
+
+
+def _term_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    truth = {t.term: t for t in comparison.truth or ()}
+    found: dict[str, dict[str, RecoveredTerm]] = {}
+    for name, outcome in comparison.outcomes.items():
+        for term in outcome.terms:
+            found.setdefault(term.term, {})[name] = term
+    rows = []
+    for name in dict.fromkeys([*truth, *found]):
+        cells, inner = [], []
+        if name in truth and truth[name].inner:
+            inner += [f"truth: {key} = {value:.4g}" for key, value in truth[name].inner.items()]
+        for learner, outcome in comparison.outcomes.items():
+            term = found.get(name, {}).get(learner)
+            cells.append(
+                {
+                    "debiased": None if term is None else term.coefficient,
+                    "penalised": None if term is None else term.coefficient_penalised,
+                    "ci95": None if term is None else term.ci95,
+                    "intervals": any(t.ci95 for t in outcome.terms),
+                }
+            )
+            if term is not None:
+                inner += [
+                    f"{LEARNER_TITLES[learner]}: {key} = {value:.4g}"
+                    for key, value in term.inner.items()
+                ]
+        true = truth.get(name)
+        rows.append(
+            {
+                "math": term_element(name),
+                "inner": ", ".join(inner),
+                "truth": (0.0 if true is None else true.coefficient),
+                "cells": cells,
+            }
+        )
+    return rows
+
+
+def _coefficients(comparison: Comparison) -> list[dict[str, Any]]:
+    network = comparison.outcomes.get("tbnn_ude")
+    table = {} if network is None else network.details.get("coefficients", {})
+    return [
+        {"math": term_element(name), "mean": row["mean"], "spread": row["spread"]}
+        for name, row in table.items()
+    ]
+
+
+def _rival(rival) -> dict[str, Any]:
+    sum_of_terms = "".join(
+        f"<mo>{'−' if value < 0 else '+'}</mo><mn>{abs(value):.3g}</mn>"
+        f"<mspace width='0.15em'/>{term_mathml(name, dict(rival.inner))}"
+        for name, value in rival.terms.items()
+    ).removeprefix("<mo>+</mo>")
+    place = rival.separated_by
+    return {
+        "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
+        "reason": rival.reason,
+        "errors": rival.errors_to_chosen,
+        "separated": f"{place['quantity']} in {place['protocol']}"
+        if place
+        else "nothing that was tried",
+    }

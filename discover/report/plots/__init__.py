@@ -1,0 +1,1 @@
+"""Pictures: figures in, SVG text out. The only place that knows matplotlib."""

@@ -1,0 +1,159 @@
+"""Stresses in one flow: against time, as Lissajous curves, and in start-up."""
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.flows import QUANTITIES, Flow
+from discover.report.plots.style import (
+    BEFORE_STYLE,
+    LEARNER_STYLES,
+    LEARNER_TITLES,
+    MEASURED,
+    SHADE,
+    TRUTH_STYLE,
+    Picture,
+    figure,
+    legend_above,
+    picture,
+)
+
+SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
+START_UP_SHOWN = 10.0
+
+
+def units(comparison: Comparison) -> tuple[str, str, str]:
+    """Return labels of stress, time and rate units: scaled for computed data, SI for measured."""
+    if comparison.noise is not None:
+        return " / G", "t / λ", "λγ̇"
+    return " (Pa)", "t (s)", "γ̇ (1/s)"
+
+
+def curves(comparison: Comparison, flow: Flow):
+    """Yield label, style and stresses of everything known in a flow, in drawing order."""
+    before = comparison.before[flow.key]
+    if before is not None:
+        yield "before (known part alone)", BEFORE_STYLE, before
+    if flow.reference:
+        label = "truth" if flow.is_truth else "measured"
+        style = TRUTH_STYLE if flow.is_truth else {"color": MEASURED, "marker": ".", "ls": "none"}
+        yield label, style, flow.reference
+    for name, outcome in comparison.outcomes.items():
+        prediction = outcome.predictions[flow.key]
+        if prediction is not None:
+            yield LEARNER_TITLES[name], LEARNER_STYLES[name], prediction
+
+
+def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
+    """Return σ12, N1 and N2 in an oscillatory flow, against time and against the rate."""
+    stress_unit, time_label, rate_label = units(comparison)
+    with figure(3, 2, height=2.1) as (drawing, axes):
+        last = _last_cycles(flow)
+        for row, quantity in enumerate(QUANTITIES):
+            in_time, lissajous = axes[row]
+            for label, style, stresses in curves(comparison, flow):
+                if quantity in stresses:
+                    in_time.plot(flow.times, stresses[quantity], label=label, **style)
+                    lissajous.plot(flow.shear_rate[last], stresses[quantity][last], **style)
+            _mark_training(in_time, flow)
+            _frame(in_time, comparison, flow, quantity, flow.times >= 0)
+            _frame(lissajous, comparison, flow, quantity, last)
+            in_time.set_ylabel(SYMBOLS[quantity] + stress_unit)
+            in_time.set_xlabel(time_label if row == 2 else "")
+            lissajous.set_xlabel(f"shear rate {rate_label}" if row == 2 else "")
+        axes[0, 0].set_title(f"against time, {flow.title}")
+        axes[0, 1].set_title("viscous Lissajous curve, last cycle")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            f"flow_{flow.name}",
+            f"{flow.title}: no learner saw this flow. Left, stresses against time; beyond the "
+            "shaded times the prediction also runs past the length of the training series. Right, "
+            "the same against the shear rate. Curves of the known part alone may leave the frame.",
+        )
+
+
+def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
+    """Return σ12, N1 and N2 in start-up."""
+    stress_unit, time_label, _ = units(comparison)
+    with figure(1, 3, height=2.9) as (drawing, axes):
+        shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
+        if not flow.is_truth:
+            shown = np.ones_like(shown)
+        for panel, quantity in zip(axes[0], QUANTITIES, strict=True):
+            for label, style, stresses in curves(comparison, flow):
+                if quantity in stresses:
+                    panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
+            _frame(panel, comparison, flow, quantity, shown)
+            panel.set_ylabel(SYMBOLS[quantity] + stress_unit)
+            panel.set_xlabel(time_label)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            f"flow_{flow.name}",
+            f"{flow.title}: a kind of flow that training, all oscillatory, did not contain.",
+        )
+
+
+def training_picture(comparison: Comparison) -> Picture:
+    """Return the data that the learners saw, and how they fit them."""
+    flows = comparison.flows_of("training")
+    stress_unit, time_label, _ = units(comparison)
+    columns = min(4, len(flows))
+    rows = -(-len(flows) // columns)
+    with figure(rows, columns, height=1.8) as (drawing, axes):
+        for panel in axes.ravel()[len(flows) :]:
+            panel.set_visible(False)
+        for panel, flow in zip(axes.ravel(), flows, strict=False):
+            if flow.measured is not None:
+                panel.plot(
+                    flow.times, flow.measured, ".", color=MEASURED, ms=2.5, label="data (σ₁₂)"
+                )
+            for name, outcome in comparison.outcomes.items():
+                prediction = outcome.predictions[flow.key]
+                if prediction is not None:
+                    style = LEARNER_STYLES[name]
+                    panel.plot(
+                        flow.times, prediction["sigma12"], label=LEARNER_TITLES[name], **style
+                    )
+            panel.set_title(flow.title, fontsize=8)
+            if not flow.oscillatory and np.min(flow.times[1:]) * 30 < flow.times[-1]:
+                panel.set_xscale("log")
+        for panel in axes[-1]:
+            panel.set_xlabel(time_label)
+        for panel in axes[:, 0]:
+            panel.set_ylabel("σ₁₂" + stress_unit)
+        legend_above(drawing, axes)
+        return picture(
+            drawing, "training", "The only data that the learners saw: σ₁₂ of these runs."
+        )
+
+
+def _mark_training(panel, flow: Flow) -> None:
+    if flow.training_end is not None and flow.training_end < flow.times[-1]:
+        panel.axvspan(
+            flow.times[0], flow.training_end, color=SHADE, lw=0, label="training times", zorder=0
+        )
+
+
+def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
+    """Let truth and learners, not what came before, decide the range."""
+    values = [
+        stresses[quantity][shown]
+        for label, _, stresses in curves(comparison, flow)
+        if quantity in stresses and not label.startswith("before")
+    ]
+    if quantity == "N2" and "N1" in flow.reference:
+        # a small N2 would look large: always at least a hundredth of N1
+        values.append(0.01 * np.max(np.abs(flow.reference["N1"])) * np.array([-1.0, 1.0]))
+    joined = np.concatenate(values) if values else np.zeros(1)
+    low, high = float(np.min(joined)), float(np.max(joined))
+    margin = 0.15 * (high - low) or 1.0
+    panel.set_ylim(low - margin, high + margin)
+
+
+def _last_cycles(flow: Flow) -> np.ndarray:
+    frequencies = np.asarray(flow.protocol.frequencies)
+    active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
+    if active.size == 0 or np.min(active) <= 0:
+        return np.ones(flow.times.size, dtype=bool)
+    return flow.times >= flow.times[-1] - 2.0 * np.pi / float(np.min(active)) * 1.02

@@ -1,0 +1,108 @@
+"""Numbers and conclusions in words."""
+
+from collections.abc import Mapping, Sequence
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.outcome import LearnerOutcome
+
+LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+
+
+def percent(value: float | None) -> str:
+    """Return a fraction as a percentage with two digits; a dash where there is none."""
+    if value is None:
+        return "–"
+    if value != 0 and abs(value) < 1e-5:
+        return "< 0.001 %"
+    return f"{100.0 * value:.2g} %" if abs(value) < 0.995 else f"{100.0 * value:.0f} %"
+
+
+def significant(value: float | None, digits: int = 4) -> str:
+    """Return a number with so many digits; a dash where there is none."""
+    return "–" if value is None else f"{value:.{digits}g}".replace("-", "−")
+
+
+def interval(bounds: Sequence[float] | None) -> str:
+    """Return an interval, with as many digits as tell its ends apart."""
+    if bounds is None:
+        return "–"
+    low, high = bounds
+    width = abs(high - low)
+    digits = 4
+    while digits < 10 and width > 0 and f"{low:.{digits}g}" == f"{high:.{digits}g}":
+        digits += 1
+    return f"{low:.{digits}g} to {high:.{digits}g}".replace("-", "−")
+
+
+def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:
+    """Return the largest error of a quantity over flows."""
+    values = [row[quantity] for row in errors.values() if row[quantity] is not None]
+    return max(values, default=None)  # pyright: ignore[reportArgumentType]
+
+
+def terms_text(outcome: LearnerOutcome) -> str:
+    """Return the law's terms as plain text."""
+    if not outcome.terms:
+        return "no term at all"
+    parts = []
+    for term in outcome.terms:
+        text = f"{significant(term.coefficient)} {term.term}"
+        if term.ci95 is not None:
+            text += f" (95 % interval {interval(term.ci95)})"
+        parts.append(text)
+    return ", ".join(parts)
+
+
+def comparison_verdict(comparison: Comparison) -> list[str]:
+    """Return the verdict on a comparison, a few sentences."""
+    sentences = []
+    sparse = comparison.outcomes.get("tensor_sindy")
+    if sparse is not None:
+        sentence = f"Sparse regression found {terms_text(sparse)}"
+        if comparison.truth is not None:
+            wanted = {t.term for t in comparison.truth}
+            found = {t.term for t in sparse.terms}
+            if found == wanted:
+                sentence += ": exactly the terms of the law that made the data."
+            else:
+                missing = ", ".join(sorted(wanted - found)) or "nothing"
+                extra = ", ".join(sorted(found - wanted)) or "nothing"
+                sentence += f". Against the law that made the data, missing: {missing}; "
+                sentence += f"too many: {extra}."
+        else:
+            sentence += "."
+        sentences.append(sentence)
+    network = comparison.outcomes.get("tbnn_ude")
+    if network is not None and network.terms:
+        largest = max(network.terms, key=lambda t: abs(t.coefficient))
+        sentences.append(
+            f"Put into words, the neural network's largest term is "
+            f"{significant(largest.coefficient)} {largest.term}."
+        )
+    elif network is not None:
+        sentences.append("Put into words, the neural network found no term.")
+    judged = comparison.judged
+    for name in comparison.outcomes:
+        errors = {flow.name: comparison.errors(name, flow) for flow in judged}
+        parts = [
+            f"{symbol} to {percent(value)}"
+            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            if (value := worst(errors, quantity.split()[0])) is not None
+        ]
+        if parts:
+            what = "flows that it never saw" if len(judged) > 1 else "a flow that it never saw"
+            sentences.append(f"{LEARNERS[name]} predicts {', '.join(parts)} at worst in {what}.")
+    if comparison.undetermined:
+        names = " and ".join(comparison.undetermined)
+        sentences.append(
+            f"Not determined by these data: {names}. What is shown of it is the choice of the "
+            "simplest law that fits, not a measurement."
+        )
+    separations = [r.separated_by for r in comparison.rivals if r.separated_by]
+    if separations:
+        place = separations[0]
+        sentences.append(
+            f"To decide, measure {place['quantity']} in {place['protocol']}: rival laws differ "
+            "most there."
+        )
+    return sentences
