@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from discover.errors import InputError
 from discover.precision import enable_x64
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -71,3 +72,93 @@ def run_compare(
     folder.save("verdict", {"text": text})
     folder.finish()
     return TaskResult(page, data, text, False)
+
+
+def run_close_loop(
+    path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress
+) -> TaskResult:
+    """Close the loop on a study and write its report.
+
+    Parameters and errors as in `run_compare`; a seed only changes synthetic noise.
+    """
+    enable_x64()
+    study = read_study(path)
+    folder = RunFolder(out, fingerprint(study, "close-loop", seed), overwrite)
+    page, data = folder.path / "report.html", folder.path / "loop.json"
+    if folder.complete and page.is_file() and data.is_file():
+        kept = folder.load("verdict") or {}
+        return TaskResult(page, data, kept.get("text", ""), True)
+    from discover.closed_loop import run_loop
+    from discover.report.loop_report import loop_verdict, write_loop
+    from discover.study.build import declared_model, load_study_data
+
+    progress("loading data", 0.0)
+    data_of_study = load_study_data(study, seed)
+    model = declared_model(study, data_of_study.dataset)
+    declared = declared_for_loop(model)
+    stages = study.loop.max_effects + 1
+    lines = 0
+
+    def say(line: str) -> None:
+        nonlocal lines
+        lines += 1
+        progress(line, min(lines / (stages + 1), 0.95))
+
+    result = run_loop(
+        data_of_study.dataset,
+        declared,
+        fit=data_of_study.fit.names,
+        held_out=data_of_study.held_out.names,
+        effects=study.loop.effects,
+        max_effects=study.loop.max_effects,
+        strain=study.loop.strain,
+        progress=say,
+    )
+    progress("drawing", 0.97)
+    window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
+    window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
+    modes = f"{len(model.modulus)} relaxation mode{'s' if len(model.modulus) > 1 else ''}"
+    if model.spectrum is not None:
+        modes += f" from the linear sweep (error {100 * model.spectrum.relative_error:.2g} %)"
+    summary = (
+        f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
+        f"{len(data_of_study.held_out)} held out{window}. "
+        f"Declared model: {model.law_name}, {modes}."
+    )
+    write_loop(result, folder, study.name, summary, path.read_text("utf-8"))
+    text = "\n".join(loop_verdict(result))
+    folder.save("verdict", {"text": text})
+    folder.finish()
+    progress("done", 1.0)
+    return TaskResult(page, data, text, False)
+
+
+def declared_for_loop(model):
+    """Return the declared model as the closed loop takes it.
+
+    Raises
+    ------
+    InputError
+        If it asks for a fit that the loop does not make.
+    """
+    from discover.closed_loop import DeclaredModel
+
+    fitted = [key for key in model.free if key not in ("modulus_Pa", "relaxation_time_s")]
+    if fitted:
+        raise InputError(
+            f'{fitted[0]} = "fit" in [model] is not possible yet. Write a number, or declare '
+            'law = "ucm" and let the loop find what is missing.'
+        )
+    if not model.law.linear_relaxation or model.solvent_viscosity:
+        raise InputError(
+            "The closed loop needs known_relaxation = true and no solvent_viscosity_Pa_s; a "
+            "solvent is one of the effects that it can find."
+        )
+    return DeclaredModel(
+        model.law,
+        model.modulus,
+        model.relaxation_time,
+        fit_modulus="modulus_Pa" in model.free,
+        fit_relaxation_time="relaxation_time_s" in model.free,
+        linear_error=0.0 if model.spectrum is None else model.spectrum.relative_error,
+    )

@@ -73,10 +73,14 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
     if as_json:
-        typer.echo(json.dumps({"name": dataset.name, "runs": rows, "lve_points": n_sweep}, indent=2))
+        typer.echo(
+            json.dumps({"name": dataset.name, "runs": rows, "lve_points": n_sweep}, indent=2)
+        )
         return
     typer.echo(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
-    typer.echo(f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  also")
+    typer.echo(
+        f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  also"
+    )
     for row in rows:
         also = " ".join(key for key in ("N1", "N2") if row[key])
         typer.echo(

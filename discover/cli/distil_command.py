@@ -57,7 +57,9 @@ def distil(
     if as_json:
         typer.echo(json.dumps(rows, indent=2))
         return
-    typer.echo(f"{'teacher':<30}{'student':<18}{'with penalty':<28}{'without':<28}{'σ12 misfit':>10}")
+    typer.echo(
+        f"{'teacher':<30}{'student':<18}{'with penalty':<28}{'without':<28}{'σ12 misfit':>10}"
+    )
     for row in rows:
         typer.echo(
             f"{row['teacher']:<30}{row['student']:<18}{_values(row['penalised']):<28}"

@@ -79,9 +79,9 @@ def batch(
 
 @guarded
 def demo(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="Folder for the results.")
-    ] = Path("discover-demo"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path(
+        "discover-demo"
+    ),
     seed: SeedOption = None,
     quiet: QuietOption = False,
     overwrite: OverwriteOption = False,

@@ -82,7 +82,8 @@ class Flow:
         rates = np.asarray(self.protocol.table_rates)
         if self.oscillatory and np.count_nonzero(amplitudes) == 1:
             i = int(np.flatnonzero(amplitudes)[0])
-            return f"γ̇ = {amplitudes[i]:g} cos({frequencies[i]:g} t)"
+            size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
+            return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
         if not np.any(amplitudes) and rates.size == 1:
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name

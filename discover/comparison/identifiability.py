@@ -224,13 +224,14 @@ def undetermined_quantities(
             None,
         )
         text = (
-            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act on "
-            "σ33 alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law that fits."
+            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act "
+            "on σ33 alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law "
+            "that fits."
         )
         if example is not None:
             text += (
                 " Checked by simulation: "
-                + " + ".join(f"{value:.3g} {name}" for name, value in example.terms.items())
+                + " ".join(f"{value:+.3g} {name}" for name, value in example.terms.items())
                 + f" gives the same σ12 but an N2 that differs by "
                 f"{100.0 * (example.errors_to_chosen['N2'] or 0.0):.2g} % of N1."
             )

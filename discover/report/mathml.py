@@ -6,7 +6,8 @@ from discover.learners.result import RecoveredTerm
 from tensor_library.terms import CandidateTerm, parse_term
 
 _SIGMA = '<mi mathvariant="bold-italic">σ</mi>'
-_RATE = '<mover accent="true"><mi mathvariant="bold-italic">γ</mi><mo>˙</mo></mover>'
+# the combining dot sits well in every font, an accent over a letter only in mathematical ones
+_RATE = '<mi mathvariant="normal" style="font-weight:bold;font-style:italic">γ̇</mi>'
 _UNIT = '<mi mathvariant="bold-italic">I</mi>'
 _DOT = "<mo>·</mo>"
 _TRACE = '<mi mathvariant="normal">tr</mi><mo>&#x2061;</mo>'

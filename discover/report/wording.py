@@ -19,7 +19,15 @@ def percent(value: float | None) -> str:
 
 def significant(value: float | None, digits: int = 4) -> str:
     """Return a number with so many digits; a dash where there is none."""
-    return "–" if value is None else f"{value:.{digits}g}".replace("-", "−")
+    if value is None:
+        return "–"
+    return "0" if abs(value) < 1e-12 else f"{value:.{digits}g}".replace("-", "−")
+
+
+def spoken(term: str) -> str:
+    """Return the canonical spelling of a term with the field's letters."""
+    text = term.replace("gammadot", "γ̇").replace("sigma", "σ").replace("epsilon", "ε")
+    return text.replace("kappa", "κ").replace(".", "·").replace("*", " ")
 
 
 def interval(bounds: Sequence[float] | None) -> str:
@@ -46,7 +54,7 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "no term at all"
     parts = []
     for term in outcome.terms:
-        text = f"{significant(term.coefficient)} {term.term}"
+        text = f"{significant(term.coefficient)} {spoken(term.term)}"
         if term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
@@ -65,8 +73,8 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
             if found == wanted:
                 sentence += ": exactly the terms of the law that made the data."
             else:
-                missing = ", ".join(sorted(wanted - found)) or "nothing"
-                extra = ", ".join(sorted(found - wanted)) or "nothing"
+                missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
+                extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
                 sentence += f". Against the law that made the data, missing: {missing}; "
                 sentence += f"too many: {extra}."
         else:
@@ -77,7 +85,7 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         sentences.append(
             f"Put into words, the neural network's largest term is "
-            f"{significant(largest.coefficient)} {largest.term}."
+            f"{significant(largest.coefficient)} {spoken(largest.term)}."
         )
     elif network is not None:
         sentences.append("Put into words, the neural network found no term.")
@@ -90,7 +98,7 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
             if (value := worst(errors, quantity.split()[0])) is not None
         ]
         if parts:
-            what = "flows that it never saw" if len(judged) > 1 else "a flow that it never saw"
+            what = "the test flows" if len(judged) > 1 else "the test flow"
             sentences.append(f"{LEARNERS[name]} predicts {', '.join(parts)} at worst in {what}.")
     if comparison.undetermined:
         names = " and ".join(comparison.undetermined)
@@ -101,8 +109,9 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
     separations = [r.separated_by for r in comparison.rivals if r.separated_by]
     if separations:
         place = separations[0]
+        titles = {flow.name: flow.title for flow in comparison.judged}
+        where = titles.get(place["protocol"], place["protocol"])
         sentences.append(
-            f"To decide, measure {place['quantity']} in {place['protocol']}: rival laws differ "
-            "most there."
+            f"To decide, measure {place['quantity']} in {where}: rival laws differ most there."
         )
     return sentences

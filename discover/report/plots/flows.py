@@ -66,9 +66,9 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
         return picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: no learner saw this flow. Left, stresses against time; beyond the "
-            "shaded times the prediction also runs past the length of the training series. Right, "
-            "the same against the shear rate. Curves of the known part alone may leave the frame.",
+            f"{flow.title}: {_seen(comparison, flow)} Left, stresses against time; beyond the "
+            "shaded times the prediction runs past the length of the training series. Right, the same "
+            "against the shear rate. Curves of the known part alone may leave the frame.",
         )
 
 
@@ -126,6 +126,12 @@ def training_picture(comparison: Comparison) -> Picture:
         return picture(
             drawing, "training", "The only data that the learners saw: σ₁₂ of these runs."
         )
+
+
+def _seen(comparison: Comparison, flow: Flow) -> str:
+    if flow.name in {f.name for f in comparison.flows_of("training")}:
+        return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
+    return "no learner saw this flow."
 
 
 def _mark_training(panel, flow: Flow) -> None:

@@ -1,0 +1,229 @@
+"""Many studies, one after the other or on a dask cluster."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from discover.batch.tasks import Progress, run_close_loop, run_compare
+from discover.errors import InputError
+from discover.study.atomic import make_folder, write_text
+from discover.study.read import read_study
+
+_TASKS = {"compare": run_compare, "close-loop": run_close_loop}
+
+
+@dataclass(frozen=True)
+class StudyStatus:
+    """How one study ended.
+
+    Attributes
+    ----------
+    name, task
+        Folder under the batch's, and ``compare`` or ``close-loop``.
+    status
+        ``done``, ``complete`` (was there already) or ``failed``.
+    text
+        The verdict, or the reason of the failure.
+    input_error
+        Whether the failure is the user's to mend.
+    seconds
+        Time taken now.
+    """
+
+    name: str
+    task: str
+    status: str
+    text: str
+    input_error: bool = False
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """How every study of a batch ended.
+
+    Attributes
+    ----------
+    studies
+        In the order given.
+    index
+        The summary page.
+    """
+
+    studies: tuple[StudyStatus, ...]
+    index: Path
+
+    @property
+    def failed(self) -> list[StudyStatus]:
+        """Studies without a result."""
+        return [study for study in self.studies if study.status == "failed"]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the contents of ``batch.json``."""
+        return {"studies": [asdict(study) for study in self.studies]}
+
+    def text(self) -> str:
+        """Return a summary for a terminal."""
+        lines = []
+        for study in self.studies:
+            first = (study.text.splitlines() or [""])[0]
+            lines.append(f"{study.status:<9}{study.name} ({study.task}): {first}")
+        lines.append(f"Summary: {self.index.resolve()}")
+        return "\n".join(lines)
+
+
+def run_batch(
+    paths: Sequence[Path],
+    out: Path,
+    workers: int = 1,
+    scheduler: str | None = None,
+    seed: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = lambda label, fraction: None,
+) -> BatchResult:
+    """Run studies into folders of their own; one that fails does not stop the others.
+
+    A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
+    one with both does both.
+
+    Parameters
+    ----------
+    paths
+        Study files.
+    out
+        Folder of the batch.
+    workers
+        Processes on this machine; with 1, everything happens in this one.
+    scheduler
+        Address of a dask scheduler to use instead.
+    seed, overwrite
+        As in `discover.batch.tasks.run_compare`.
+    progress
+        Called with what is going on and the fraction done.
+    """
+    make_folder(out)
+    jobs = [
+        (str(path), name, task, str(out / name), seed, overwrite)
+        for path, name in zip(paths, folder_names(paths), strict=True)
+        for name, task in _tasks_of(path, name)
+    ]
+    statuses: dict[int, StudyStatus] = {}
+    if workers == 1 and scheduler is None:
+        for i, job in enumerate(jobs):
+
+            def inner(label: str, fraction: float, i: int = i, job=job) -> None:
+                progress(f"{job[1]}: {label}", (i + fraction) / len(jobs))
+
+            statuses[i] = run_one(*job, progress=inner)
+    else:
+        _run_on_cluster(jobs, workers, scheduler, statuses, progress)
+    result = BatchResult(tuple(statuses[i] for i in range(len(jobs))), out / "index.html")
+    import json
+
+    from discover.report.page import render
+
+    write_text(out / "batch.json", json.dumps(result.to_json(), indent=2) + "\n")
+    write_text(result.index, render("batch.html", studies=result.studies))
+    return result
+
+
+def folder_names(paths: Sequence[Path]) -> list[str]:
+    """Return a folder name for every study: its stem, with its folder's name where stems repeat.
+
+    Raises
+    ------
+    InputError
+        If two studies still have one name.
+    """
+    stems = [path.stem for path in paths]
+    names = [
+        stem if stems.count(stem) == 1 else f"{path.resolve().parent.name}-{stem}"
+        for path, stem in zip(paths, stems, strict=True)
+    ]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"Two studies would write to the folder {name!r}. Rename one of the files, or give "
+                "each only once."
+            )
+    return names
+
+
+def run_one(
+    path: str,
+    name: str,
+    task: str,
+    out: str,
+    seed: int | None,
+    overwrite: bool,
+    progress: Progress = lambda label, fraction: None,
+) -> StudyStatus:
+    """Run one study and say how it ended; never raises for a failure of the study."""
+    started = perf_counter()
+    try:
+        result = _TASKS[task](Path(path), Path(out), seed, overwrite, progress)
+    except InputError as error:
+        return StudyStatus(name, task, "failed", str(error), True, perf_counter() - started)
+    except Exception as error:
+        reason = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
+        return StudyStatus(name, task, "failed", reason, False, perf_counter() - started)
+    status = "complete" if result.was_complete else "done"
+    return StudyStatus(name, task, status, result.text, False, perf_counter() - started)
+
+
+def _tasks_of(path: Path, name: str) -> list[tuple[str, str]]:
+    try:
+        sections = read_study(path).model_fields_set
+    except InputError:
+        return [(name, "compare")]  # fails again when it runs, and is listed with the reason
+    if "loop" not in sections:
+        return [(name, "compare")]
+    if "compare" not in sections:
+        return [(name, "close-loop")]
+    return [(name, "compare"), (f"{name}-loop", "close-loop")]
+
+
+def _run_on_cluster(
+    jobs: list,
+    workers: int,
+    scheduler: str | None,
+    statuses: dict[int, StudyStatus],
+    progress: Callable[[str, float], None],
+) -> None:
+    try:
+        from distributed import Client, LocalCluster, as_completed
+    except ImportError:
+        raise InputError(
+            "Several workers need dask: install discover-rheology[batch], or leave --workers out."
+        ) from None
+    if scheduler is not None:
+        try:
+            client, cluster = Client(scheduler, timeout="20s"), None
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(f"No dask scheduler answers at {scheduler!r} ({error}).") from None
+    else:
+        cluster = LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        )
+        client = Client(cluster)
+    try:
+        # paths must mean the same in the workers as here
+        futures = {}
+        for i, (path, name, task, out, seed, overwrite) in enumerate(jobs):
+            arguments = (str(Path(path).resolve()), name, task, str(Path(out).resolve()))
+            future = client.submit(run_one, *arguments, seed, overwrite, pure=False)
+            futures[future] = i
+        for future in as_completed(futures):
+            i = futures[future]
+            error = future.exception()
+            if error is None:
+                statuses[i] = future.result()
+            else:
+                statuses[i] = StudyStatus(jobs[i][1], jobs[i][2], "failed", str(error))
+            progress(f"{jobs[i][1]}: {statuses[i].status}", len(statuses) / len(jobs))
+    finally:
+        client.close()
+        if cluster is not None:
+            cluster.close()

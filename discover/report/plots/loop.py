@@ -1,0 +1,188 @@
+"""Pictures of a closed loop: data and predictions, residuals, waterfall, ranking."""
+
+import numpy as np
+
+from discover.closed_loop.result import LoopResult, RunRecord
+from discover.report.plots.style import (
+    BEFORE,
+    GREEN,
+    INK,
+    NETWORK,
+    SPARSE,
+    TRUTH,
+    Picture,
+    figure,
+    legend_above,
+    picture,
+)
+
+_FIT, _HELD = NETWORK, SPARSE
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) or 1.0
+
+
+def _spans_decades(times: np.ndarray) -> bool:
+    positive = times[times > 0]
+    return positive.size > 2 and bool(positive[-1] > 30 * positive[0])
+
+
+def runs_picture(result: LoopResult) -> Picture:
+    """Return every run: measured, declared model, augmented model."""
+    records = result.records
+    columns = min(4, len(records))
+    rows = -(-len(records) // columns)
+    with figure(rows, columns, width=10.0, height=2.2) as (drawing, axes):
+        for panel in axes.ravel()[len(records) :]:
+            panel.set_visible(False)
+        for panel, record in zip(axes.ravel(), records, strict=False):
+            every = max(1, record.time.size // 60)
+            measured = record.measured[::every]
+            panel.plot(
+                record.time[::every], measured, "o", ms=2.5, mfc="none", color=TRUTH,
+                mew=0.7, label="measured",
+            )  # fmt: skip
+            panel.plot(
+                record.time, record.predicted[0], "-.", lw=1.1, color=BEFORE,
+                label="declared model",
+            )  # fmt: skip
+            panel.plot(
+                record.time, record.predicted[-1], lw=1.5, color=_HELD if record.held_out else _FIT,
+                label="augmented, held out" if record.held_out else "augmented, fitted",
+            )  # fmt: skip
+            low, high = float(np.min(record.measured)), float(np.max(record.measured))
+            shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
+            low, high = min(low, float(shown.min())), max(high, float(shown.max()))
+            margin = 0.05 * (high - low) or 1.0
+            panel.set_ylim(low - margin, high + margin)
+            if _spans_decades(record.time):
+                panel.set_xscale("log")
+            panel.set_title(_short(record), fontsize=8)
+        for panel in axes[-1]:
+            panel.set_xlabel("time (s)")
+        for panel in axes[:, 0]:
+            panel.set_ylabel("σ₁₂ (Pa)")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "runs",
+            "Every run in the window of the loop. Runs in orange were held out: no fit saw them.",
+        )
+
+
+def _short(record: RunRecord) -> str:
+    name = record.name.removesuffix(".csv")
+    return f"{name}: {100 * record.errors[0]:.2g} → {100 * record.errors[-1]:.2g} %"
+
+
+def residual_picture(result: LoopResult) -> Picture:
+    """Return the residual against time and strain, before and after."""
+    with figure(2, 2, height=2.4) as (drawing, axes):
+        for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
+            limit = 0.0
+            for record in result.records:
+                relative = 100.0 * record.residual[stage] / _rms(record.measured)
+                style = {
+                    "color": _HELD if record.held_out else _FIT,
+                    "lw": 0.9,
+                    "alpha": 0.8,
+                    "label": "held out" if record.held_out else "fitted",
+                }
+                axes[row, 0].plot(record.time, relative, **style)
+                axes[row, 1].plot(record.strain, relative, **style)
+                limit = max(limit, float(np.percentile(np.abs(relative), 98)))
+            for panel, values, label in (
+                (axes[row, 0], [r.time for r in result.records], "time (s)"),
+                (axes[row, 1], [np.abs(r.strain) for r in result.records], "strain"),
+            ):
+                if any(_spans_decades(v) for v in values) and all(np.all(v >= 0) for v in values):
+                    panel.set_xscale("log")
+                panel.set_xlabel(label if row else "")
+                panel.axhline(0.0, color=INK, lw=0.6)
+                panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
+            axes[row, 0].set_ylabel("residual (% of rms σ₁₂)")
+            axes[row, 0].set_title(title, loc="left")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "residual",
+            "Prediction minus measurement, over each run's root-mean-square stress, against time "
+            "and strain. Note the different scales above and below. What is left should look like "
+            "noise around zero; anything else is an effect still missing.",
+        )
+
+
+def waterfall_picture(result: LoopResult) -> Picture:
+    """Return the errors after each stage."""
+    labels = ["declared", *(f"+ {stage.effect}" for stage in result.stages)]
+    pairs = [result.error_before, *(stage.error for stage in result.stages)]
+    with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
+        panel = axes[0, 0]
+        positions = np.arange(len(labels))
+        series = [("fitted runs", _FIT, [p.fit for p in pairs], -0.19)]
+        if all(p.held_out is not None for p in pairs):
+            series.append(("held-out runs", _HELD, [p.held_out for p in pairs], 0.19))
+        for label, colour, values, shift in series:
+            heights = 100.0 * np.array(values, dtype=float)
+            bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
+            panel.bar_label(bars, [f"{h:.2g} %" for h in heights], fontsize=8, padding=2)
+        panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
+        panel.set_yscale("log")
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high * 1.6)
+        panel.set_xticks(positions, labels)
+        panel.set_ylabel("relative error (%)")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "waterfall",
+            "Error after each effect added: root mean square of prediction minus measurement over "
+            "the root-mean-square stress, mean over runs.",
+        )
+
+
+def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
+    """Return what each candidate would remove of the residual, stage by stage."""
+    rankings = [ranking for ranking in result.rankings if ranking]
+    if not rankings:
+        return None
+    with figure(1, len(rankings), width=4.2 * len(rankings) + 1.0, height=3.4) as (drawing, axes):
+        for number, (panel, ranking) in enumerate(zip(axes[0], rankings, strict=True)):
+            best = ranking[:shown][::-1]
+            chosen = result.stages[number].effect if number < len(result.stages) else None
+            panel.barh(
+                [c.effect for c in best],
+                [100.0 * max(c.reduction, 0.0) for c in best],
+                color=[GREEN if c.effect == chosen else BEFORE for c in best],
+            )
+            panel.set_xlim(0, 100)
+            panel.set_title(f"stage {number + 1}" + ("" if chosen else ": none added"))
+            panel.set_xlabel("squared residual removed (%)")
+            panel.tick_params(axis="y", labelsize=7.5)
+        return picture(
+            drawing,
+            "ranking",
+            "What each candidate, tried alone, would remove of the squared residual of the fitted "
+            "runs; in green the one that was added. It is chosen by evidence and by runs left out, "
+            "so it need not be the longest bar.",
+        )
+
+
+def run_error_picture(result: LoopResult) -> Picture:
+    """Return the error of every run before and after."""
+    records = result.records
+    with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
+        panel = axes[0, 0]
+        for position, record in enumerate(records[::-1]):
+            before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
+            colour = _HELD if record.held_out else _FIT
+            panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
+            panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
+            label = "augmented, held out" if record.held_out else "augmented, fitted"
+            panel.plot(after, position, "o", color=colour, label=label)
+        panel.set_yticks(range(len(records)), [r.name for r in records[::-1]])
+        panel.set_xscale("log")
+        panel.set_xlabel("relative error (%)")
+        legend_above(drawing, axes)
+        return picture(drawing, "run_errors", "Residual by run: error before and after.")
