@@ -118,6 +118,8 @@ class SupportSearch:
         seeds = self._grow_horizon(empty)
         risen = 0
         for size in range(1, self.largest + 1):
+            if size > 1:
+                self._rescale(self.model_at(self.of_size(size - 1)[0]))
             parents = self.of_size(size - 1)[:2]
             self._try(size, parents, seeds.get(size, {}), limit=2 * LANES if size == 1 else LANES)
             for _ in range(_ROUNDS):
@@ -175,9 +177,7 @@ class SupportSearch:
         for horizon in (*_HORIZONS, 1.0):
             keep = order <= horizon
             model = LinearModel.at(self.problem, current, keep)
-            if current is empty:
-                norms = np.where(model.norms > 0, model.norms, 1.0)
-                self.scale = 1.0 / norms
+            self._rescale(model)
             candidates = self._ranked(model, 1, all_of_size(1, self.n_terms))[: LANES // 2]
             if self.largest > 1:
                 candidates += self._ranked(model, 2, all_of_size(2, self.n_terms))[:2]
@@ -191,7 +191,12 @@ class SupportSearch:
             if sane:
                 current = min(sane, key=self.criterion)
             self.progress(f"first {horizon:.0%} of each run: misfit {current.misfit:.3g}")
+        self._rescale(LinearModel.at(self.problem, current))
         return seeds
+
+    def _rescale(self, model: LinearModel) -> None:
+        """Take the size of coefficients from the present law: an early one may be far off."""
+        self.scale = 1.0 / np.where(model.norms > 0, model.norms, 1.0)
 
     def _ranked(self, model: LinearModel, size: int, supports) -> list[tuple[int, ...]]:
         if not supports or size > self.n_terms:
@@ -220,26 +225,47 @@ class SupportSearch:
                     candidates.append(support)
                     starts[support] = centre
         self._refit(candidates, starts)
+        self._retry(candidates)
         return bool(candidates)
+
+    def _retry(self, supports: list[tuple[int, ...]]) -> None:
+        """Refit again, from the fits of their parts, supports that may have missed their minimum.
+
+        Those are what fits worse than a part of itself, and closed forms: an inner parameter
+        that an early fit drove to its bound has no slope there to come back by.
+        """
+        again = [
+            (support, self.fits[part])
+            for support in supports
+            for part in removals(support)
+            if part in self.fits
+            and (
+                self.fits[part].misfit < self.fits[support].misfit * (1.0 - 1e-6)
+                or any(self.problem.library.terms[i].closed_form for i in support)
+            )
+        ]
+        # from each such part: several may lead to different minima
+        for first in range(0, len(again), LANES):
+            batch = again[first : first + LANES]
+            self._refit([s for s, _ in batch], [fit for _, fit in batch])
 
     def _refit(
         self,
         supports: list[tuple[int, ...]],
-        starts: dict[tuple[int, ...], Fit],
+        starts: dict[tuple[int, ...], Fit] | list[Fit],
         keep: Bool[np.ndarray, "runs samples"] | None = None,
         tolerance: float = SCREENING,
     ) -> list[Fit]:
         """Refit supports; remember those that were fitted on all samples."""
         default = (np.zeros(self.n_terms), self.problem.library.inner_default)
 
-        def start_of(support):
-            known = starts.get(support)
-            return default if known is None else (known.dense(self.n_terms), known.inner)
+        known = [starts.get(s) for s in supports] if isinstance(starts, dict) else starts
+        begin = [default if k is None else (k.dense(self.n_terms), k.inner) for k in known]
 
         fits = refit(
             self.problem,
             supports,
-            [start_of(s) for s in supports],
+            begin,
             self.scale,
             self.slots,
             None if keep is None else [keep] * len(supports),
