@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from discover.laws.base import AbstractConstitutiveLaw
 
@@ -64,6 +64,6 @@ class LearnerResult:
     law: AbstractConstitutiveLaw
     terms: tuple[RecoveredTerm, ...]
     train_seconds: float
-    loss_history: tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""

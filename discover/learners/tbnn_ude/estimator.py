@@ -94,13 +94,13 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.progress = progress
 
-    def fit(self, X: Sequence[ShearRun], y=None) -> "TBNNUDE":
+    def fit(self, X: Sequence, y=None) -> "TBNNUDE":
         """Train on σ12 of these runs.
 
         Parameters
         ----------
         X
-            Runs.
+            Runs, a sequence of `ShearRun`.
         y
             Ignored: the observations are part of the runs.
 

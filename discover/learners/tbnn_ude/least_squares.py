@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import lineax
 import numpy as np
@@ -124,4 +123,4 @@ def minimise(
         recent = history[-_PATIENCE - 1 :]
         if len(recent) > _PATIENCE and recent[0] - recent[-1] < 1e-3 * recent[0]:
             break
-    return jax.device_get(best)
+    return best

@@ -132,7 +132,7 @@ def is_white(residual: Float[np.ndarray, "runs n"], mask: np.ndarray) -> bool:
     pairs = mask[:, 1:] & mask[:, :-1]
     product = np.sum(np.where(pairs, residual[:, 1:] * residual[:, :-1], 0.0))
     correlation = product / max(np.sum(residual**2), 1e-300)
-    return abs(correlation) < 3.0 / np.sqrt(max(np.sum(pairs), 1))
+    return bool(abs(correlation) < 3.0 / np.sqrt(max(np.sum(pairs), 1)))
 
 
 class _Session:
@@ -171,7 +171,7 @@ class _Session:
         objective = Objective(self.problem, rebuild, cloud, prior)
         target = 0.1 * self.recipe.exact
         weights = minimise(weights_of(law), objective, steps, self.record, target)
-        trained = rebuild(jnp.asarray(weights))
+        trained = rebuild(weights)
         # a law that runs away in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
 
