@@ -1,0 +1,18 @@
+"""Find what a model misses, trace it to an effect it lacks, add it, report before and after."""
+
+from discover.closed_loop.attribution import Attribution, CandidateScore
+from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.loop import run_loop
+from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+
+__all__ = [
+    "Attribution",
+    "CandidateScore",
+    "DeclaredModel",
+    "ErrorPair",
+    "LoopResult",
+    "RunRecord",
+    "Stage",
+    "StageParameter",
+    "run_loop",
+]

@@ -1,0 +1,156 @@
+"""Score every effect by how well its signature, beyond what is fitted, explains the residual."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.least_squares import Fit, evaluate
+
+ALIAS_COSINE = 0.99
+"""Signatures that agree to this cosine cannot be told apart by the data at hand."""
+
+_STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
+
+
+@dataclass
+class CandidateScore:
+    """How a candidate effect did at one stage.
+
+    Attributes
+    ----------
+    effect, kind
+        Its name and kind.
+    score
+        Share of the squared residual that its signature explains to first order, 0 to 1.
+    step
+        Amplitude to first order.
+    reduction
+        Share of the squared residual removed by the best trial amplitude, others held.
+    aliases
+        Candidates with the same signature.
+    error, left_out_error
+        Mean relative error on the fitted runs, and on each run left out in turn, after a refit;
+        None if it was not refitted.
+    evidence
+        Lowering of the information criterion by the refit; positive is evidence for the effect.
+    start
+        Parameter vector to refit from.
+    """
+
+    effect: str
+    kind: str
+    score: float
+    step: float
+    reduction: float = 0.0
+    aliases: tuple[str, ...] = ()
+    error: float | None = None
+    left_out_error: float | None = None
+    evidence: float | None = None
+    start: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
+
+
+@dataclass
+class Attribution:
+    """All candidates at one stage, the leading ones first."""
+
+    candidates: list[CandidateScore]
+
+
+def attribute(
+    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str], leaders: int
+) -> Attribution:
+    """Return every effect that is not yet in the model, scored and ranked.
+
+    The signature of an effect is the change of the prediction at a small amplitude, made
+    orthogonal to what the fitted parameters can do. Because a base law may be far off, where a
+    signature at zero amplitude says little, amplitudes around the first-order one are tried with
+    the whole nonlinear model as well, and candidates are ranked by the best of them.
+
+    Parameters
+    ----------
+    model, batch
+        The model with all candidates, and the runs fitted.
+    fit
+        The current fit.
+    active
+        Effects already in the model.
+    leaders
+        How many leading candidates to return distinct: a candidate with the signature of one
+        above it joins its aliases.
+    """
+    waiting = [effect for effect in model.effects if effect.name not in active]
+    at = [model.slices[effect.name].start for effect in waiting]
+    probes = []
+    for position in at:
+        theta = fit.theta.copy()
+        theta[position] += 0.1 * model.first_trial[position]
+        probes.append(theta)
+    residual = fit.residual.ravel()
+    total = float(residual @ residual)
+    changes = evaluate(model, batch, probes).reshape(len(probes), -1) - residual
+    basis = np.zeros((residual.size, 0))
+    if len(fit.free):
+        basis, _ = np.linalg.qr(fit.jacobian.reshape(len(fit.free), -1).T)
+    candidates, signatures = [], []
+    for effect, position, change in zip(waiting, at, changes, strict=True):
+        signature = np.where(np.isfinite(change), change, 0.0) / (0.1 * model.first_trial[position])
+        length = np.linalg.norm(signature)
+        beyond = signature - basis @ (basis.T @ signature)
+        beyond_length = np.linalg.norm(beyond)
+        score, step = 0.0, 0.0
+        if beyond_length > 1e-4 * length and length > 0:
+            step = float(-(beyond @ residual) / beyond_length**2)
+            score = float((beyond @ residual) ** 2 / beyond_length**2 / total)
+            # an amplitude outside its range explains nothing
+            if not model.low[position] < step < np.inf:
+                score, step = 0.0, 0.0
+        candidates.append(CandidateScore(effect.name, effect.kind, score, step))
+        signatures.append(beyond / beyond_length if score > 0 else np.zeros_like(beyond))
+    _try_amplitudes(model, batch, fit, candidates, at)
+    order = sorted(
+        range(len(waiting)),
+        key=lambda i: (-round(candidates[i].reduction, 6), waiting[i].complexity, i),
+    )
+    ranked: list[CandidateScore] = []
+    heads: list[int] = []
+    for i in order:
+        twin = next((h for h in heads if abs(signatures[h] @ signatures[i]) > ALIAS_COSINE), None)
+        if twin is None or len(heads) >= leaders:
+            heads.append(i)
+            ranked.append(candidates[i])
+            continue
+        first, second = candidates[twin], candidates[i]
+        if waiting[i].complexity < waiting[twin].complexity:
+            # the simpler explanation goes first
+            ranked[ranked.index(first)] = second
+            heads[heads.index(twin)] = i
+            second.aliases = (first.effect, *first.aliases)
+            first.aliases = ()
+        else:
+            first.aliases = (*first.aliases, second.effect)
+    return Attribution(ranked)
+
+
+def _try_amplitudes(model, batch, fit, candidates, at):
+    trials, owner = [], []
+    for i, (candidate, position) in enumerate(zip(candidates, at, strict=True)):
+        candidate.start = fit.theta.copy()
+        if candidate.score <= 0:
+            continue
+        for stretch in _STRETCHES:
+            theta = fit.theta.copy()
+            theta[position] = np.clip(
+                stretch * candidate.step, model.low[position], model.high[position]
+            )
+            trials.append(theta)
+            owner.append(i)
+    if not trials:
+        return
+    costs = np.sum(evaluate(model, batch, trials) ** 2, axis=(1, 2))
+    for theta, i, cost in zip(trials, owner, costs, strict=True):
+        reduction = 1.0 - cost / fit.cost if np.isfinite(cost) else 0.0
+        if reduction > candidates[i].reduction:
+            candidates[i].reduction = float(reduction)
+            candidates[i].start = theta

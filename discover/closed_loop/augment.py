@@ -1,0 +1,207 @@
+"""Refit the leading candidates and choose the one that earns its place, or none."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.residual import summarise
+from discover.effects import ConstitutiveEffect
+from discover.laws import AbstractConstitutiveLaw
+from tensor_library.algebra import Symmetric
+
+IMPROVEMENT = 0.98
+"""An effect must lower the error of the runs left out at least to this fraction."""
+
+
+class AugmentedLaw(AbstractConstitutiveLaw):
+    """A law with the extra terms of constitutive effects.
+
+    Attributes
+    ----------
+    base
+        The declared law.
+    values
+        Parameters of each effect.
+    effects
+        The effects.
+    linear_relaxation
+        As in the declared law.
+    """
+
+    base: AbstractConstitutiveLaw
+    values: tuple[Float[Array, " _"], ...]
+    effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h of the declared law plus the terms of the effects."""
+        extra = self.base.extra_term(stress, rate)
+        for effect, values in zip(self.effects, self.values, strict=True):
+            extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
+        return extra
+
+
+@dataclass
+class Choice:
+    """A candidate after its refit.
+
+    Attributes
+    ----------
+    candidate, fit
+        The candidate and the fit with it.
+    left_out
+        Error of each fitted run when left out.
+    """
+
+    candidate: CandidateScore
+    fit: Fit
+    left_out: Float[np.ndarray, " runs"]
+
+
+def evidence(
+    before: Fit, after: Fit, weight: Float[np.ndarray, "runs n"], n_candidates: int
+) -> float:
+    """Return by how much adding parameters lowers the information criterion.
+
+    The Bayesian criterion on the number of independent samples that the remaining residual is
+    worth, with a price for having chosen among `n_candidates`   [Schwarz 1978, Ann. Statist. 6,
+    461; Chen & Chen 2008, Biometrika 95, 759 for the price].
+    """
+    effective = summarise(after.residual, weight).effective_samples
+    added = len(after.free) - len(before.free)
+    if after.cost <= 0.0:
+        return float("inf") if before.cost > 0.0 else -float("inf")
+    gain = effective * np.log(before.cost / after.cost)
+    return float(gain - added * np.log(max(effective, 2.0)) - 2.0 * np.log(max(n_candidates, 1)))
+
+
+def refit(
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    leaders: Sequence[CandidateScore],
+    n_candidates: int,
+) -> list[Choice]:
+    """Refit each leading candidate together with all that is fitted already.
+
+    The refit carries no penalty, so its coefficients are not biased towards zero. Fills in the
+    candidates' errors and evidence.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the current fit.
+    leaders
+        Candidates to refit.
+    n_candidates
+        Number of candidates they were chosen from.
+    """
+    weight = np.asarray(batch.weight)
+    free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
+    fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free)
+    choices = []
+    for candidate, trial in zip(leaders, fits, strict=True):
+        if not trial.usable:
+            continue
+        left_out = leave_one_run_out(model, batch, trial)
+        candidate.error = float(np.mean(trial.run_errors))
+        candidate.left_out_error = float(np.mean(left_out))
+        candidate.evidence = evidence(fit, trial, weight, n_candidates)
+        choices.append(Choice(candidate, trial, left_out))
+    return choices
+
+
+def choose(choices: Sequence[Choice], left_out_before: float) -> Choice | None:
+    """Return the choice with the strongest evidence that also predicts runs left out better.
+
+    Parameters
+    ----------
+    choices
+        Refitted candidates.
+    left_out_before
+        Mean error of the runs left out before adding anything.
+    """
+    one_run = bool(choices) and len(choices[0].left_out) < 2
+    earned = [
+        choice
+        for choice in choices
+        if (choice.candidate.evidence or 0.0) > 0.0
+        # a run left out of one run leaves nothing to fit
+        and (one_run or np.mean(choice.left_out) < IMPROVEMENT * left_out_before)
+    ]
+    if not earned:
+        return None
+    return max(earned, key=lambda choice: choice.candidate.evidence or 0.0)
+
+
+def prune(
+    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str], n_candidates: int
+) -> tuple[Fit, list[str]]:
+    """Drop effects that later ones have made redundant, one after another.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the current fit.
+    active
+        Effects in the model, in the order they were added; the last is never dropped.
+    n_candidates
+        As in `evidence`.
+
+    Returns
+    -------
+    The fit and the effects that stay.
+    """
+    active = list(active)
+    weight = np.asarray(batch.weight)
+    while len(active) > 1:
+        starts, free = [], []
+        for name in active[:-1]:
+            at = model.positions(name)
+            theta = fit.theta.copy()
+            theta[at] = model.zero()[at]
+            starts.append(theta)
+            free.append(tuple(p for p in fit.free if p not in at))
+        fits = fit_batch(model, batch, starts, free)
+        support = [
+            evidence(trial, fit, weight, n_candidates) if trial.usable else np.inf for trial in fits
+        ]
+        weakest = int(np.argmin(support))
+        if support[weakest] > 0.0:
+            break
+        fit = fits[weakest]
+        del active[weakest]
+    return fit, active
+
+
+def intervals(model: AugmentedModel, batch: RunBatch, fit: Fit) -> dict[int, tuple[float, float]]:
+    """Return the 95 % interval of each fitted parameter, by position.
+
+    From the curvature at the fit, with the residual's variance counted on as many samples as its
+    correlation leaves independent.
+    """
+    if not fit.free:
+        return {}
+    design = fit.jacobian.reshape(len(fit.free), -1).T
+    weight = np.asarray(batch.weight)
+    n = np.count_nonzero(weight)
+    effective = summarise(fit.residual, weight).effective_samples
+    scale = np.linalg.norm(design, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
+    variance = fit.cost / max(n - len(fit.free), 1) * n / max(effective, 1.0)
+    half = 1.96 * np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance) / scale
+    return {
+        position: (
+            float(max(fit.theta[position] - h, model.low[position])),
+            float(min(fit.theta[position] + h, model.high[position])),
+        )
+        for position, h in zip(fit.free, half, strict=True)
+    }

@@ -1,0 +1,86 @@
+"""Predictions of the declared and the augmented model, run by run."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.result import ErrorPair, RunRecord
+from discover.dataset import ShearRun
+from discover.errors import InputError
+
+
+def strain_of(run: ShearRun) -> Float[np.ndarray, " n"]:
+    """Return the strain of a run at its samples: recorded, or of its commanded rate."""
+    if run.strain is not None:
+        return run.strain
+    return np.asarray(jax.vmap(run.protocol.strain)(jnp.asarray(run.time)))
+
+
+def cut_to_strain(runs: Sequence[ShearRun], window: tuple[float, float] | None) -> list[ShearRun]:
+    """Return the samples of every run whose strain magnitude lies in a window.
+
+    Raises
+    ------
+    InputError
+        If the window is no window, or a run has fewer than 3 samples in it.
+    """
+    if window is None:
+        return list(runs)
+    low, high = window
+    if not 0 <= low < high:
+        raise InputError(
+            f"The strain window must be two increasing numbers from 0 on; got {list(window)}."
+        )
+    cut = []
+    for run in runs:
+        strain = np.abs(strain_of(run))
+        keep = (strain >= low) & (strain <= high)
+        if np.count_nonzero(keep) < 3:
+            raise InputError(
+                f"The run {run.name!r} has {np.count_nonzero(keep)} samples at strains from "
+                f"{low:g} to {high:g}; at least 3 are needed. Widen [loop] strain or leave the run "
+                "out."
+            )
+        cut.append(run.window(keep))
+    return cut
+
+
+def record_runs(
+    model: AugmentedModel,
+    batch: RunBatch,
+    runs: Sequence[ShearRun],
+    thetas: Sequence[np.ndarray],
+    held_out: bool,
+) -> list[RunRecord]:
+    """Return each run with the predictions of several parameter vectors."""
+    predictions = np.stack([model.predict(theta, batch) for theta in thetas])
+    records = []
+    for i, run in enumerate(runs):
+        predicted = predictions[:, i, : len(run)]
+        size = np.sqrt(np.mean(run.shear_stress**2))
+        misfit = np.sqrt(np.mean((predicted - run.shear_stress) ** 2, axis=1))
+        records.append(
+            RunRecord(
+                name=run.name,
+                held_out=held_out,
+                time=run.time,
+                strain=strain_of(run),
+                instrument_time=run.time / run.clock_factor,
+                shear_rate=run.shear_rate,
+                measured=run.shear_stress,
+                predicted=predicted,
+                errors=misfit / (size if size > 0 else 1.0),
+            )
+        )
+    return records
+
+
+def errors_of(records: Sequence[RunRecord], index: int) -> ErrorPair:
+    """Return the mean errors of one of the models in the records."""
+    fitted = [r.errors[index] for r in records if not r.held_out]
+    held = [r.errors[index] for r in records if r.held_out]
+    return ErrorPair(float(np.mean(fitted)), float(np.mean(held)) if held else None)

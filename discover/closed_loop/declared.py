@@ -1,0 +1,148 @@
+"""The model that the user declares, before any effect is added."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.laws import LAWS, AbstractConstitutiveLaw, UpperConvectedMaxwell, make_law
+
+MODULUS, RELAXATION_TIME = "modulus_Pa", "relaxation_time_s"
+"""Names of the two common factors that may be fitted."""
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """A parameter of the declared law that is to be fitted, with its range."""
+
+    name: str
+    start: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class DeclaredModel:
+    """A law, its modes, and which of them are still to be fitted.
+
+    Attributes
+    ----------
+    law
+        The law of every mode, with starting values where parameters are free.
+    modulus
+        G_k in Pa, shape (k,).
+    relaxation_time
+        λ_k in s, shape (k,).
+    solvent_viscosity
+        In Pa s.
+    fit_modulus, fit_relaxation_time
+        Whether one common factor on all moduli, or on all times, is fitted.
+    law_name, parameters
+        Name and parameters of a named law; needed only if some are free.
+    free_parameters
+        Parameters of the law to fit.
+    linear_error
+        Relative error with which the modes describe the linear data they come from; no prediction
+        can be expected to do better.
+    """
+
+    law: AbstractConstitutiveLaw
+    modulus: Float[np.ndarray, " k"]
+    relaxation_time: Float[np.ndarray, " k"]
+    solvent_viscosity: float = 0.0
+    fit_modulus: bool = False
+    fit_relaxation_time: bool = False
+    law_name: str = ""
+    parameters: tuple[tuple[str, float], ...] = ()
+    free_parameters: tuple[FreeParameter, ...] = ()
+    linear_error: float = 0.0
+
+    def __post_init__(self):
+        for name in ("modulus", "relaxation_time"):
+            values = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
+            if values.ndim != 1 or not np.all(np.isfinite(values)) or np.any(values <= 0):
+                raise InputError(f"{name} must be positive numbers; got {values}.")
+            object.__setattr__(self, name, values)
+        if self.modulus.shape != self.relaxation_time.shape:
+            raise InputError(
+                f"A model needs as many moduli as relaxation times; got {len(self.modulus)} and "
+                f"{len(self.relaxation_time)}."
+            )
+
+    @classmethod
+    def maxwell(cls, modulus, relaxation_time, **options) -> "DeclaredModel":
+        """Return the upper convected Maxwell law with these modes."""
+        return cls(
+            UpperConvectedMaxwell(),
+            np.atleast_1d(modulus),
+            np.atleast_1d(relaxation_time),
+            **options,
+        )
+
+    @classmethod
+    def named(
+        cls,
+        law_name: str,
+        parameters: Mapping[str, float],
+        modulus,
+        relaxation_time,
+        free: Sequence[str] = (),
+        **options,
+    ) -> "DeclaredModel":
+        """Return a named law with these modes.
+
+        Parameters
+        ----------
+        law_name, parameters
+            As in `discover.laws.make_law`; starting values for those that are free.
+        modulus, relaxation_time
+            In Pa and s, one or several.
+        free
+            What to fit: parameters of the law, ``modulus_Pa``, ``relaxation_time_s``.
+        **options
+            Other attributes.
+
+        Raises
+        ------
+        InputError
+            If the law or a parameter is not as it should be.
+        """
+        law = make_law(law_name, parameters)
+        ranges = LAWS[law_name].parameters
+        unknown = [n for n in free if n not in ranges and n not in (MODULUS, RELAXATION_TIME)]
+        if unknown:
+            raise InputError(f"{unknown[0]!r} cannot be fitted: the law {law_name!r} has it not.")
+        return cls(
+            law,
+            np.atleast_1d(modulus),
+            np.atleast_1d(relaxation_time),
+            fit_modulus=MODULUS in free,
+            fit_relaxation_time=RELAXATION_TIME in free,
+            law_name=law_name,
+            parameters=tuple((name, float(parameters[name])) for name in ranges),
+            free_parameters=tuple(
+                FreeParameter(name, float(parameters[name]), *ranges[name])
+                for name in ranges
+                if name in free
+            ),
+            **options,
+        )
+
+    def law_with(self, values) -> AbstractConstitutiveLaw:
+        """Return the law with these values of its free parameters, which may be traced."""
+        if not self.free_parameters:
+            return self.law
+        known = dict(self.parameters)
+        for parameter, value in zip(self.free_parameters, values, strict=True):
+            known[parameter.name] = value
+        return LAWS[self.law_name].build(*known.values())
+
+    @property
+    def free_positions(self) -> list[int]:
+        """Positions of what is fitted, in the vector that starts with the declared parameters."""
+        factors = [self.fit_modulus, self.fit_relaxation_time]
+        return [i for i, wanted in enumerate(factors) if wanted] + [
+            2 + i for i in range(len(self.free_parameters))
+        ]

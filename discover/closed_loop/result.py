@@ -1,0 +1,192 @@
+"""What a closed loop found, for people, pictures and other programs."""
+
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.attribution import CandidateScore
+from discover.laws import Fluid
+
+Verdict = Literal["effects_added", "no_effect_needed", "unexplained"]
+
+
+@dataclass(frozen=True)
+class ErrorPair:
+    """Relative errors, mean over runs: on the fitted runs and on those held out, if any."""
+
+    fit: float
+    held_out: float | None
+
+
+@dataclass(frozen=True)
+class StageParameter:
+    """A parameter of an effect as finally fitted, with its 95 % interval."""
+
+    value: float
+    ci95: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """An effect that was added.
+
+    Attributes
+    ----------
+    effect, kind
+        Its name and kind.
+    parameters
+        Its parameters in the final model.
+    aliases
+        Effects that these data cannot tell from it.
+    error
+        Errors after this stage.
+    evidence
+        Lowering of the information criterion.
+    equation, source, check
+        What it adds, where that comes from, and how to confirm it in the laboratory.
+    """
+
+    effect: str
+    kind: str
+    parameters: dict[str, StageParameter]
+    aliases: tuple[str, ...]
+    error: ErrorPair
+    evidence: float
+    equation: str
+    source: str
+    check: str
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One run in the window of the loop, measured and predicted.
+
+    Attributes
+    ----------
+    name, held_out
+        The run, and whether it was held out.
+    time, strain, instrument_time
+        In s, dimensionless, and in s on the instrument's clock, shape (n,).
+    shear_rate
+        Commanded, in 1/s, shape (n,).
+    measured
+        Shear stress in Pa, shape (n,).
+    predicted
+        Shear stress in Pa by the declared model and after each stage, shape (stages + 1, n).
+    errors
+        Relative error of each of these, shape (stages + 1,).
+    """
+
+    name: str
+    held_out: bool
+    time: Float[np.ndarray, " n"]
+    strain: Float[np.ndarray, " n"]
+    instrument_time: Float[np.ndarray, " n"]
+    shear_rate: Float[np.ndarray, " n"]
+    measured: Float[np.ndarray, " n"]
+    predicted: Float[np.ndarray, "stages n"]
+    errors: Float[np.ndarray, " stages"]
+
+    @property
+    def residual(self) -> Float[np.ndarray, "stages n"]:
+        """Prediction minus measurement in Pa, for each model."""
+        return self.predicted - self.measured
+
+
+@dataclass(frozen=True)
+class LoopResult:
+    """The outcome of a closed loop.
+
+    Attributes
+    ----------
+    verdict
+        What is to be believed.
+    error_before, error_after
+        Of the declared and of the augmented model.
+    noise_floor
+        Relative noise, mean over the fitted runs.
+    stages
+        Effects added, in order.
+    remaining
+        What is left, and whether it has structure.
+    rankings
+        Candidates at each stage, and those that earned nothing at the last.
+    records
+        Every run with its predictions.
+    declared_parameters
+        Fitted factors on moduli and relaxation times, where asked for.
+    fluid
+        The augmented fluid, without instrument effects.
+    seconds
+        Time taken.
+    """
+
+    verdict: Verdict
+    error_before: ErrorPair
+    error_after: ErrorPair
+    noise_floor: float
+    stages: tuple[Stage, ...]
+    remaining: dict[str, Any]
+    rankings: tuple[tuple[CandidateScore, ...], ...] = field(repr=False, default=())
+    records: tuple[RunRecord, ...] = field(repr=False, default=())
+    declared_parameters: dict[str, StageParameter] = field(default_factory=dict)
+    fluid: Fluid | None = field(repr=False, default=None)
+    seconds: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the contents of ``loop.json``."""
+        contents = {
+            "verdict": self.verdict,
+            "error_before": asdict(self.error_before),
+            "error_after": asdict(self.error_after),
+            "noise_floor": self.noise_floor,
+            "stages": [asdict(stage) for stage in self.stages],
+            "remaining": self.remaining,
+            "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
+            "ranking": [
+                [
+                    {
+                        "effect": c.effect,
+                        "kind": c.kind,
+                        "score": c.score,
+                        "reduction": c.reduction,
+                        "evidence": c.evidence,
+                        "error": c.error,
+                        "left_out_error": c.left_out_error,
+                        "aliases": c.aliases,
+                    }
+                    for c in stage
+                ]
+                for stage in self.rankings
+            ],
+            "runs": {
+                record.name: {"held_out": record.held_out, "errors": record.errors}
+                for record in self.records
+            },
+            "seconds": self.seconds,
+        }
+        return _plain(contents)
+
+    def write_json(self, path: str | Path) -> None:
+        """Write ``loop.json``."""
+        text = json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
+        Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    # JSON knows neither arrays nor nan
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value

@@ -1,0 +1,162 @@
+"""What an effect is: something that a model may lack, with an amplitude that switches it on."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from tensor_library.algebra import Symmetric
+
+Kind = Literal["constitutive", "kinematic", "signal"]
+
+Scale = Literal["one", "sampling_time", "stress", "viscosity", "stress_rate", "inertia"]
+"""What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    name
+        Name in JSON and reports.
+    symbol
+        LaTeX.
+    unit
+        SI unit; empty for a pure number.
+    low, high
+        Admissible range.
+    scale
+        Data property in which `first_trial` is measured.
+    first_trial
+        Size of the first trial value, in that scale; for an inner parameter its starting value.
+    """
+
+    name: str
+    symbol: str
+    unit: str = ""
+    low: float = -jnp.inf
+    high: float = jnp.inf
+    scale: Scale = "one"
+    first_trial: float = 0.1
+
+
+@dataclass(frozen=True)
+class AbstractEffect(ABC):
+    """An effect. Its first parameter is the amplitude: at zero it changes nothing.
+
+    Attributes
+    ----------
+    name
+        Name in studies, JSON and reports.
+    parameters
+        The amplitude first, then any inner parameters.
+    equation
+        LaTeX of what the effect adds or changes.
+    source
+        Literature.
+    check
+        What a user should do in the laboratory to confirm it.
+    complexity
+        Used to prefer the simpler of two explanations that the data cannot separate.
+    """
+
+    name: str
+    parameters: tuple[EffectParameter, ...]
+    equation: str
+    source: str
+    check: str
+    complexity: int = 1
+    kind: ClassVar[Kind]
+
+
+class ConstitutiveEffect(AbstractEffect):
+    """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes."""
+
+    kind: ClassVar[Kind] = "constitutive"
+
+    def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
+        """Return what the effect adds to h, dimensionless, for one mode.
+
+        Parameters
+        ----------
+        values
+            Parameters in their order.
+        stress, rate
+            σ_k/G_k and λ_k γ̇, both (3, 3) or both (4,).
+        """
+        del values, rate
+        return jnp.zeros_like(stress)
+
+    def instantaneous_stress(
+        self, values: Float[Array, " p"], shear_rate: Float[Array, " n"]
+    ) -> Float[Array, " n"]:
+        """Return the shear stress in Pa that the effect adds beside the modes."""
+        del values
+        return jnp.zeros_like(shear_rate)
+
+
+@dataclass(frozen=True)
+class Record:
+    """A signal of one run on a grid of times.
+
+    Attributes
+    ----------
+    times
+        In s, shape (n,), increasing from the start of the flow.
+    shear_rate
+        Felt by the fluid, in 1/s, shape (n,).
+    stress
+        Shear stress in Pa, shape (n,).
+    clock_factor
+        Time on the instrument's clock is ``times / clock_factor``.
+    """
+
+    times: Float[Array, " n"]
+    shear_rate: Float[Array, " n"]
+    stress: Float[Array, " n"]
+    clock_factor: Float[Array, ""]
+
+    @property
+    def instrument_times(self) -> Float[Array, " n"]:
+        """Times on the instrument's clock, in s."""
+        return self.times / self.clock_factor
+
+
+class KinematicEffect(AbstractEffect):
+    """Changes the deformation that the fluid really felt."""
+
+    kind: ClassVar[Kind] = "kinematic"
+
+    @abstractmethod
+    def felt_rate(
+        self,
+        values: Float[Array, " p"],
+        instrument_times: Float[Array, " n"],
+        shear_rate: Float[Array, " n"],
+    ) -> Float[Array, " n"]:
+        """Return the shear rate felt, from the one that would be felt without this effect.
+
+        Parameters
+        ----------
+        values
+            Parameters in their order.
+        instrument_times
+            In s on the instrument's clock, increasing from the start of the flow; the fluid was at
+            rest before.
+        shear_rate
+            In 1/s, taken to be linear between times.
+        """
+
+
+class SignalEffect(AbstractEffect):
+    """Changes what was recorded of the stress."""
+
+    kind: ClassVar[Kind] = "signal"
+
+    @abstractmethod
+    def recorded_stress(self, values: Float[Array, " p"], record: Record) -> Float[Array, " n"]:
+        """Return the stress recorded, from the one that would be recorded without this effect."""

@@ -1,0 +1,32 @@
+"""Release of entanglements by the flow."""
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.algebra import identity_like, inner
+
+
+class ConvectiveConstraintRelease(ConstitutiveEffect):
+    """Adds c tr(σ·γ̇)[(1 + β)σ + I]   [Likhtman & Graham 2003, JNNFM 114, 1].
+
+    With c = 1/3 it is the Rolie–Poly law without stretch.
+    """
+
+    def extra_term(self, values, stress, rate):
+        """Return c tr(σ·γ̇)[(1 + β)σ + I]."""
+        release = (1.0 + values[1]) * stress + identity_like(stress)
+        return values[0] * inner(stress, rate) * release
+
+
+EFFECT = ConvectiveConstraintRelease(
+    name="convective_constraint_release",
+    parameters=(
+        EffectParameter("c", "c", low=0.0, high=1.0, first_trial=0.01),
+        EffectParameter("beta", r"\beta", low=0.0, high=1.0, first_trial=0.5),
+    ),
+    equation=(
+        r"h \mathrel{+}= c\,\mathrm{tr}(\sigma\cdot\dot\gamma)"
+        r"\left[(1+\beta)\,\sigma + I\right]"
+    ),
+    source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
+    check="A steady shear stress that does not fall with rate; step strain after start-up.",
+    complexity=3,
+)

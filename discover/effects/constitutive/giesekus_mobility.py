@@ -1,0 +1,22 @@
+"""Anisotropic mobility of the chains."""
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.algebra import square
+
+
+class GiesekusMobility(ConstitutiveEffect):
+    """Adds α σ·σ   [Giesekus 1982, JNNFM 11, 69]."""
+
+    def extra_term(self, values, stress, rate):
+        """Return α σ·σ."""
+        del rate
+        return values[0] * square(stress)
+
+
+EFFECT = GiesekusMobility(
+    name="giesekus_mobility",
+    parameters=(EffectParameter("alpha", r"\alpha", low=0.0, high=1.0, first_trial=0.01),),
+    equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
+    source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
+    check="A second normal stress difference N2/N1 near -alpha/2 at low rates.",
+)

@@ -1,0 +1,21 @@
+"""Slip of the network against the flow."""
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.algebra import anticommutator
+
+
+class NonAffineMotion(ConstitutiveEffect):
+    """Adds (ξ/2)(σ·γ̇ + γ̇·σ)   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    def extra_term(self, values, stress, rate):
+        """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
+        return 0.5 * values[0] * anticommutator(stress, rate)
+
+
+EFFECT = NonAffineMotion(
+    name="non_affine_motion",
+    parameters=(EffectParameter("xi", r"\xi", low=0.0, high=2.0, first_trial=0.01),),
+    equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",
+    source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
+    check="N2/N1 near -xi/2 at all rates, and a stress that oscillates in fast start-up.",
+)

@@ -1,0 +1,26 @@
+"""Loss of network junctions that grows exponentially with their stretch."""
+
+import jax.numpy as jnp
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.algebra import trace
+
+
+class ExponentialNetworkLoss(ConstitutiveEffect):
+    """Adds (exp(ε tr σ) − 1) σ   [Phan-Thien 1978, J. Rheol. 22, 259]."""
+
+    def extra_term(self, values, stress, rate):
+        """Return (exp(ε tr σ) − 1) σ."""
+        del rate
+        # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
+        return jnp.expm1(jnp.minimum(values[0] * trace(stress), 60.0)) * stress
+
+
+EFFECT = ExponentialNetworkLoss(
+    name="ptt_exponential",
+    parameters=(EffectParameter("epsilon", r"\varepsilon", low=0.0, high=10.0, first_trial=0.01),),
+    equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
+    source="Phan-Thien 1978, J. Rheol. 22, 259",
+    check="An extensional viscosity with a maximum; no second normal stress difference.",
+    complexity=2,
+)

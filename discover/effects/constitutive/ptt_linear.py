@@ -1,0 +1,22 @@
+"""Loss of network junctions in proportion to their stretch."""
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.algebra import trace
+
+
+class LinearNetworkLoss(ConstitutiveEffect):
+    """Adds ε tr(σ) σ   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
+
+    def extra_term(self, values, stress, rate):
+        """Return ε tr(σ) σ."""
+        del rate
+        return values[0] * trace(stress) * stress
+
+
+EFFECT = LinearNetworkLoss(
+    name="ptt_linear",
+    parameters=(EffectParameter("epsilon", r"\varepsilon", low=0.0, high=10.0, first_trial=0.01),),
+    equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
+    source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
+    check="No second normal stress difference; a bounded extensional viscosity.",
+)

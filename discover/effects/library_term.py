@@ -1,0 +1,52 @@
+"""Any term of the tensor library as an effect: what nobody has named yet can still be found."""
+
+from dataclasses import dataclass
+
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.library import build_library
+from tensor_library.terms import CandidateTerm
+
+# Terms that are an effect with a name already, or the base law's own
+_NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
+
+
+@dataclass(frozen=True)
+class LibraryTerm(ConstitutiveEffect):
+    """Adds c · term to the law, for one candidate term of the tensor library.
+
+    Attributes
+    ----------
+    term
+        The term.
+    """
+
+    term: CandidateTerm = None  # type: ignore[assignment]  # fields of the base have defaults
+
+    def extra_term(self, values, stress, rate):
+        """Return c · term."""
+        return values[0] * self.term.evaluate(stress, rate)
+
+
+def library_term(term: CandidateTerm) -> LibraryTerm:
+    """Return the effect that adds this term with a free coefficient."""
+    return LibraryTerm(
+        name=term.name,
+        parameters=(EffectParameter("coefficient", "c", first_trial=0.01),),
+        equation=rf"h \mathrel{{+}}= c\,{term.latex()}",
+        source="Smith 1971, Int. J. Eng. Sci. 9, 899: isotropic functions of two tensors",
+        check="A flow of another kind, such as step strain or extension.",
+        complexity=2 + term.complexity,
+        term=term,
+    )
+
+
+def library_effects(degree: int = 1) -> tuple[LibraryTerm, ...]:
+    """Return every term of the tensor library up to a degree that no named effect covers.
+
+    Parameters
+    ----------
+    degree
+        Highest degree of the invariant multipliers.
+    """
+    terms = build_library(degree=degree).terms
+    return tuple(library_term(term) for term in terms if term.name not in _NAMED)

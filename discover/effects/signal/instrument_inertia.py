@@ -1,0 +1,30 @@
+"""Torque that accelerates the tool."""
+
+import jax.numpy as jnp
+
+from discover.effects.base import EffectParameter, SignalEffect
+
+
+class InstrumentInertia(SignalEffect):
+    """The stress recorded contains the inertia of the moving tool."""
+
+    def recorded_stress(self, values, record):
+        """Return σ + I dγ̇/dt."""
+        step = jnp.diff(record.instrument_times)
+        slope = jnp.diff(record.shear_rate) / step
+        # slope at the points, from the intervals at both sides
+        inside = 0.5 * (slope[1:] + slope[:-1])
+        at_points = jnp.concatenate([slope[:1], inside, slope[-1:]])
+        # the rate is per second of material time; the tool moves on the instrument's clock
+        return record.stress + values[0] * record.clock_factor * at_points
+
+
+EFFECT = InstrumentInertia(
+    name="instrument_inertia",
+    parameters=(
+        EffectParameter("inertia", "I", "Pa s^2", low=0.0, scale="inertia", first_trial=0.01),
+    ),
+    equation=r"\sigma_\mathrm{rec} = \sigma + I\,\frac{d\dot\gamma}{dt}",
+    source="Krieger 1990, J. Rheol. 34, 471",
+    check="Oscillate a Newtonian oil over the same frequencies; compare the raw phase.",
+)

@@ -1,0 +1,20 @@
+"""A zero of the transducer that drifts."""
+
+from discover.effects.base import EffectParameter, SignalEffect
+
+
+class StressDrift(SignalEffect):
+    """A stress that grows linearly with instrument time is added to the one recorded."""
+
+    def recorded_stress(self, values, record):
+        """Return σ + d t."""
+        return record.stress + values[0] * record.instrument_times
+
+
+EFFECT = StressDrift(
+    name="stress_drift",
+    parameters=(EffectParameter("drift", "d", "Pa/s", scale="stress_rate", first_trial=0.01),),
+    equation=r"\sigma_\mathrm{rec} = \sigma + d\,t",
+    source="Macosko 1994, Rheology, ch. 8: transducer drift",
+    check="Record the stress of a sample at rest for as long as the longest run.",
+)

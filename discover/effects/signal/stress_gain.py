@@ -1,0 +1,20 @@
+"""A stress that is wrong by a factor."""
+
+from discover.effects.base import EffectParameter, SignalEffect
+
+
+class StressGain(SignalEffect):
+    """The stress recorded is (1 + g) times the true one."""
+
+    def recorded_stress(self, values, record):
+        """Return (1 + g) σ."""
+        return (1.0 + values[0]) * record.stress
+
+
+EFFECT = StressGain(
+    name="stress_gain",
+    parameters=(EffectParameter("gain_error", "g", low=-0.9, high=10.0, first_trial=0.01),),
+    equation=r"\sigma_\mathrm{rec} = (1 + g)\,\sigma",
+    source="Macosko 1994, Rheology, ch. 8: calibration and sample radius",
+    check="Calibrate the transducer with a dead weight; look at the filling of the gap.",
+)

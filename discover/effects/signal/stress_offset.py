@@ -1,0 +1,20 @@
+"""A zero of the transducer that is off."""
+
+from discover.effects.base import EffectParameter, SignalEffect
+
+
+class StressOffset(SignalEffect):
+    """A constant is added to the stress recorded."""
+
+    def recorded_stress(self, values, record):
+        """Return σ + σ₀."""
+        return record.stress + values[0]
+
+
+EFFECT = StressOffset(
+    name="stress_offset",
+    parameters=(EffectParameter("offset", r"\sigma_0", "Pa", scale="stress", first_trial=0.01),),
+    equation=r"\sigma_\mathrm{rec} = \sigma + \sigma_0",
+    source="Macosko 1994, Rheology, ch. 8: transducer zero",
+    check="Record the stress before the flow starts.",
+)

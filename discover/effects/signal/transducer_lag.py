@@ -1,0 +1,23 @@
+"""A transducer or filter that follows the stress with a lag."""
+
+from discover.effects.base import EffectParameter, SignalEffect
+from discover.effects.filters import first_order_lag
+
+
+class TransducerLag(SignalEffect):
+    """The stress recorded follows the true one with a first-order lag on the instrument's clock."""
+
+    def recorded_stress(self, values, record):
+        """Return the lagged stress: τ σ_rec' + σ_rec = σ, from rest."""
+        return first_order_lag(record.instrument_times, record.stress, values[0])
+
+
+EFFECT = TransducerLag(
+    name="transducer_lag",
+    parameters=(
+        EffectParameter("tau", r"\tau", "s", low=0.0, scale="sampling_time", first_trial=0.5),
+    ),
+    equation=r"\tau\,\frac{d\sigma_\mathrm{rec}}{dt} + \sigma_\mathrm{rec} = \sigma",
+    source="Mackay & Halley 1991, J. Rheol. 35, 1609: response of force transducers",
+    check="Look up the filter of the transducer; strike it and record the response.",
+)

@@ -1,0 +1,144 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.effects import (
+    ConstitutiveEffect,
+    KinematicEffect,
+    Record,
+    SignalEffect,
+    library_effects,
+    make_effect,
+    named_effects,
+)
+from discover.effects.filters import first_order_lag
+from discover.errors import InputError
+from discover.laws import LAWS
+from tensor_library.algebra import from_shear
+
+NAMED = list(named_effects().values())
+STRESS = jnp.array([1.3, -0.2, 0.1, 0.7])
+RATE = jnp.array([0.0, 0.0, 0.0, 1.5])
+TIMES = jnp.linspace(0.0, 4.0, 81)
+SIGNAL = jnp.sin(TIMES) + 0.3
+
+
+def values_of(effect, amplitude):
+    return jnp.array([amplitude, *(p.first_trial for p in effect.parameters[1:])])
+
+
+def response(effect, amplitude):
+    """Return all that an effect can change, as one vector."""
+    values = values_of(effect, amplitude)
+    if isinstance(effect, ConstitutiveEffect):
+        return jnp.concatenate(
+            [
+                effect.extra_term(values, STRESS, RATE),
+                effect.instantaneous_stress(values, jnp.array([2.0])),
+            ]
+        )
+    if isinstance(effect, KinematicEffect):
+        return effect.felt_rate(values, TIMES, SIGNAL) - SIGNAL
+    assert isinstance(effect, SignalEffect)
+    return effect.recorded_stress(values, record()) - SIGNAL
+
+
+def record(clock_factor=1.0):
+    return Record(TIMES, jnp.cos(TIMES), SIGNAL, jnp.asarray(clock_factor))
+
+
+@pytest.mark.parametrize("effect", [*NAMED, *library_effects(degree=0)], ids=lambda e: e.name)
+def test_an_effect_of_zero_amplitude_changes_nothing_and_of_another_something(effect):
+    np.testing.assert_array_equal(response(effect, 0.0), 0.0)
+    assert np.max(np.abs(response(effect, 0.3))) > 1e-6
+
+
+@pytest.mark.parametrize("effect", NAMED, ids=lambda e: e.name)
+def test_an_effect_says_where_it_comes_from_and_how_to_confirm_it(effect):
+    assert effect.source
+    assert effect.check
+    assert effect.equation
+    assert effect.parameters[0].low <= 0.0 <= effect.parameters[0].high
+
+
+@pytest.mark.parametrize(
+    "effect", [e for e in NAMED if e.kind == "constitutive"], ids=lambda e: e.name
+)
+def test_the_shear_path_of_a_constitutive_effect_agrees_with_full_tensors(effect):
+    values = values_of(effect, 0.3)
+    full = effect.extra_term(values, from_shear(STRESS), from_shear(RATE))
+    shear = effect.extra_term(values, STRESS, RATE)
+    np.testing.assert_allclose(full, from_shear(shear), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("giesekus_mobility", "giesekus"),
+        ("non_affine_motion", "johnson_segalman"),
+        ("ptt_linear", "ptt_linear"),
+        ("ptt_exponential", "ptt_exponential"),
+    ],
+)
+def test_an_effect_on_maxwell_is_the_law_of_its_name(name, law):
+    added = make_effect(name).extra_term(jnp.array([0.3]), STRESS, RATE)
+    np.testing.assert_allclose(added, LAWS[law].build(0.3).extra_term(STRESS, RATE), rtol=1e-14)
+
+
+def test_full_constraint_release_keeps_the_trace_of_the_conformation():
+    # Rolie-Poly without stretch: tr A = 3 + tr(sigma) must not change in flow
+    stress = jnp.array([0.9, -0.4, -0.5, 0.7])
+    term = make_effect("convective_constraint_release").extra_term(
+        jnp.array([1 / 3, 0.4]), stress, RATE
+    )
+    assert float(jnp.sum(stress[:3])) == pytest.approx(0.0, abs=1e-15)
+    growth = 2.0 * RATE[3] * stress[3]
+    assert float(jnp.sum(term[:3])) == pytest.approx(float(growth), rel=1e-12)
+
+
+def test_a_lag_answers_a_step_exponentially_and_a_ramp_exactly():
+    lagged = first_order_lag(TIMES, jnp.ones_like(TIMES), jnp.asarray(0.7))
+    np.testing.assert_allclose(lagged, 1 - jnp.exp(-TIMES / 0.7), atol=1e-13)
+    ramp = first_order_lag(TIMES, TIMES, jnp.asarray(0.7))
+    np.testing.assert_allclose(ramp, TIMES - 0.7 * (1 - jnp.exp(-TIMES / 0.7)), atol=1e-13)
+
+
+def test_a_lag_much_shorter_than_the_samples_leaves_the_signal_alone_and_stays_differentiable():
+    lagged = first_order_lag(TIMES, SIGNAL, jnp.asarray(1e-8))
+    np.testing.assert_allclose(lagged[1:], SIGNAL[1:], atol=1e-6)
+    slope = jax.jacfwd(lambda tau: first_order_lag(TIMES, SIGNAL, tau))(jnp.asarray(0.0))
+    assert np.all(np.isfinite(slope))
+
+
+def test_signal_effects_run_on_the_clock_of_the_instrument():
+    slow, fast = record(1.0), record(10.0)
+    drift = make_effect("stress_drift")
+    at_1 = drift.recorded_stress(jnp.array([2.0]), slow) - SIGNAL
+    at_10 = drift.recorded_stress(jnp.array([2.0]), fast) - SIGNAL
+    np.testing.assert_allclose(at_1, 10.0 * at_10, atol=1e-12)
+
+
+def test_a_delay_shifts_the_record():
+    delayed = make_effect("time_delay").recorded_stress(jnp.array([0.05]), record())
+    np.testing.assert_allclose(delayed[1:], SIGNAL[:-1], atol=1e-12)
+    assert float(delayed[0]) == 0.0
+
+
+def test_inertia_adds_the_slope_of_the_rate():
+    added = make_effect("instrument_inertia").recorded_stress(jnp.array([3.0]), record()) - SIGNAL
+    # central differences of step 0.05: error below h^2/6
+    np.testing.assert_allclose(added[1:-1], -3.0 * jnp.sin(TIMES[1:-1]), atol=3.0 * 0.05**2)
+
+
+def test_any_library_term_is_an_effect_and_an_unknown_name_is_refused():
+    term = make_effect("tr(sigma)*sigma.sigma")
+    assert term.kind == "constitutive"
+    with pytest.raises(InputError, match="giesekus_mobility"):
+        make_effect("gremlins")
+
+
+def test_no_library_term_repeats_a_named_effect():
+    names = {effect.name for effect in library_effects()}
+    assert names.isdisjoint({"sigma.sigma", "tr(sigma)*sigma", "sigma.gammadot+gammadot.sigma"})
+    assert "tr(sigma)*gammadot" in names
