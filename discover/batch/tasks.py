@@ -62,7 +62,7 @@ def run_compare(
     if folder.complete and page.is_file() and data.is_file():
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
-    from discover.comparison.compare import compare
+    from discover.comparison.run_comparison import compare
     from discover.report.comparison_report import write_comparison
     from discover.report.wording import comparison_verdict
 

@@ -20,7 +20,7 @@ from discover.study.build import StudyData
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""
 
-Stresses = Mapping[str, Float[np.ndarray, " n"]]
+Stresses = Mapping[str, Float[np.ndarray, " _"]]
 """Some of `QUANTITIES`, each of shape (n,)."""
 
 HIGH_DEBORAH_AMPLITUDE = 3.0
@@ -170,7 +170,7 @@ def _exactly(truth: Fluid, protocol: ShearProtocol, times: np.ndarray) -> dict[s
 
 def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
     changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
-    return bool(np.any(np.asarray(protocol.amplitudes))) or changes >= 3
+    return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
 
 
 def stresses(stress: ShearStress) -> dict[str, np.ndarray]:

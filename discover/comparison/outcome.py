@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Real
 
 from discover.comparison.flows import Flow, Stresses, predict
 from discover.laws.base import AbstractConstitutiveLaw
@@ -41,7 +42,7 @@ class LearnerOutcome:
     learner: str
     terms: tuple[RecoveredTerm, ...]
     train_seconds: float
-    loss_history: tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    loss_history: tuple[Real[np.ndarray, " m"], Real[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
@@ -124,8 +125,8 @@ def law_of_terms(
         for name, default in zip(library.inner_names, library.inner_default, strict=True)
     ]
     return LibraryExpansion(
-        np.array([c for _, c in pairs], dtype=float),  # pyright: ignore[reportArgumentType]
-        np.array(values, dtype=float),  # pyright: ignore[reportArgumentType]
+        jnp.asarray([c for _, c in pairs], float),
+        jnp.asarray(values, float),
         library,
         linear_relaxation,
         base,

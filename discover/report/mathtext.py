@@ -6,6 +6,7 @@ import io
 from discover.report.plots.style import INK, Picture, plt
 
 _REPLACEMENTS = (
+    (r"\mathrel{+}=", r"\,+\!=\,"),
     (r"\operatorname{tr}", r"\mathrm{tr}\,"),
     (r"\operatorname", r"\mathrm"),
     (r"\tfrac", r"\frac"),

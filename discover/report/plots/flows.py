@@ -66,9 +66,10 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
         return picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_seen(comparison, flow)} Left, stresses against time; beyond the "
-            "shaded times the prediction runs past the length of the training series. Right, the same "
-            "against the shear rate. Curves of the known part alone may leave the frame.",
+            f"{flow.title}: {_seen(comparison, flow)} "
+            "Left, stresses against time; beyond the shaded times the prediction runs past the "
+            "length of the training series. Right, the same against the shear rate. "
+            "Curves of the known part alone may leave the frame.",
         )
 
 

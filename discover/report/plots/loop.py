@@ -23,9 +23,11 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2))) or 1.0
 
 
-def _spans_decades(times: np.ndarray) -> bool:
-    positive = times[times > 0]
-    return positive.size > 2 and bool(positive[-1] > 30 * positive[0])
+def _is_start_up(record: RunRecord) -> bool:
+    """Whether log time is the natural axis: a constant rate, sampled over decades."""
+    positive = record.time[record.time > 0]
+    spans = positive.size > 2 and positive[-1] > 30 * positive[0]
+    return bool(spans and np.ptp(record.shear_rate) <= 1e-6 * np.max(np.abs(record.shear_rate)))
 
 
 def runs_picture(result: LoopResult) -> Picture:
@@ -56,7 +58,7 @@ def runs_picture(result: LoopResult) -> Picture:
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
             margin = 0.05 * (high - low) or 1.0
             panel.set_ylim(low - margin, high + margin)
-            if _spans_decades(record.time):
+            if _is_start_up(record):
                 panel.set_xscale("log")
             panel.set_title(_short(record), fontsize=8)
         for panel in axes[-1]:
@@ -92,11 +94,8 @@ def residual_picture(result: LoopResult) -> Picture:
                 axes[row, 0].plot(record.time, relative, **style)
                 axes[row, 1].plot(record.strain, relative, **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
-            for panel, values, label in (
-                (axes[row, 0], [r.time for r in result.records], "time (s)"),
-                (axes[row, 1], [np.abs(r.strain) for r in result.records], "strain"),
-            ):
-                if any(_spans_decades(v) for v in values) and all(np.all(v >= 0) for v in values):
+            for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
+                if all(_is_start_up(record) for record in result.records):
                     panel.set_xscale("log")
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
@@ -129,8 +128,8 @@ def waterfall_picture(result: LoopResult) -> Picture:
             panel.bar_label(bars, [f"{h:.2g} %" for h in heights], fontsize=8, padding=2)
         panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
         panel.set_yscale("log")
-        low, high = panel.get_ylim()
-        panel.set_ylim(low, high * 1.6)
+        heights = [100.0 * value for _, _, values, _ in series for value in values]
+        panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
         panel.set_xticks(positions, labels)
         panel.set_ylabel("relative error (%)")
         legend_above(drawing, axes)
@@ -147,7 +146,7 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
     rankings = [ranking for ranking in result.rankings if ranking]
     if not rankings:
         return None
-    with figure(1, len(rankings), width=4.2 * len(rankings) + 1.0, height=3.4) as (drawing, axes):
+    with figure(1, len(rankings), width=10.0, height=3.0) as (drawing, axes):
         for number, (panel, ranking) in enumerate(zip(axes[0], rankings, strict=True)):
             best = ranking[:shown][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None

@@ -1,7 +1,6 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from collections.abc import Callable
 
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.flows import Flow, comparison_flows, predict
@@ -12,26 +11,15 @@ from discover.comparison.truth import TrueTerm, true_terms
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
+from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
-
-
-class Store(Protocol):
-    """Where finished parts are kept; `discover.study.RunFolder` is one."""
-
-    def load(self, part: str) -> dict[str, Any] | None:
-        """Return a finished part, or None."""
-        ...
-
-    def save(self, part: str, content: Mapping[str, Any]) -> None:
-        """Keep a finished part."""
-        ...
 
 
 def compare(
     study: Study,
     seed: int | None = None,
     progress: Progress = silent,
-    store: Store | None = None,
+    store: RunFolder | None = None,
 ) -> Comparison:
     """Run a study's learners on identical data and look at what each found.
 
@@ -116,7 +104,7 @@ def _outcome(
     flows: list[Flow],
     seed: int,
     progress: Callable[[str, float], None],
-    store: Store | None,
+    store: RunFolder | None,
 ) -> LearnerOutcome:
     kept = None if store is None else store.load(part)
     if kept is not None:
@@ -154,7 +142,7 @@ def _sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
     return studies
 
 
-def _distil(study: Study, data: StudyData, store: Store | None, progress: Progress):
+def _distil(study: Study, data: StudyData, store: RunFolder | None, progress: Progress):
     if not study.compare.distillation:
         return []
     if data.truth is None or study.data.synthetic is None:

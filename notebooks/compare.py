@@ -1,0 +1,84 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Two learners on identical data
+#
+# Eight oscillatory runs on a Giesekus fluid, shear stress only, with 1 % noise. The learners know
+# the upper convected Maxwell part and look for what is missing. Then we ask each for the normal
+# stresses, which nobody measured, in a flow that neither saw.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from discover.precision import enable_x64
+
+enable_x64()
+
+from discover.learners.tbnn_ude import TBNNUDE
+from discover.learners.tensor_sindy import TensorSINDy
+from discover.protocols import start_up
+from discover.simulate import simulate, synthetic_dataset
+
+data = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+[run.name for run in data]
+
+# %% [markdown]
+# ## Sparse regression
+#
+# The candidate terms are the eight tensors of the integrity basis with constant coefficients.
+
+# %%
+sparse = TensorSINDy(max_terms=2).fit(data.runs)
+for term in sparse.terms_:
+    print(f"{term.coefficient:.4f} {term.term}   95 % interval {term.ci95}")
+print(sparse.result_.message)
+
+# %% [markdown]
+# ## A neural network inside the differential equation
+#
+# The quick setting: fewer steps than the default.
+
+# %%
+network = TBNNUDE(quick=True).fit(data.runs)
+for term in network.terms_:
+    print(f"{term.coefficient:.4f} {term.term}")
+print(network.result_.message)
+
+# %% [markdown]
+# ## Start-up, which neither saw
+#
+# N2 is the choice of the simplest law that fits: shear stress alone does not determine it.
+
+# %%
+times = np.linspace(0.0, 10.0, 101)
+fluids = {"truth": data.truth, "sparse": sparse.fluid_, "network": network.fluid_}
+stresses = {name: simulate(fluid, start_up(2.0), times) for name, fluid in fluids.items()}
+figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
+for (name, s), line in zip(stresses.items(), ("-", "--", ":"), strict=True):
+    axes[0].plot(times, s.shear_stress, line, label=name)
+    axes[1].plot(times, s.first_normal_stress_difference, line)
+    axes[2].plot(times, s.second_normal_stress_difference, line)
+for axis, label in zip(axes, ("σ12 / G", "N1 / G", "N2 / G"), strict=True):
+    axis.set(xlabel="t / λ", ylabel=label)
+figure.legend(loc="outside upper center", ncols=3)
+plt.show()
+
+# %%
+truth = stresses["truth"]
+for name in ("sparse", "network"):
+    difference = stresses[name].components - truth.components
+    print(
+        f"{name}: relative error of all stresses "
+        f"{np.linalg.norm(difference) / np.linalg.norm(truth.components):.2%}"
+    )

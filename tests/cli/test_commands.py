@@ -1,0 +1,232 @@
+"""The command line: exit codes, one clear message, resuming, JSON."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.learners.result import LearnerResult, RecoveredTerm
+
+STUDY = """
+[data]
+synthetic = { law = "giesekus", parameters = { alpha = 0.2 }, noise = 0.01, samples = 21 }
+[compare]
+library = { degree = 0 }
+high_deborah = [1.5]
+"""
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def trained(monkeypatch):
+    """Learners that know the answer; the list says who was asked."""
+    from discover.laws import Fluid, make_law
+
+    calls = []
+
+    def train(learner, study, model, runs, seed=0, progress=None):
+        calls.append(learner)
+        law = make_law("giesekus", {"alpha": 0.2})
+        history = (np.arange(1, 3), np.array([1.0, 0.1]))
+        result = LearnerResult(learner, law, (RecoveredTerm("sigma.sigma", 0.2),), 1.0, history)
+        return result, Fluid.dimensionless(law)
+
+    monkeypatch.setattr("discover.comparison.run_comparison.train", train)
+    return calls
+
+
+def data_folder(path, **columns):
+    path.mkdir(parents=True)
+    (path / "runs.csv").write_text("file\na.csv\n")
+    t = np.linspace(0.0, 2.0, 12)
+    table = {"time_s": t, "shear_rate_1_s": np.ones(12), "stress_Pa": 1.0 - np.exp(-t), **columns}
+    rows = [
+        ",".join(table),
+        *(",".join(map(str, row)) for row in zip(*table.values(), strict=True)),
+    ]
+    (path / "a.csv").write_text("\n".join(rows))
+    return path
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys\n"
+        "from discover.cli import main\n"
+        "sys.argv = ['discover', '--help']\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        "heavy = {'jax', 'pysindy', 'matplotlib', 'numpy', 'pydantic', 'dask'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    for command in ("demo", "compare", "close-loop", "batch", "data", "distil"):
+        assert command in done.stdout
+
+
+def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained):
+    study, out = tmp_path / "s.toml", tmp_path / "out"
+    study.write_text(STUDY)
+    first = invoke("compare", study, "--out", out)
+    assert first.exit_code == 0, first.output
+    for name in ("report.html", "comparison.json", "equations.tex", "figures/loss.svg"):
+        assert (out / name).is_file()
+    assert str(out / "report.html") in first.output.replace("\n", "")
+    again = invoke("compare", study, "--out", out)
+    assert again.exit_code == 0
+    assert "complete; use --overwrite" in again.output
+    assert trained == ["tensor_sindy", "tbnn_ude"]
+    before = (out / "comparison.json").read_bytes()
+    fresh = invoke("compare", study, "--out", out, "--overwrite", "--json")
+    assert len(trained) == 4
+    assert json.loads(fresh.stdout) == json.loads(before)
+    other = invoke("compare", study, "--out", out, "--seed", "7")
+    assert other.exit_code == 2
+    assert "--overwrite" in other.stderr
+
+
+def test_quiet_says_nothing(tmp_path, trained):
+    (tmp_path / "s.toml").write_text(STUDY)
+    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out", "--quiet")
+    assert (result.exit_code, result.output) == (0, "")
+
+
+def test_an_interrupted_run_says_so_and_goes_on(tmp_path, monkeypatch, trained):
+    from discover.comparison import run_comparison as module
+
+    known = module.train
+
+    def interrupted(learner, *args, **kwargs):
+        if learner == "tbnn_ude":
+            raise KeyboardInterrupt
+        return known(learner, *args, **kwargs)
+
+    (tmp_path / "s.toml").write_text(STUDY)
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "train", interrupted)
+        result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "interrupted; run again to resume" in result.stderr
+    assert invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").exit_code == 0
+    assert trained == ["tensor_sindy", "tbnn_ude"]
+
+
+def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypatch):
+    def broken(*args, **kwargs):
+        raise RuntimeError("it broke\nin two lines")
+
+    monkeypatch.setattr("discover.comparison.run_comparison.train", broken)
+    (tmp_path / "s.toml").write_text(STUDY)
+    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    assert result.stderr.strip().count("\n") == 0
+    assert "RuntimeError: it broke" in result.stderr
+
+
+BAD_STUDIES = {
+    "not_toml": ("[data\n", "not valid TOML"),
+    "unknown_key": (STUDY + "\n[compar]\n", "'compar'"),
+    "wrong_law": (STUDY.replace('"giesekus"', '"gieskus"'), "gieskus"),
+    "wrong_parameter": (STUDY.replace("alpha", "beta"), "'beta'"),
+    "parameter_out_of_range": (STUDY.replace("0.2", "3.0"), "'alpha'"),
+    "nan_noise": (STUDY.replace("0.01", "nan"), "noise"),
+    "no_folder": ('[data]\nfolder = "nowhere"\n', "'nowhere'"),
+    "unknown_run": (STUDY.replace("[compare]", 'held_out = ["x"]\n[compare]'), "'x'"),
+    "no_sweep_data": (STUDY + '\n[model]\nmodes = "lve"\n', "lve.csv"),
+    "known_relaxation": (
+        STUDY + '\n[model]\nlaw = "giesekus"\nparameters = {alpha = 0.1}\nknown_relaxation = false',
+        "known_relaxation",
+    ),
+}
+
+
+@pytest.mark.parametrize("command", ["compare", "close-loop"])
+@pytest.mark.parametrize("case", BAD_STUDIES)
+def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, case):
+    text, word = BAD_STUDIES[case]
+    (tmp_path / "bad.toml").write_text(text)
+    result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 2, result.output
+    assert word in result.stderr
+    assert result.stderr.strip().count("\n") == 0
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize("command", ["compare", "close-loop"])
+def test_a_missing_study_file_is_the_users_mistake(tmp_path, command):
+    result = invoke(command, tmp_path / "none.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "none.toml" in result.stderr
+
+
+def test_nan_in_a_run_is_named_with_its_file(tmp_path, monkeypatch):
+    stress = np.ones(12)
+    stress[4] = np.nan
+    data_folder(tmp_path / "d", stress_Pa=stress)
+    (tmp_path / "s.toml").write_text('[data]\nfolder = "d"\n')
+    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "a.csv" in result.stderr
+    assert not (tmp_path / "out" / "report.html").exists()
+
+
+def test_data_commands(tmp_path, monkeypatch):
+    data_folder(tmp_path / "mine")
+    monkeypatch.setenv("DISCOVER_DATA", str(tmp_path))
+    assert "mine" in invoke("data", "list").output
+    shown = invoke("data", "show", "mine")
+    assert shown.exit_code == 0
+    assert "a.csv" in shown.output
+    assert json.loads(invoke("data", "show", "mine", "--json").stdout)["runs"][0]["samples"] == 12
+    assert invoke("data", "check", "mine").exit_code == 0
+    bad = data_folder(tmp_path / "bad", time_s=np.zeros(12))
+    result = invoke("data", "check", bad)
+    assert result.exit_code == 2
+    assert "a.csv" in result.stderr
+    monkeypatch.delenv("DISCOVER_DATA")
+    assert invoke("data", "list").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--teacher", "giesekus:alpha=0.2"],
+        ["--teacher", "giesekus:alpha", "--student", "ucm"],
+        ["--teacher", "nobody:a=1", "--student", "ucm"],
+        ["--teacher", "giesekus:alpha=0.2", "--student", "nobody"],
+    ],
+)
+def test_distil_refuses_what_it_cannot_read(arguments):
+    result = invoke("distil", *arguments)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("discover: ")
+
+
+def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained):
+    (tmp_path / "good.toml").write_text(STUDY)
+    (tmp_path / "bad.toml").write_text("[data]\n")
+    studies = (tmp_path / "bad.toml", tmp_path / "good.toml")
+    result = invoke("batch", *studies, "--out", tmp_path / "b")
+    assert result.exit_code == 2
+    table = json.loads((tmp_path / "b" / "batch.json").read_text())["studies"]
+    assert [row["status"] for row in table] == ["failed", "done"]
+    assert "bad.toml" in table[0]["text"]
+    page = (tmp_path / "b" / "index.html").read_text()
+    assert "good/report.html" in page
+    assert "bad/report.html" not in page
+    again = invoke("batch", tmp_path / "good.toml", "--out", tmp_path / "b", "--json")
+    assert json.loads(again.stdout)["studies"][0]["status"] == "complete"
+    assert len(trained) == 2
+
+
+def test_a_batch_refuses_two_studies_for_one_folder(tmp_path):
+    (tmp_path / "a.toml").write_text(STUDY)
+    twice = (tmp_path / "a.toml", tmp_path / "a.toml")
+    assert invoke("batch", *twice, "--out", tmp_path / "b").exit_code == 2

@@ -1,0 +1,183 @@
+"""Comparing learners: errors, what stays open, what is kept, what JSON holds."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.comparison import LearnerOutcome, compare, relative_errors
+from discover.comparison.comparison import Comparison
+from discover.comparison.flows import comparison_flows
+from discover.comparison.identifiability import find_rivals, undetermined_quantities
+from discover.comparison.outcome import law_of_terms
+from discover.comparison.truth import true_terms
+from discover.errors import InputError
+from discover.laws import Fluid, make_law
+from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.study import RunFolder, parse_study
+from discover.study.build import declared_model, load_study_data
+
+
+def fake_study(**compare_options):
+    return parse_study(
+        {
+            "data": {
+                "synthetic": {
+                    "law": "giesekus",
+                    "parameters": {"alpha": 0.2},
+                    "noise": 0.01,
+                    "samples": 21,
+                }
+            },
+            "compare": {"high_deborah": [1.5], "library": {"degree": 0}, **compare_options},
+        }
+    )
+
+
+def trained(learner, study, model, runs, seed=0, progress=None):
+    mobility = 0.2 if learner == "tensor_sindy" else 0.22
+    law = make_law("giesekus", {"alpha": mobility})
+    term = RecoveredTerm("sigma.sigma", mobility, 0.19, (0.19, 0.21))
+    history = (np.arange(1, 3), np.array([1.0, 0.1]))
+    details = {"rivals": [], "bad": float("nan")}
+    result = LearnerResult(learner, law, (term,), 1.5, history, details, "fake")
+    return result, Fluid.dimensionless(law)
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("discover.comparison.run_comparison.train", trained)
+        return compare(fake_study())
+
+
+def test_a_perfect_learner_has_no_error_and_a_wrong_one_has(comparison):
+    for flow in comparison.flows_of("test"):
+        assert max(comparison.errors("tensor_sindy", flow).values()) < 1e-6  # solver tolerance
+        assert comparison.errors("tbnn_ude", flow)["N1"] > 0.01
+        assert comparison.errors("before", flow)["sigma12"] > 0.3
+
+
+def test_json_is_the_contract(comparison):
+    content = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert set(content["learners"]) == {"tensor_sindy", "tbnn_ude"}
+    learner = content["learners"]["tensor_sindy"]
+    assert {"terms", "errors", "train_seconds"} <= set(learner)
+    assert set(learner["errors"]) == {"laos_3_1.5", "laos_2_1", "startup_2"}
+    assert set(learner["errors"]["laos_2_1"]) == {"sigma12", "N1", "N2"}
+    term = learner["terms"][0]
+    assert term["term"] == "sigma.sigma"
+    assert term["ci95"] == [0.19, 0.21]
+    assert term["coefficient_penalised"] == 0.19
+    assert "N2" in content["undetermined"]
+    for rival in content["rivals"]:
+        assert {"terms", "errors_to_chosen", "separated_by"} <= set(rival)
+
+
+def test_n2_error_is_relative_to_n1():
+    reference = {"sigma12": np.ones(4), "N1": 2.0 * np.ones(4), "N2": np.zeros(4)}
+    prediction = {"sigma12": 1.1 * np.ones(4), "N1": 2.0 * np.ones(4), "N2": 0.2 * np.ones(4)}
+    errors = relative_errors(prediction, reference)
+    assert errors["sigma12"] == pytest.approx(0.1)
+    assert errors["N1"] == 0.0
+    assert errors["N2"] == pytest.approx(0.1)
+
+
+def test_what_was_not_measured_has_no_error():
+    errors = relative_errors({"sigma12": np.ones(3), "N1": np.ones(3), "N2": np.ones(3)},
+                             {"sigma12": np.ones(3)})  # fmt: skip
+    assert errors == {"sigma12": 0.0, "N1": None, "N2": None}
+    assert relative_errors(None, {"sigma12": np.ones(3)})["sigma12"] is None
+
+
+def test_an_outcome_comes_back_from_its_state_unchanged(comparison):
+    outcome = comparison.outcomes["tbnn_ude"]
+    state = json.loads(json.dumps(outcome.to_state()))
+    again = LearnerOutcome.from_state(state)
+    assert again.terms == outcome.terms
+    for key, prediction in outcome.predictions.items():
+        assert np.array_equal(again.predictions[key]["N1"], prediction["N1"])
+
+
+def test_a_finished_learner_is_not_trained_again(tmp_path, monkeypatch):
+    calls = []
+
+    def counting(learner, *args, **kwargs):
+        calls.append(learner)
+        if learner == "tbnn_ude" and len(calls) == 2:
+            raise KeyboardInterrupt
+        return trained(learner, *args, **kwargs)
+
+    monkeypatch.setattr("discover.comparison.run_comparison.train", counting)
+    study = fake_study()
+    with pytest.raises(KeyboardInterrupt):
+        compare(study, store=RunFolder(tmp_path, "x"))
+    compare(study, store=RunFolder(tmp_path, "x"))
+    assert calls == ["tensor_sindy", "tbnn_ude", "tbnn_ude"]
+
+
+@pytest.fixture(scope="module")
+def slip_case():
+    study = parse_study(
+        {
+            "data": {
+                "synthetic": {"law": "johnson_segalman", "parameters": {"xi": 0.4}, "samples": 21}
+            }
+        }
+    )
+    data = load_study_data(study)
+    return declared_model(study, data.dataset), comparison_flows(data, ())
+
+
+def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
+    model, flows = slip_case
+    chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
+    rivals = find_rivals(chosen, [], model, flows)
+    twin = next(r for r in rivals if set(r.terms) == {"tr(sigma)*gammadot"})
+    assert twin.terms["tr(sigma)*gammadot"] == pytest.approx(0.32)  # ξ(1 − ξ/2) at ξ = 0.4
+    assert twin.errors_to_chosen["sigma12"] < 1e-6
+    assert twin.errors_to_chosen["N1"] < 1e-6
+    assert twin.separated_by["quantity"] == "N2"
+    statements = undetermined_quantities(flows, False, rivals)
+    assert [s.quantity for s in statements if s.undetermined] == ["N2"]
+
+
+def test_a_pair_on_33_is_no_rival_where_the_trace_feels_it(slip_case):
+    # negative control: with tr σ in the law, σ33 acts back on σ12
+    model, flows = slip_case
+    rivals = find_rivals([RecoveredTerm("tr(sigma)*sigma", 0.3)], [], model, flows)
+    assert rivals == []
+
+
+def test_true_terms_make_the_true_law():
+    parameters = {
+        "ucm": {},
+        "johnson_segalman": {"xi": 0.4},
+        "giesekus": {"alpha": 0.2},
+        "ptt_linear": {"epsilon": 0.3},
+        "ptt_exponential": {"epsilon": 0.3},
+    }
+    stress, rate = jnp.array([1.7, -0.2, 0.1, 0.6]), jnp.asarray(1.3)
+    for name, values in parameters.items():
+        wanted = make_law(name, values).stress_rate(stress, rate)
+        for known in (True, False):
+            terms = true_terms(name, values, known)
+            inner = {k: v for t in terms for k, v in t.inner.items()}
+            law = law_of_terms(
+                [t.term for t in terms], [t.coefficient for t in terms], inner, known
+            )
+            assert np.allclose(law.stress_rate(stress, rate), wanted, rtol=1e-12), name
+
+
+def test_free_parameters_are_refused_with_a_remedy():
+    content = fake_study().model_dump(exclude_none=True)
+    content["model"] = {"modulus_Pa": "fit"}
+    with pytest.raises(InputError, match="close-loop"):
+        compare(parse_study(content))
+
+
+def test_a_sweep_over_an_unknown_parameter_is_refused():
+    sweep = {"laws": ["ptt_linear"], "parameter": "alpha", "values": [0.1]}
+    with pytest.raises(InputError, match="'alpha'"):
+        compare(fake_study(sweep=sweep))

@@ -1,0 +1,182 @@
+"""Study files: what is accepted, and what the one error says."""
+
+import json
+
+import numpy as np
+import pytest
+
+from discover.errors import InputError
+from discover.study import RunFolder, fingerprint, parse_study, read_study
+from discover.study.atomic import write_text
+from discover.study.build import declared_model, load_study_data
+
+SYNTHETIC = {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 20}}
+
+
+def make_folder(path, n_runs=2):
+    path.mkdir()
+    rows = ["file"]
+    for i in range(n_runs):
+        t = np.linspace(0.0, 2.0, 15)
+        lines = ["time_s,shear_rate_1_s,stress_Pa"]
+        lines += [f"{a},{1.0 + i},{b}" for a, b in zip(t, 1 - np.exp(-t), strict=True)]
+        (path / f"r{i}.csv").write_text("\n".join(lines))
+        rows.append(f"r{i}.csv")
+    (path / "runs.csv").write_text("\n".join(rows))
+    return path
+
+
+def test_the_contract_example_is_accepted(tmp_path):
+    file = tmp_path / "s.toml"
+    file.write_text(
+        """
+[data]
+folder = "path"
+fit = ["a.csv", "b.csv"]
+held_out = ["c.csv"]
+clock_factor = "time_factor"
+[model]
+law = "ucm"
+modulus_Pa = 100.0
+relaxation_time_s = 1.0
+parameters = { }
+known_relaxation = true
+[loop]
+max_effects = 3
+strain = [0.02, 25]
+[compare]
+learners = ["tensor_sindy", "tbnn_ude"]
+library = { degree = 1, closed_forms = ["exp"] }
+test = "paper"
+"""
+    )
+    study = read_study(file)
+    assert study.loop.strain == (0.02, 25.0)
+    assert study.name == "s"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({}, ["'data' is missing"]),
+        ({"data": {}}, ["folder", "synthetic"]),
+        ({"data": SYNTHETIC, "dta": 1}, ["unknown key 'dta'", "data, model"]),
+        ({"data": {**SYNTHETIC, "fitt": []}}, ["data.fitt", "held_out"]),
+        ({"data": SYNTHETIC, "compare": {"library": {"degre": 1}}}, ["degre", "degree"]),
+        ({"data": SYNTHETIC, "model": {"law": "gieskus"}}, ["model.law", "giesekus"]),
+        ({"data": SYNTHETIC, "model": {"modulus_Pa": -1}}, ["modulus_Pa", "greater than 0", "-1"]),
+        ({"data": SYNTHETIC, "model": {"modulus_Pa": "ft"}}, ["modulus_Pa", "'fit'", "'ft'"]),
+        ({"data": {"folder": "a", "fit": "b"}}, ["data.fit", "list"]),
+        ({"data": SYNTHETIC, "loop": {"strain": [3, 1]}}, ["strain", "low < high"]),
+        ({"data": SYNTHETIC, "compare": {"learners": []}}, ["learner"]),
+        ({"data": {"folder": "a", "fit": ["x"], "held_out": ["x"]}}, ["'x'", "both"]),
+        ({"data": {"synthetic": {"law": "ucm", "noise": float("nan")}}}, ["noise"]),
+    ],
+)
+def test_a_wrong_study_is_one_error_that_names_the_key(content, words):
+    with pytest.raises(InputError) as error:
+        parse_study(content, "my.toml")
+    message = str(error.value)
+    assert message.startswith("my.toml: ")
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_files_that_are_no_study_are_refused(tmp_path):
+    for name, content in (("bad.toml", b"a = [1,"), ("bytes.toml", b"\xff\xfe\x00")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=name):
+            read_study(tmp_path / name)
+    for path in (tmp_path, tmp_path / "none.toml"):
+        with pytest.raises(InputError, match=path.name):
+            read_study(path)
+
+
+def test_held_out_runs_are_not_among_those_to_fit():
+    data = load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": ["laos_1_1"]}}))
+    assert data.held_out.names == ("laos_1_1",)
+    assert "laos_1_1" not in data.fit.names
+    assert len(data.fit) == 7
+
+
+def test_a_held_out_run_that_does_not_exist_is_an_input_error():
+    with pytest.raises(InputError, match="nothing"):
+        load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": ["nothing"]}}))
+
+
+def test_a_folder_is_found_beside_the_study_file(tmp_path, monkeypatch):
+    monkeypatch.delenv("DISCOVER_DATA", raising=False)
+    make_folder(tmp_path / "runs")
+    file = tmp_path / "s.toml"
+    file.write_text('[data]\nfolder = "runs"\n')
+    assert load_study_data(read_study(file)).fit.names == ("r0.csv", "r1.csv")
+
+
+def test_known_relaxation_false_leaves_an_elastic_law():
+    study = parse_study({"data": SYNTHETIC, "model": {"known_relaxation": False}})
+    model = declared_model(study, load_study_data(study).dataset)
+    assert not model.law.linear_relaxation
+
+
+def test_modes_without_a_sweep_are_an_input_error():
+    study = parse_study({"data": SYNTHETIC, "model": {"modes": "lve"}})
+    with pytest.raises(InputError, match=r"lve\.csv"):
+        declared_model(study, load_study_data(study).dataset)
+
+
+def test_the_fingerprint_changes_with_study_seed_and_data(tmp_path):
+    make_folder(tmp_path / "runs")
+    file = tmp_path / "s.toml"
+    file.write_text('[data]\nfolder = "runs"\n')
+    first = fingerprint(read_study(file), 1)
+    assert first == fingerprint(read_study(file), 1)
+    assert first != fingerprint(read_study(file), 2)
+    with (tmp_path / "runs" / "r0.csv").open("a") as stream:
+        stream.write("\n3.0,1.0,0.99")
+    assert first != fingerprint(read_study(file), 1)
+
+
+def test_a_run_folder_resumes_and_refuses_another_study(tmp_path):
+    folder = RunFolder(tmp_path / "out", "one")
+    folder.save("part", {"x": [0.1, 1e-300]})
+    again = RunFolder(tmp_path / "out", "one")
+    assert again.load("part") == {"x": [0.1, 1e-300]}
+    assert not again.complete
+    again.finish()
+    assert RunFolder(tmp_path / "out", "one").complete
+    with pytest.raises(InputError, match="--overwrite"):
+        RunFolder(tmp_path / "out", "two")
+    fresh = RunFolder(tmp_path / "out", "two", overwrite=True)
+    assert fresh.load("part") is None
+    assert not fresh.complete
+
+
+def test_overwrite_leaves_files_alone_that_are_not_ours(tmp_path):
+    (tmp_path / "thesis.txt").write_text("mine")
+    RunFolder(tmp_path, "one").save("part", {})
+    RunFolder(tmp_path, "one", overwrite=True)
+    assert (tmp_path / "thesis.txt").read_text() == "mine"
+
+
+def test_a_damaged_part_is_computed_again(tmp_path):
+    folder = RunFolder(tmp_path, "one")
+    folder.save("part", {"x": 1})
+    (tmp_path / "state" / "part.json").write_text(json.dumps({"x": 1})[:-2])
+    assert folder.load("part") is None
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
+    target = tmp_path / "a.json"
+    write_text(target, "old")
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        write_text(target, "new")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.json"]
+    assert target.read_text() == "old"
+
+
+def test_a_file_in_place_of_the_result_folder_is_an_input_error(tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(InputError, match="is a file"):
+        RunFolder(tmp_path / "out", "one")
