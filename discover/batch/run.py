@@ -205,7 +205,7 @@ def _run_on_cluster(
             raise InputError(f"No dask scheduler answers at {scheduler!r} ({error}).") from None
     else:
         cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+            n_workers=workers, threads_per_worker=1, dashboard_address=":0", host="127.0.0.1"
         )
         client = Client(cluster)
     try:

@@ -125,11 +125,11 @@ def law_of_terms(
         for name, default in zip(library.inner_names, library.inner_default, strict=True)
     ]
     return LibraryExpansion(
-        jnp.asarray([c for _, c in pairs], float),
-        jnp.asarray(values, float),
-        library,
-        linear_relaxation,
-        base,
+        coefficients=jnp.asarray([c for _, c in pairs], float),
+        inner=jnp.asarray(values, float),
+        library=library,
+        linear_relaxation=linear_relaxation,
+        base=base,
     )
 
 

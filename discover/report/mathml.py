@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from discover.learners.result import RecoveredTerm
 from tensor_library.terms import CandidateTerm, parse_term
 
-_SIGMA = '<mi mathvariant="bold-italic">σ</mi>'
+_SIGMA = '<mi mathvariant="normal" style="font-weight:bold">σ</mi>'
 # the combining dot sits well in every font, an accent over a letter only in mathematical ones
-_RATE = '<mi mathvariant="normal" style="font-weight:bold;font-style:italic">γ̇</mi>'
-_UNIT = '<mi mathvariant="bold-italic">I</mi>'
+_RATE = '<mi mathvariant="normal" style="font-weight:bold">γ̇</mi>'
+_UNIT = '<mi mathvariant="normal" style="font-weight:bold">I</mi>'
 _DOT = "<mo>·</mo>"
 _TRACE = '<mi mathvariant="normal">tr</mi><mo>&#x2061;</mo>'
 
@@ -93,7 +93,7 @@ def term_element(name: str, inner: dict[str, float] | None = None) -> str:
 
 def law_element(terms: Sequence[RecoveredTerm], linear_relaxation: bool) -> str:
     """Return the whole dimensionless law as a displayed `math` element."""
-    convected = f"<mover><mrow>{_SIGMA}</mrow><mo>▽</mo></mover>"
+    convected = f"<mover><mrow>{_SIGMA}</mrow><mo style="font-size:70%">▽</mo></mover>"
     right = f"<mo>=</mo>{_RATE}"
     if linear_relaxation:
         right += f"<mo>−</mo>{_SIGMA}"

@@ -120,8 +120,9 @@ def waterfall_picture(result: LoopResult) -> Picture:
         panel = axes[0, 0]
         positions = np.arange(len(labels))
         series = [("fitted runs", _FIT, [p.fit for p in pairs], -0.19)]
-        if all(p.held_out is not None for p in pairs):
-            series.append(("held-out runs", _HELD, [p.held_out for p in pairs], 0.19))
+        held_out = [p.held_out for p in pairs if p.held_out is not None]
+        if len(held_out) == len(pairs):
+            series.append(("held-out runs", _HELD, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)

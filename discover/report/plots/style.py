@@ -121,7 +121,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
     width, height
         Of the whole figure and of one row, in inches.
     """
-    with plt.rc_context(_SETTINGS):
+    with plt.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType]
         drawing, axes = plt.subplots(
             rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained"
         )
