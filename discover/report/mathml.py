@@ -93,7 +93,7 @@ def term_element(name: str, inner: dict[str, float] | None = None) -> str:
 
 def law_element(terms: Sequence[RecoveredTerm], linear_relaxation: bool) -> str:
     """Return the whole dimensionless law as a displayed `math` element."""
-    convected = f"<mover><mrow>{_SIGMA}</mrow><mo style="font-size:70%">▽</mo></mover>"
+    convected = f"<mover><mrow>{_SIGMA}</mrow><mo style='font-size:70%'>▽</mo></mover>"
     right = f"<mo>=</mo>{_RATE}"
     if linear_relaxation:
         right += f"<mo>−</mo>{_SIGMA}"
