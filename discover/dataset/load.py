@@ -194,7 +194,7 @@ def read_run(
     if rate is None:
         if strain is None:
             # said in the words of the commoner mistake
-            table.required(units.SHEAR_RATE)
+            strain = table.required(units.SHEAR_RATE)
         try:
             rate = differentiate(time, strain, rate_window)
         except InputError as error:

@@ -21,8 +21,8 @@ HISTORIES = {
 def test_johnson_segalman_has_a_twin_with_the_same_stress_and_n1_but_no_n2(slip, flow):
     times = np.linspace(0, 6, 31)
     library = tl.build_library(tensors=["gammadot"], degree=1, invariants=["tr(sigma)"])
-    coefficients = jnp.zeros(2).at[library.names.index("tr(sigma)*gammadot")].set(
-        slip * (1 - slip / 2)
+    coefficients = (
+        jnp.zeros(2).at[library.names.index("tr(sigma)*gammadot")].set(slip * (1 - slip / 2))
     )
     twin = LibraryExpansion(coefficients, jnp.zeros(0), library)
     a = simulate(Fluid.dimensionless(JohnsonSegalman(slip)), flow, times)

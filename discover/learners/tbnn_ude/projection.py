@@ -1,6 +1,7 @@
 """What a network says in symbols: its extra term projected on a library."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -85,9 +86,10 @@ def project(
             plain = [j for j, t in enumerate(library.terms) if not t.degree and t.form is None]
             return _misfit(design(trial)[:, sorted({*columns, *plain})], target, norm)
 
-        inner[i] = np.exp(
-            minimize_scalar(misfit_of, bounds=(np.log(low), np.log(high)), method="bounded").x
+        found: Any = minimize_scalar(
+            misfit_of, bounds=(np.log(low), np.log(high)), method="bounded"
         )
+        inner[i] = np.exp(found.x)
     matrix = design(inner)
     support: list[int] = []
     misfit = 1.0

@@ -6,6 +6,7 @@ via universal differential equations and differentiable physics"]
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -53,7 +54,7 @@ class PaperRecipe:
 def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> TensorBasisNetwork:
     """Return the network at the start of training."""
     law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
-    last = law.network.layers[-1]
+    last: Any = law.network.layers[-1]  # its bias is there: the network is made with one
     return eqx.tree_at(
         lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
         law,
