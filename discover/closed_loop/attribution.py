@@ -1,15 +1,16 @@
 """Score every effect by how well its signature, beyond what is fitted, explains the residual."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
 from discover.closed_loop.least_squares import Fit, evaluate
+from discover.effects import AbstractEffect
 
 ALIAS_COSINE = 0.99
-"""Signatures that agree to this cosine cannot be told apart by the data at hand."""
+"""Signatures that agree to this cosine are the same to first order."""
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
@@ -29,7 +30,7 @@ class CandidateScore:
     reduction
         Share of the squared residual removed by the best trial amplitude, others held.
     aliases
-        Candidates with the same signature.
+        Candidates whose refit the data cannot tell from this one's.
     error, left_out_error
         Mean relative error on the fitted runs, and on each run left out in turn, after a refit;
         None if it was not refitted.
@@ -53,13 +54,19 @@ class CandidateScore:
 
 @dataclass
 class Attribution:
-    """All candidates at one stage, the leading ones first."""
+    """All candidates at one stage: those worth a refit, and the rest."""
 
-    candidates: list[CandidateScore]
+    leading: list[CandidateScore]
+    rest: list[CandidateScore]
 
 
 def attribute(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str], leaders: int
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    active: Sequence[str],
+    leaders: int,
+    admitted: Callable[[AbstractEffect], bool] = lambda effect: True,
 ) -> Attribution:
     """Return every effect that is not yet in the model, scored and ranked.
 
@@ -77,10 +84,12 @@ def attribute(
     active
         Effects already in the model.
     leaders
-        How many leading candidates to return distinct: a candidate with the signature of one
-        above it joins its aliases.
+        How many candidates with signatures of their own lead, and how many more whose signature
+        one of those has already.
+    admitted
+        Which effects are candidates.
     """
-    waiting = [effect for effect in model.effects if effect.name not in active]
+    waiting = [e for e in model.effects if e.name not in active and admitted(e)]
     at = [model.slices[effect.name].start for effect in waiting]
     probes = []
     for position in at:
@@ -113,24 +122,19 @@ def attribute(
         range(len(waiting)),
         key=lambda i: (-round(candidates[i].reduction, 6), waiting[i].complexity, i),
     )
-    ranked: list[CandidateScore] = []
     heads: list[int] = []
+    twins: list[int] = []
     for i in order:
-        twin = next((h for h in heads if abs(signatures[h] @ signatures[i]) > ALIAS_COSINE), None)
-        if twin is None or len(heads) >= leaders:
-            heads.append(i)
-            ranked.append(candidates[i])
+        if candidates[i].reduction <= 0.0:
             continue
-        first, second = candidates[twin], candidates[i]
-        if waiting[i].complexity < waiting[twin].complexity:
-            # the simpler explanation goes first
-            ranked[ranked.index(first)] = second
-            heads[heads.index(twin)] = i
-            second.aliases = (first.effect, *first.aliases)
-            first.aliases = ()
-        else:
-            first.aliases = (*first.aliases, second.effect)
-    return Attribution(ranked)
+        twin = any(abs(signatures[h] @ signatures[i]) > ALIAS_COSINE for h in heads)
+        (twins if twin else heads).append(i)
+    # signatures that agree at zero may part at the amplitude that is there, so twins are refitted
+    # too; but they must not crowd out candidates of another kind
+    twins.sort(key=lambda i: (waiting[i].complexity, -candidates[i].reduction))
+    leading = heads[:leaders] + twins[:leaders]
+    rest = [i for i in order if i not in leading]
+    return Attribution([candidates[i] for i in leading], [candidates[i] for i in rest])
 
 
 def _try_amplitudes(model, batch, fit, candidates, at):

@@ -19,6 +19,10 @@ from tensor_library.algebra import Symmetric
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""
 
+INDISTINGUISHABLE = 6.0
+"""Below this difference of the criterion two effects are aliases   [Kass & Raftery 1995, JASA 90,
+773: from 6 on the evidence is strong]."""
+
 
 class AugmentedLaw(AbstractConstitutiveLaw):
     """A law with the extra terms of constitutive effects.
@@ -65,21 +69,29 @@ class Choice:
     left_out: Float[np.ndarray, " runs"]
 
 
-def evidence(
-    before: Fit, after: Fit, weight: Float[np.ndarray, "runs n"], n_candidates: int
-) -> float:
+def evidence(before: Fit, after: Fit, effective_samples: float, n_candidates: int) -> float:
     """Return by how much adding parameters lowers the information criterion.
 
     The Bayesian criterion on the number of independent samples that the remaining residual is
     worth, with a price for having chosen among `n_candidates`   [Schwarz 1978, Ann. Statist. 6,
     461; Chen & Chen 2008, Biometrika 95, 759 for the price].
+
+    Parameters
+    ----------
+    before, after
+        Fits without and with the effect.
+    effective_samples
+        One number for all candidates that are compared: counted on each one's own residual, the
+        worst fit with the whitest residual could win.
+    n_candidates
+        Number of candidates.
     """
-    effective = summarise(after.residual, weight).effective_samples
     added = len(after.free) - len(before.free)
     if after.cost <= 0.0:
         return float("inf") if before.cost > 0.0 else -float("inf")
-    gain = effective * np.log(before.cost / after.cost)
-    return float(gain - added * np.log(max(effective, 2.0)) - 2.0 * np.log(max(n_candidates, 1)))
+    gain = effective_samples * np.log(before.cost / after.cost)
+    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * np.log(max(n_candidates, 1))
+    return float(gain - price)
 
 
 def refit(
@@ -106,6 +118,8 @@ def refit(
     weight = np.asarray(batch.weight)
     free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
     fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free)
+    best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
+    effective = summarise(best.residual, weight).effective_samples
     choices = []
     for candidate, trial in zip(leaders, fits, strict=True):
         if not trial.usable:
@@ -113,7 +127,7 @@ def refit(
         left_out = leave_one_run_out(model, batch, trial)
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
-        candidate.evidence = evidence(fit, trial, weight, n_candidates)
+        candidate.evidence = evidence(fit, trial, effective, n_candidates)
         choices.append(Choice(candidate, trial, left_out))
     return choices
 
@@ -138,11 +152,26 @@ def choose(choices: Sequence[Choice], left_out_before: float) -> Choice | None:
     ]
     if not earned:
         return None
-    return max(earned, key=lambda choice: choice.candidate.evidence or 0.0)
+    best = max(earned, key=lambda choice: choice.candidate.evidence or 0.0)
+    best.candidate.aliases = tuple(
+        choice.candidate.effect
+        for choice in earned
+        if choice is not best and _difference(best, choice) < INDISTINGUISHABLE
+    )
+    return best
+
+
+def _difference(best: Choice, other: Choice) -> float:
+    return (best.candidate.evidence or 0.0) - (other.candidate.evidence or 0.0)
 
 
 def prune(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str], n_candidates: int
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    active: Sequence[str],
+    n_candidates: int,
+    settled: Sequence[str] = (),
 ) -> tuple[Fit, list[str]]:
     """Drop effects that later ones have made redundant, one after another.
 
@@ -154,6 +183,8 @@ def prune(
         Effects in the model, in the order they were added; the last is never dropped.
     n_candidates
         As in `evidence`.
+    settled
+        Effects established on other grounds, which stay.
 
     Returns
     -------
@@ -161,23 +192,25 @@ def prune(
     """
     active = list(active)
     weight = np.asarray(batch.weight)
-    while len(active) > 1:
+    while optional := [name for name in active[:-1] if name not in settled]:
         starts, free = [], []
-        for name in active[:-1]:
+        for name in optional:
             at = model.positions(name)
             theta = fit.theta.copy()
             theta[at] = model.zero()[at]
             starts.append(theta)
             free.append(tuple(p for p in fit.free if p not in at))
         fits = fit_batch(model, batch, starts, free)
+        effective = summarise(fit.residual, weight).effective_samples
         support = [
-            evidence(trial, fit, weight, n_candidates) if trial.usable else np.inf for trial in fits
+            evidence(trial, fit, effective, n_candidates) if trial.usable else np.inf
+            for trial in fits
         ]
         weakest = int(np.argmin(support))
         if support[weakest] > 0.0:
             break
         fit = fits[weakest]
-        del active[weakest]
+        active.remove(optional[weakest])
     return fit, active
 
 

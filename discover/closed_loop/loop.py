@@ -6,15 +6,20 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore, attribute
-from discover.closed_loop.augment import AugmentedLaw, choose, intervals, prune, refit
+from discover.closed_loop.augment import AugmentedLaw, intervals
 from discover.closed_loop.augmented_model import AugmentedModel, data_scales, make_batch
-from discover.closed_loop.before_after import cut_to_strain, errors_of, record_runs
+from discover.closed_loop.before_after import (
+    cut_to_strain,
+    errors_of,
+    record_runs,
+    strain_of,
+)
 from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.residual import summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
-from discover.dataset import ShearDataset
+from discover.closed_loop.search import Search
+from discover.dataset import ShearDataset, ShearRun
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -25,8 +30,14 @@ from discover.effects import (
 from discover.errors import InputError
 from discover.laws import Fluid
 
-LEADERS = 8
-"""Candidates that are refitted at each stage."""
+LINEAR_STRAIN = 0.4
+"""Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""
+
+FEWEST_LINEAR_SAMPLES = 10
+"""Fewer samples than this at small strain settle nothing."""
+
+EXTRAPOLATION = 10.0
+"""Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
 
 STRUCTURE = 1.5
 """A residual this many times larger than noise and linear error together is not explained."""
@@ -40,14 +51,19 @@ def run_loop(
     effects: Sequence[str | AbstractEffect] | None = None,
     max_effects: int = 3,
     strain: tuple[float, float] | None = None,
+    noise: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
 
-    At each stage every effect is scored by its signature beyond what is fitted already; the
-    leading ones are refitted together with everything fitted before; chosen is the one with the
-    strongest evidence among those that also predict runs left out better. Effects made redundant
-    are dropped again. The loop stops when none earns its place. Nothing in it is random.
+    Small strains come first: there the fluid is linear, so what the linear prediction misses is
+    the instrument's. Then, at each stage, every effect is scored by its signature beyond what is
+    fitted already; the leading ones are refitted together with everything fitted before; chosen
+    is the one with the strongest evidence among those that also predict runs left out better.
+    Effects made redundant are dropped again. The loop stops when none earns its place. Where the
+    held-out flows are faster than the fitted ones by more than a decade, constitutive terms that
+    name the rate are not tried: such laws may be ill-posed in fast flow (see
+    `ConstitutiveEffect`). Nothing in the loop is random.
 
     Parameters
     ----------
@@ -66,6 +82,8 @@ def run_loop(
         Largest number of effects added.
     strain
         Smallest and largest strain of the samples fitted and judged.
+    noise
+        Relative noise, where it is known; estimated from the residuals otherwise.
     progress
         Called with a line of text now and then.
 
@@ -84,55 +102,29 @@ def run_loop(
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    always = declared.free_positions
+    search = Search(model, batch, held_batch, len(candidates), _admission(fitted_runs, held_runs))
     say(f"declared model on {len(fitted_runs)} runs")
-    current = fit_batch(model, batch, [model.zero()], [always])[0]
-    if not current.usable:
-        raise InputError(
-            "The declared model cannot be integrated through the fitted runs: its stress runs "
-            "away. Check its parameters, modes and units."
-        )
-    left_out = _left_out(model, batch, current)
-    thetas, active, rankings = [current.theta], [], []
-    aliases: dict[str, tuple[str, ...]] = {}
-    support: dict[str, float] = {}
-    for number in range(1, max_effects + 1):
-        ranking = attribute(model, batch, current, active, LEADERS).candidates
-        leaders = [c for c in ranking if c.reduction > 0.0][:LEADERS]
-        choices = refit(model, batch, current, leaders, len(candidates))
-        choices = [c for c in choices if _predictable(model, held_batch, c.fit.theta)]
-        rankings.append(_ordered(ranking))
-        choice = choose(choices, left_out)
+    search.start()
+    _settle(search, fitted_runs, max_effects, say)
+    while len(search.active) < max_effects:
+        choice = search.advance()
         if choice is None:
-            say(f"stage {number}: no candidate earns its place")
+            say("no further candidate earns its place")
             break
-        name = choice.candidate.effect
-        aliases[name] = choice.candidate.aliases
-        support[name] = choice.candidate.evidence or 0.0
-        kept = [*active, name]
-        current, active = prune(model, batch, choice.fit, kept, len(candidates))
-        if len(active) < len(kept):
-            # the stages must tell how the final model is reached, so they are fitted again
-            thetas = _refit_path(model, batch, always, active, current)
-        else:
-            thetas.append(current.theta)
-        left_out = _left_out(model, batch, current)
-        say(
-            f"stage {number}: {name}, error {np.mean(current.run_errors):.4f}, runs left out "
-            f"{left_out:.4f}"
-        )
-
+        say(f"{choice}: error {search.error:.4f}, runs left out {search.left_out:.4f}")
+    current, active, thetas = search.fit, search.active, search.path
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False)
     if held_batch is not None:
         records += record_runs(model, held_batch, held_runs, thetas, held_out=True)
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
     stages = tuple(
-        _stage(model, current, name, aliases, support, bounds, errors_of(records, i))
+        _stage(search, name, bounds, errors_of(records, i))
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
-    expected = float(np.hypot(summary.noise_floor, declared.linear_error))
+    floor = summary.noise_floor if noise is None else noise
+    expected = float(np.hypot(floor, declared.linear_error))
     structured = after.fit > STRUCTURE * expected
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if stages and not structured:
@@ -142,19 +134,19 @@ def run_loop(
         verdict=verdict,
         error_before=errors_of(records, 0),
         error_after=after,
-        noise_floor=summary.noise_floor,
+        noise_floor=floor,
         stages=stages,
         remaining={
             "structured": structured,
             "error": after.fit,
-            "noise_floor": summary.noise_floor,
+            "noise_floor": floor,
             "linear_error": declared.linear_error,
             "autocorrelation": float(np.mean(summary.autocorrelation)),
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
             "description": _describe(after.fit, expected, structured, worst),
         },
-        rankings=tuple(rankings),
+        rankings=tuple(search.rankings),
         records=tuple(records),
         declared_parameters=_declared_parameters(declared, current, bounds),
         fluid=_fluid(model, current, active),
@@ -188,35 +180,44 @@ def _candidates(effects: Sequence[str | AbstractEffect] | None) -> list[Abstract
     return made
 
 
-def _left_out(model, batch, fit: Fit) -> float:
-    return float(np.mean(leave_one_run_out(model, batch, fit)))
+def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
+    """Return which effects are candidates, given how far the loop must extrapolate in rate.
+
+    Rates are commanded before anything is measured, so this looks at no held-out stress.
+    """
+    fastest = max(float(np.max(np.abs(run.shear_rate))) for run in fitted)
+    asked = max((float(np.max(np.abs(run.shear_rate))) for run in held), default=0.0)
+    far = asked > EXTRAPOLATION * fastest
+
+    def admitted(effect: AbstractEffect) -> bool:
+        return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
+
+    return admitted
 
 
-def _predictable(model, batch, theta) -> bool:
-    # flows are commanded before they are measured: a law that cannot be integrated through a
-    # held-out flow is no law of this fluid, and saying so uses none of its stresses
-    return batch is None or bool(np.all(np.isfinite(model.predict(theta, batch))))
+def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> None:
+    """Find instrument effects where the strain is small and no law differs from another."""
+    small = []
+    for run in runs:
+        reached = np.maximum.accumulate(np.abs(strain_of(run)))
+        keep = reached <= LINEAR_STRAIN
+        if np.count_nonzero(keep) >= FEWEST_LINEAR_SAMPLES:
+            small.append(run.window(keep))
+    if len(small) < 2 or max_effects == 0:
+        return
+    linear = search.restricted(make_batch(small), lambda effect: effect.kind != "constitutive")
+    linear.start()
+    while len(linear.active) < max_effects:
+        name = linear.advance()
+        if name is None:
+            break
+        say(f"at small strain, {name}: error {linear.error:.4f}")
+    if linear.active:
+        search.adopt(linear)
 
 
-def _ordered(ranking: Sequence[CandidateScore]) -> tuple[CandidateScore, ...]:
-    def key(candidate):
-        known = candidate.evidence if candidate.evidence is not None else -np.inf
-        return (-known, -candidate.reduction)
-
-    return tuple(sorted(ranking, key=key))
-
-
-def _refit_path(model, batch, always, active, current):
-    theta, thetas = model.zero(), []
-    for count in range(len(active)):
-        positions = [*always, *(p for n in active[:count] for p in model.positions(n))]
-        start = theta.copy()
-        start[positions] = current.theta[positions]
-        thetas.append(fit_batch(model, batch, [start], [positions])[0].theta)
-    return [*thetas, current.theta]
-
-
-def _stage(model, fit, name, aliases, support, bounds, error) -> Stage:
+def _stage(search: Search, name: str, bounds, error) -> Stage:
+    model, fit = search.model, search.fit
     effect = next(e for e in model.effects if e.name == name)
     parameters = {
         p.name: StageParameter(float(fit.theta[at]), bounds[at], p.unit)
@@ -226,9 +227,9 @@ def _stage(model, fit, name, aliases, support, bounds, error) -> Stage:
         effect=name,
         kind=effect.kind,
         parameters=parameters,
-        aliases=aliases.get(name, ()),
+        aliases=search.aliases.get(name, ()),
         error=error,
-        evidence=support.get(name, 0.0),
+        evidence=search.support.get(name, 0.0),
         equation=effect.equation,
         source=effect.source,
         check=effect.check,

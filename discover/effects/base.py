@@ -73,9 +73,19 @@ class AbstractEffect(ABC):
     kind: ClassVar[Kind]
 
 
+@dataclass(frozen=True)
 class ConstitutiveEffect(AbstractEffect):
-    """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes."""
+    """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes.
 
+    Attributes
+    ----------
+    explicit_rate
+        Whether the term names the rate of deformation. Such laws can lose their well-posedness in
+        fast deformation, which laws with an upper convected derivative and a term in the stress
+        alone keep   [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58, 25].
+    """
+
+    explicit_rate: bool = False
     kind: ClassVar[Kind] = "constitutive"
 
     def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):

@@ -36,6 +36,7 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
         source="Smith 1971, Int. J. Eng. Sci. 9, 899: isotropic functions of two tensors",
         check="A flow of another kind, such as step strain or extension.",
         complexity=2 + term.complexity,
+        explicit_rate="gammadot" in term.name,
         term=term,
     )
 

@@ -166,6 +166,27 @@ def test_bad_input_is_refused_with_one_message(options, message):
         loop(make_dataset(UpperConvectedMaxwell()), **options)
 
 
+@pytest.mark.parametrize(("factor", "tried"), [(2.0, True), (20.0, False)])
+def test_terms_that_name_the_rate_are_not_tried_where_the_loop_must_extrapolate_far(factor, tried):
+    flow = start_up(1.5 * factor)
+    times = TIMES / factor
+    fluid = Fluid(UpperConvectedMaxwell(), jnp.asarray(100.0), jnp.asarray(1.0))
+    stress = simulate(fluid, flow, times).shear_stress
+    far = ShearRun("far", times, flow, np.full(len(times), 1.5 * factor), stress)
+    made = make_dataset(Giesekus(0.2))
+    result = loop(ShearDataset("made", (*made.runs[:2], far)), held_out=["far"], max_effects=1)
+    ranked = {candidate.effect for stage in result.rankings for candidate in stage}
+    assert ("non_affine_motion" in ranked) == tried
+    assert "giesekus_mobility" in ranked
+
+
+def test_a_noise_that_is_given_is_believed():
+    dataset = make_dataset(Giesekus(0.2))
+    result = loop(dataset, effects=("stress_offset",), noise=0.9, max_effects=1)
+    assert result.noise_floor == 0.9
+    assert not result.remaining["structured"]
+
+
 def test_the_noise_of_a_smooth_misfit_is_not_its_size():
     generator = np.random.default_rng(0)
     noise = 0.01 * generator.standard_normal(400)

@@ -29,4 +29,5 @@ EFFECT = ConvectiveConstraintRelease(
     source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
     check="A steady shear stress that does not fall with rate; step strain after start-up.",
     complexity=3,
+    explicit_rate=True,
 )

@@ -18,4 +18,5 @@ EFFECT = NonAffineMotion(
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",
     source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
     check="N2/N1 near -xi/2 at all rates, and a stress that oscillates in fast start-up.",
+    explicit_rate=True,
 )
