@@ -89,11 +89,11 @@ def fit_batch(
     for _ in range(max_steps):
         if done.all():
             break
-        stale = [i for i in np.flatnonzero(~done) if jacobian[i] is None]
+        stale = [int(i) for i in np.flatnonzero(~done) if jacobian[i] is None]
         fresh = jacobians(model, batch, theta[stale], residual[stale], [free[i] for i in stale])
         for i, value in zip(stale, fresh, strict=True):
             jacobian[i] = value
-        going = np.flatnonzero(~done)
+        going = [int(i) for i in np.flatnonzero(~done)]
         trial = theta[going].copy()
         for row, i in enumerate(going):
             at = list(free[i])

@@ -259,10 +259,10 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
     ]
     base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     law = AugmentedLaw(
-        base,
-        tuple(values for _, values in added),
-        tuple(effect for effect, _ in added),
-        base.linear_relaxation,
+        base=base,
+        values=tuple(values for _, values in added),
+        effects=tuple(effect for effect, _ in added),
+        linear_relaxation=base.linear_relaxation,
     )
     one = jnp.ones(1)
     viscosity = declared.solvent_viscosity + sum(
