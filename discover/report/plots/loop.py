@@ -15,6 +15,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
+from discover.report.wording import percent
 
 _FIT, _HELD = NETWORK, SPARSE
 
@@ -73,7 +74,7 @@ def runs_picture(result: LoopResult) -> Picture:
 
 def _short(record: RunRecord) -> str:
     name = record.name.removesuffix(".csv")
-    return f"{name}: {100 * record.errors[0]:.2g} → {100 * record.errors[-1]:.2g} %"
+    return f"{name}: {percent(record.errors[0])} → {percent(record.errors[-1])}"
 
 
 def residual_picture(result: LoopResult) -> Picture:
@@ -124,7 +125,7 @@ def waterfall_picture(result: LoopResult) -> Picture:
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
-            panel.bar_label(bars, [f"{h:.2g} %" for h in heights], fontsize=8, padding=2)
+            panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
         panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
         panel.set_yscale("log")
         heights = [100.0 * value for _, _, values, _ in series for value in values]
