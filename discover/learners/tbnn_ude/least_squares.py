@@ -66,8 +66,8 @@ def residual_rows(
 
 @eqx.filter_jit
 def _start(weights, objective):
-    shapes = eqx.filter_eval_shape(residual_rows, weights, objective)
-    return _SOLVER.init(residual_rows, weights, objective, {}, *shapes, frozenset())
+    rows, by_run = eqx.filter_eval_shape(residual_rows, weights, objective)
+    return _SOLVER.init(residual_rows, weights, objective, {}, rows, by_run, frozenset())
 
 
 @eqx.filter_jit
