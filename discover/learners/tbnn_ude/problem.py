@@ -62,8 +62,8 @@ class TrainingProblem(eqx.Module):
         """Return the mean squared error of each run.
 
         The default adjoint, reverse mode through the steps with recursive checkpoints, was
-        measured at 0.55 times the cost of storing every step, with the same relative error of
-        1e-9 (``benchmarks/adjoints.py``: 91 and 167 ms on a busy machine).
+        measured at half the cost of storing every step and at a ninth of the continuous adjoint
+        (``benchmarks/adjoints.py``: 51, 94 and 481 ms for the paper's network).
         """
         residual = self.residual(law, adjoint)
         return jnp.sum(residual**2, axis=1) / jnp.sum(self.grids.sample_mask, axis=1)
