@@ -1,10 +1,9 @@
 """One study from file to report."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from discover.errors import InputError
 from discover.precision import enable_x64
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -66,7 +65,7 @@ def run_compare(
     from discover.report.comparison_report import write_comparison
     from discover.report.wording import comparison_verdict
 
-    comparison = compare(study, seed, progress, folder)
+    comparison = compare(study, seed, progress, folder, settle=fit_declared)
     text = "\n".join(comparison_verdict(comparison))
     write_comparison(comparison, folder, study.model.known_relaxation, path.read_text("utf-8"))
     folder.save("verdict", {"text": text})
@@ -112,6 +111,7 @@ def run_close_loop(
         effects=study.loop.effects,
         max_effects=study.loop.max_effects,
         strain=study.loop.strain,
+        noise=study.loop.noise,
         progress=say,
     )
     progress("drawing", 0.97)
@@ -133,32 +133,67 @@ def run_close_loop(
     return TaskResult(page, data, text, False)
 
 
-def declared_for_loop(model):
-    """Return the declared model as the closed loop takes it.
+def fit_declared(model, dataset):
+    """Return a study's declared model with what was to be fitted as numbers.
+
+    The declared law alone is fitted to the stresses, so what it lacks biases its constants. The
+    learners can correct that: a wrong relaxation time is a term in ``sigma``, a wrong modulus one
+    in ``gammadot``.
+
+    Parameters
+    ----------
+    model
+        From `discover.study.build.declared_model`.
+    dataset
+        The runs to fit.
 
     Raises
     ------
     InputError
-        If it asks for a fit that the loop does not make.
+        If the declared law cannot be integrated through the runs.
     """
+    if not model.free:
+        return model
+    from discover.closed_loop import run_loop
+    from discover.laws import make_law
+
+    # with no effect allowed the loop only fits the declared model; it wants to know one by name
+    fitted = run_loop(dataset, declared_for_loop(model), effects=["stress_offset"], max_effects=0)
+    values = {name: entry.value for name, entry in fitted.declared_parameters.items()}
+    parameters = {name: values.get(name, known) for name, known in model.parameters.items()}
+    law = make_law(model.law_name, parameters) if model.law.linear_relaxation else model.law
+    return replace(
+        model,
+        law=law,
+        parameters=parameters,
+        modulus=model.modulus * values.get("modulus_factor", 1.0),
+        relaxation_time=model.relaxation_time * values.get("relaxation_time_factor", 1.0),
+        free=(),
+    )
+
+
+def declared_for_loop(model):
+    """Return the declared model as the closed loop takes it, with all that is left to be fitted."""
     from discover.closed_loop import DeclaredModel
 
-    fitted = [key for key in model.free if key not in ("modulus_Pa", "relaxation_time_s")]
-    if fitted:
-        raise InputError(
-            f'{fitted[0]} = "fit" in [model] is not possible yet. Write a number, or declare '
-            'law = "ucm" and let the loop find what is missing.'
+    options = {
+        "solvent_viscosity": model.solvent_viscosity,
+        "linear_error": 0.0 if model.spectrum is None else model.spectrum.relative_error,
+    }
+    if not model.law.linear_relaxation:
+        return DeclaredModel(
+            model.law,
+            model.modulus,
+            model.relaxation_time,
+            fit_modulus="modulus_Pa" in model.free,
+            fit_relaxation_time="relaxation_time_s" in model.free,
+            **options,
         )
-    if not model.law.linear_relaxation or model.solvent_viscosity:
-        raise InputError(
-            "The closed loop needs known_relaxation = true and no solvent_viscosity_Pa_s; a "
-            "solvent is one of the effects that it can find."
-        )
-    return DeclaredModel(
-        model.law,
+    return DeclaredModel.named(
+        model.law_name,
+        model.parameters,
         model.modulus,
         model.relaxation_time,
-        fit_modulus="modulus_Pa" in model.free,
-        fit_relaxation_time="relaxation_time_s" in model.free,
-        linear_error=0.0 if model.spectrum is None else model.spectrum.relative_error,
+        free=model.free,
+        **options,
     )

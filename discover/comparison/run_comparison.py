@@ -8,6 +8,7 @@ from discover.comparison.identifiability import find_rivals, undetermined_quanti
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.training import Progress, require_numbers, silent, train
 from discover.comparison.truth import TrueTerm, true_terms
+from discover.dataset.run import ShearDataset
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
@@ -20,6 +21,7 @@ def compare(
     seed: int | None = None,
     progress: Progress = silent,
     store: RunFolder | None = None,
+    settle: Callable[[DeclaredModel, ShearDataset], DeclaredModel] | None = None,
 ) -> Comparison:
     """Run a study's learners on identical data and look at what each found.
 
@@ -33,6 +35,8 @@ def compare(
         Called with what is going on and the fraction done.
     store
         Where finished learners are kept and found again.
+    settle
+        Fits what the declared law leaves open; without it, open parameters are an error.
 
     Raises
     ------
@@ -41,7 +45,8 @@ def compare(
     """
     options = study.compare
     data = load_study_data(study, seed)
-    model = declared_model(study, data.dataset)
+    declared = declared_model(study, data.dataset)
+    model = declared if settle is None else settle(declared, data.fit)
     require_numbers(model)
     flows = comparison_flows(data, options.high_deborah)
     learner_seed = options.seed if seed is None else seed
@@ -81,7 +86,7 @@ def compare(
     return Comparison(
         name=study.name,
         data_summary=_summary(data, study),
-        known_part=_known_part(model, study),
+        known_part=_known_part(model, study, declared.free),
         flows=flows,
         before={flow.key: predict(model.fluid, flow) for flow in flows},
         outcomes=outcomes,
@@ -185,7 +190,15 @@ def _summary(data: StudyData, study: Study) -> str:
     return f"{runs} computed from the {law} law, {noise}"
 
 
-def _known_part(model: DeclaredModel, study: Study) -> str:
+def _known_part(model: DeclaredModel, study: Study, fitted: tuple[str, ...]) -> str:
+    text = _law_and_modes(model, study)
+    if not fitted:
+        return text
+    constants = f"G = {model.modulus.sum():.4g} Pa, λ = {model.relaxation_time.max():.4g} s"
+    return f"{text}, {constants} ({', '.join(fitted)} fitted with this law alone, then held)"
+
+
+def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     if not study.model.known_relaxation:
         return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
     values = ", ".join(f"{key} = {value:g}" for key, value in model.parameters.items())

@@ -45,10 +45,13 @@ class RunFolder:
                 shutil.rmtree(self._state)
             found = None
         elif found is not None and found.get("fingerprint") != fingerprint:
-            raise InputError(
-                f"{self.path} holds the results of another study, or of this one before it was "
-                "changed. Use --overwrite to replace them, or another --out."
-            )
+            if not found.get("complete") and not self._has_parts():
+                found = None  # claimed, but nothing was computed: nothing can be lost
+            else:
+                raise InputError(
+                    f"{self.path} holds the results of another study, or of this one before it "
+                    "was changed. Use --overwrite to replace them, or another --out."
+                )
         self.complete = bool(found and found.get("complete"))
         make_folder(self._state)
         make_folder(self.path / "figures")
@@ -71,6 +74,9 @@ class RunFolder:
         """Mark the study as complete; called last."""
         self._write_state(True)
         self.complete = True
+
+    def _has_parts(self) -> bool:
+        return any(file.name != STATE_FILE for file in self._state.glob("*.json"))
 
     def _write_state(self, complete: bool) -> None:
         content = {"fingerprint": self.fingerprint, "complete": complete}

@@ -129,6 +129,23 @@ def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypat
     assert "RuntimeError: it broke" in result.stderr
 
 
+def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, trained):
+    to_fit = 'modulus_Pa = "fit"\nrelaxation_time_s = "fit"\n[loop]\nnoise = 0.01'
+    study = STUDY + '[model]\nlaw = "giesekus"\nparameters = {alpha = "fit"}\n' + to_fit
+    (tmp_path / "s.toml").write_text(study)
+    result = invoke("close-loop", tmp_path / "s.toml", "--out", tmp_path / "loop")
+    assert result.exit_code == 0, result.stderr
+    loop = json.loads((tmp_path / "loop" / "loop.json").read_text())
+    assert loop["noise_floor"] == 0.01  # as the study says, not as estimated
+    mobility = loop["declared_parameters"]["alpha"]
+    low, high = mobility["ci95"]
+    assert low - (high - low) < 0.2 < high + (high - low)  # twice the 95 % interval
+    result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.stderr
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "then held" in page
+
+
 BAD_STUDIES = {
     "not_toml": ("[data\n", "not valid TOML"),
     "unknown_key": (STUDY + "\n[compar]\n", "'compar'"),

@@ -152,6 +152,13 @@ def test_a_run_folder_resumes_and_refuses_another_study(tmp_path):
     assert not fresh.complete
 
 
+def test_a_folder_in_which_nothing_was_computed_takes_a_mended_study(tmp_path):
+    RunFolder(tmp_path / "out", "with a mistake")
+    RunFolder(tmp_path / "out", "mended").save("part", {})
+    with pytest.raises(InputError, match="--overwrite"):
+        RunFolder(tmp_path / "out", "yet another")
+
+
 def test_overwrite_leaves_files_alone_that_are_not_ours(tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     RunFolder(tmp_path, "one").save("part", {})
