@@ -113,6 +113,7 @@ class Comparison:
                         "ci95": None if t.ci95 is None else list(t.ci95),
                         "coefficient_penalised": t.coefficient_penalised,
                         "inner": dict(t.inner),
+                        "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},
                         "latex": t.latex,
                     }
                     for t in outcome.terms

@@ -79,7 +79,13 @@ class LearnerOutcome:
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
         """Return the outcome that was kept."""
         terms = tuple(
-            RecoveredTerm(**{**t, "ci95": None if t["ci95"] is None else tuple(t["ci95"])})
+            RecoveredTerm(
+                **{
+                    **t,
+                    "ci95": None if t["ci95"] is None else tuple(t["ci95"]),
+                    "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
+                }
+            )
             for t in state["terms"]
         )
         iterations, losses = (np.asarray(part, dtype=float) for part in state["loss_history"])

@@ -28,6 +28,8 @@ class RecoveredTerm:
         Inner parameters by name.
     latex
         The term as LaTeX, without its coefficient.
+    inner_ci95
+        95 % intervals of the inner parameters.
     """
 
     term: str
@@ -36,6 +38,7 @@ class RecoveredTerm:
     ci95: tuple[float, float] | None = None
     inner: Mapping[str, float] = field(default_factory=dict)
     latex: str = ""
+    inner_ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from discover.report.page import render
 from discover.report.plots.flows import flow_picture, start_up_picture, training_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
-from discover.report.wording import comparison_verdict
+from discover.report.wording import comparison_verdict, interval
 from discover.study.run_folder import RunFolder
 
 _COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
@@ -126,6 +126,7 @@ def _term_rows(comparison: Comparison) -> list[dict[str, Any]]:
             if term is not None:
                 inner += [
                     f"{LEARNER_TITLES[learner]}: {key} = {value:.4g}"
+                    + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
                     for key, value in term.inner.items()
                 ]
         true = truth.get(name)

@@ -14,7 +14,7 @@ from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
-from discover.learners.tensor_sindy.intervals import standard_errors
+from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import check_optimiser, solve_sparse
 from discover.learners.tensor_sindy.problem import as_runs, make_problem
 from discover.learners.tensor_sindy.refit import Fit
@@ -85,6 +85,8 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         Coefficients over the library, zero where a term was left out.
     inner_ : ndarray of shape (n_inner,)
         Inner parameters of the library's closed forms.
+    uncertainty_ : ParameterUncertainty or None
+        Covariance of coefficients and inner parameters; None for an empty law.
     path_ : list of Fit
         The best fit of each size, from empty on.
     search_ : SupportSearch
@@ -187,6 +189,9 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         self.fluid_ = Fluid(
             self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
         )
+        self.uncertainty_ = None
+        if fit.support:
+            self.uncertainty_ = parameter_uncertainty(problem, fit, self.misfit_floor)
         self.terms_ = self._terms(search, fit)
         misfits = [misfit for _, misfit in search.history]
         self.result_ = LearnerResult(
@@ -208,6 +213,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,
                 "misfit": fit.misfit,
+                "noise": self._noise(),
                 "n_observations": problem.n_observations,
             },
             message=(
@@ -259,11 +265,22 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
             base=self.base_law,
         )
 
+    def _noise(self) -> dict[str, Any] | None:
+        if self.uncertainty_ is None:
+            return None
+        noise = self.uncertainty_.noise
+        return {
+            "autoregressive_order": int(noise.coefficients.size),
+            "lag_one_correlation": float(noise.correlation[1]) if noise.coefficients.size else 0.0,
+            "effective_samples": noise.effective_samples,
+        }
+
     def _terms(self, search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...]:
-        problem, library = search.problem, search.problem.library
+        library = search.problem.library
         if not fit.support:
             return ()
-        errors, _, factor = standard_errors(problem, fit)
+        assert self.uncertainty_ is not None  # some term was chosen
+        half_widths = self.uncertainty_.half_widths
         model = search.model_at(fit)
         solutions = {
             s.support: s.coefficients
@@ -282,12 +299,14 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         terms = []
         for position, (index, value) in enumerate(zip(fit.support, fit.coefficients, strict=True)):
             term = library.terms[index]
-            half = factor * errors[position]
-            inner = {
-                form.inner_name: float(fit.inner[i])
-                for i, form in enumerate(library.forms)
-                if form.name == term.closed_form
-            }
+            half = half_widths[position]
+            inner, inner_ci95 = {}, {}
+            for place, i in enumerate(self.uncertainty_.inner_positions):
+                if (form := library.forms[i]).name == term.closed_form:
+                    value_of_inner = float(fit.inner[i])
+                    spread = half_widths[len(fit.support) + place]
+                    inner[form.inner_name] = value_of_inner
+                    inner_ci95[form.inner_name] = (value_of_inner - spread, value_of_inner + spread)
             terms.append(
                 RecoveredTerm(
                     term=term.name,
@@ -295,6 +314,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
                     coefficient_penalised=float(penalised[index]),
                     ci95=(float(value - half), float(value + half)),
                     inner=inner,
+                    inner_ci95=inner_ci95,
                     latex=term.latex(),
                 )
             )

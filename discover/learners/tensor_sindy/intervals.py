@@ -1,43 +1,124 @@
-"""Intervals of fitted parameters from the Fisher information of the trajectories."""
+"""Intervals of fitted parameters, from the sensitivities of the integrated trajectories.
+
+A least-squares fit weighs all samples alike whatever their noise, so its covariance is
+
+    C = (SᵀS)⁻¹ Sᵀ Ω S (SᵀS)⁻¹,
+
+with S the weighted sensitivities and Ω the covariance of the noise. Ω is estimated from the
+residual as an autoregressive process (`noise_model`): a block bootstrap needs a refit for every
+draw, an effective sample size alone would shrink all directions alike, while slow noise spoils a
+slow signature more than a fast one.
+"""
+
+from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.stats import t as student
 
+from discover.learners.tensor_sindy.noise_model import NoiseModel, noise_model
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.sensitivities import linearise
 
 
-def standard_errors(
-    problem: TrajectoryProblem, fit: Fit
-) -> tuple[Float[np.ndarray, " q"], Float[np.ndarray, " m"], float]:
-    """Return standard errors of coefficients and inner parameters, and Student's 95 % factor.
+@dataclass(frozen=True)
+class ParameterUncertainty:
+    """How well a fit determines its parameters.
 
-    The noise is taken as white with the variance of the residual; inner parameters of closed
-    forms that the fit does not use have no error (nan).
+    Attributes
+    ----------
+    covariance
+        Of the coefficients of the support, then of the inner parameters used, shape (p, p).
+    inner_positions
+        Which inner parameters of the library those are.
+    numerical
+        What an integration error of the size of the misfit floor can do to each, shape (p,).
+    factor
+        Student's 95 % factor at the effective number of samples.
+    noise
+        The noise the residual shows.
+    """
+
+    covariance: Float[np.ndarray, "p p"]
+    inner_positions: tuple[int, ...]
+    numerical: Float[np.ndarray, " p"]
+    factor: float
+    noise: NoiseModel
+
+    @property
+    def half_widths(self) -> Float[np.ndarray, " p"]:
+        """Half the width of each 95 % interval: noise, plus what integration cannot promise."""
+        return self.factor * np.sqrt(np.diag(self.covariance)) + self.numerical
+
+
+def parameter_uncertainty(
+    problem: TrajectoryProblem, fit: Fit, misfit_floor: float = 0.0
+) -> ParameterUncertainty:
+    """Return the uncertainty of a fit's coefficients and inner parameters.
 
     Parameters
     ----------
     problem
         The data.
     fit
-        A fit on all rows.
+        A fit on all rows, with at least one term.
+    misfit_floor
+        Relative misfit below which the integration itself is in doubt.
     """
     n = len(problem.library)
     residual, columns = linearise(problem, jnp.asarray(fit.dense(n)), jnp.asarray(fit.inner))
-    residual, columns = np.asarray(residual), np.asarray(columns)
     used = {problem.library.terms[i].closed_form for i in fit.support}
-    inner = [n + i for i, form in enumerate(problem.library.forms) if form.name in used]
-    chosen = columns[:, [*fit.support, *inner]]
-    free = max(problem.n_observations - chosen.shape[1], 1)
-    variance = float(residual @ residual) / free
-    norms = np.linalg.norm(chosen, axis=0)
+    inner = tuple(i for i, form in enumerate(problem.library.forms) if form.name in used)
+    chosen = np.asarray(columns)[:, [*fit.support, *(n + i for i in inner)]]
+    covariance, inverse, noise = least_squares_covariance(
+        chosen, np.asarray(residual), _sequences(problem)
+    )
+    free = max(noise.effective_samples - chosen.shape[1], 1.0)
+    return ParameterUncertainty(
+        covariance=covariance,
+        inner_positions=inner,
+        # an error vector of norm f moves a least-squares solution by at most f √diag (SᵀS)⁻¹
+        numerical=misfit_floor * np.sqrt(np.diag(inverse)),
+        factor=float(student.ppf(0.975, free)),
+        noise=noise,
+    )
+
+
+def least_squares_covariance(
+    columns: Float[np.ndarray, "rows p"],
+    residual: Float[np.ndarray, " rows"],
+    sequences: list[Int[np.ndarray, " n"]],
+) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
+    """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
+
+    Parameters
+    ----------
+    columns
+        Sensitivities S.
+    residual
+        Residual of the fit.
+    sequences
+        Rows of each sequence of observations, in the order of time.
+    """
+    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
+    # columns of like size, or the pseudo-inverse would drop what is merely small
+    norms = np.linalg.norm(columns, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
-    information = (chosen / norms).T @ (chosen / norms)
-    errors = np.sqrt(np.diag(np.linalg.pinv(information, rcond=1e-14)) * variance) / norms
-    inner_errors = np.full(len(problem.library.forms), np.nan)
-    for position, column in enumerate(inner):
-        inner_errors[column - n] = errors[len(fit.support) + position]
-    return errors[: len(fit.support)], inner_errors, float(student.ppf(0.975, free))
+    scaled = columns / norms
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14)
+    middle = sum(
+        scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
+    )
+    sizes = np.outer(norms, norms)
+    return inverse @ middle @ inverse / sizes, inverse / sizes, noise
+
+
+def _sequences(problem: TrajectoryProblem) -> list[np.ndarray]:
+    """Return the rows of each run and observed quantity, in the order of time."""
+    seen = np.asarray(problem.weight) > 0
+    runs, samples, kinds = seen.shape
+    rows = np.arange(seen.size).reshape(runs, samples, kinds)
+    sequences = [rows[i, seen[i, :, k], k] for i in range(runs) for k in range(kinds)]
+    return [sequence for sequence in sequences if sequence.size]

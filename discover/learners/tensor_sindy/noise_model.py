@@ -1,0 +1,105 @@
+"""The noise of a fit, as its residual shows it: a size for each run, one autocorrelation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import matmul_toeplitz, solve_toeplitz
+from scipy.signal import lfilter, lfiltic
+
+_HIGHEST_ORDER = 12
+_FEWEST_FOR_OWN_VARIANCE = 30
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Autoregressive noise, with one correlation for all sequences and a variance for each.
+
+    Attributes
+    ----------
+    coefficients
+        φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
+    correlation
+        Of samples k apart, from k = 0, shape (longest sequence,).
+    variance
+        Of each sequence, shape (sequences,).
+    effective_samples
+        Number of independent samples whose mean would be as uncertain as that of all sequences.
+    """
+
+    coefficients: Float[np.ndarray, " order"]
+    correlation: Float[np.ndarray, " n"]
+    variance: Float[np.ndarray, " sequences"]
+    effective_samples: float
+
+    def covariance_times(self, sequence: int, columns: Float[np.ndarray, "n q"]) -> np.ndarray:
+        """Return the noise covariance of one sequence times columns, without forming it."""
+        if self.coefficients.size == 0:
+            return self.variance[sequence] * columns
+        first = self.correlation[: len(columns)]
+        return self.variance[sequence] * matmul_toeplitz((first, first), columns)
+
+
+def noise_model(residuals: list[Float[np.ndarray, " n"]], n_parameters: int = 0) -> NoiseModel:
+    """Return the noise model of residuals, its order chosen by BIC.
+
+    The autocovariance is pooled over the sequences, so that short runs share one correlation; the
+    Yule–Walker equations give the coefficients   [Brockwell & Davis 1991, Time Series, ch. 8].
+
+    Parameters
+    ----------
+    residuals
+        One sequence for each run and observed quantity, in the order of time. Where sampling is
+        uneven the correlation is one by sample, not by time.
+    n_parameters
+        Number of fitted parameters, which the variance allows for.
+    """
+    total = sum(len(r) for r in residuals)
+    shrink = total / max(total - n_parameters, 1)
+    highest = min(_HIGHEST_ORDER, max(min((len(r) for r in residuals), default=1) // 4, 0))
+    covariance = np.array(
+        [
+            sum(float(r[: len(r) - k] @ r[k:]) for r in residuals if len(r) > k) / total
+            for k in range(highest + 1)
+        ]
+    )
+    variance = np.array(
+        [
+            (r @ r / len(r) if len(r) >= _FEWEST_FOR_OWN_VARIANCE else covariance[0]) * shrink
+            for r in residuals
+        ]
+    )
+    longest = max(len(r) for r in residuals)
+    coefficients = _coefficients(covariance, total)
+    correlation = np.zeros(longest)
+    correlation[0] = 1.0
+    order = coefficients.size
+    if order:
+        known = covariance[: order + 1] / covariance[0]
+        recursion = np.concatenate([[1.0], -coefficients])
+        state = lfiltic([1.0], recursion, known[1:][::-1])
+        later = lfilter([1.0], recursion, np.zeros(max(longest - order - 1, 0)), zi=state)[0]
+        correlation = np.concatenate([known, later])[:longest]
+    weights = np.array([_sum_of_correlations(correlation, len(r)) for r in residuals])
+    effective = total**2 / max(float(np.sum(weights)), 1.0)
+    return NoiseModel(coefficients, correlation, variance, float(min(effective, total)))
+
+
+def _coefficients(covariance: np.ndarray, total: int) -> np.ndarray:
+    if covariance[0] <= 0.0:
+        return np.zeros(0)
+    best, chosen = 0.0, np.zeros(0)  # white noise: BIC measured from there
+    for order in range(1, len(covariance)):
+        phi = solve_toeplitz(covariance[:order], covariance[1 : order + 1])
+        innovation = 1.0 - float(phi @ covariance[1 : order + 1]) / covariance[0]
+        if innovation <= 0.0:
+            break
+        bic = total * np.log(innovation) + order * np.log(total)
+        if bic < best:
+            best, chosen = bic, phi
+    return chosen
+
+
+def _sum_of_correlations(correlation: np.ndarray, n: int) -> float:
+    lags = np.arange(1, n)
+    return float(n + 2.0 * np.sum((n - lags) * correlation[1:n]))
