@@ -1,0 +1,1 @@
+"""What data determine and what they leave open."""

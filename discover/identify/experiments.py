@@ -1,0 +1,166 @@
+"""Experiments that a user could run next."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.protocols.shear import (
+    ShearProtocol,
+    measured_rate,
+    oscillatory_shear,
+    start_up,
+    step_rates,
+)
+
+FlowClass = Literal["laos", "start_up", "cessation", "steps", "superposed"]
+FLOW_CLASSES: tuple[FlowClass, ...] = ("laos", "start_up", "cessation", "steps", "superposed")
+
+Observed = Literal["sigma12", "N1", "N2"]
+OBSERVED: tuple[Observed, ...] = ("sigma12", "N1", "N2")
+"""What may be measured, the easiest first: torque, axial force, and what needs special plates."""
+
+N_SAMPLES = 101
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A flow that could be run.
+
+    Attributes
+    ----------
+    title
+        In words, with numbers.
+    kind
+        Class of the flow.
+    protocol
+        Shear rate against time.
+    times
+        Samples in s, shape (n,).
+    """
+
+    title: str
+    kind: FlowClass
+    protocol: ShearProtocol
+    times: Float[np.ndarray, " n"]
+
+
+def candidate_experiments(
+    relaxation_time: float,
+    classes: Sequence[str] = FLOW_CLASSES,
+    weissenberg_numbers: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
+    deborah_numbers: Sequence[float] = (0.25, 0.5, 1.0, 2.0),
+) -> list[Experiment]:
+    """Return experiments of the classes that a user allows.
+
+    Parameters
+    ----------
+    relaxation_time
+        In s; Wi and De are multiplied with its inverse.
+    classes
+        Of `FLOW_CLASSES`.
+    weissenberg_numbers
+        λ times the largest shear rate.
+    deborah_numbers
+        λ times the frequency of oscillation.
+
+    Raises
+    ------
+    InputError
+        If a class is unknown, or a number is not positive.
+    """
+    unknown = [name for name in classes if name not in FLOW_CLASSES]
+    if unknown:
+        raise InputError(
+            f"Unknown class of experiment {unknown[0]!r}; known are {', '.join(FLOW_CLASSES)}."
+        )
+    for label, values in (("Wi", weissenberg_numbers), ("De", deborah_numbers)):
+        if not values or not all(np.isfinite(v) and v > 0 for v in values):
+            raise InputError(f"{label} must be positive numbers; got {list(values)}.")
+    unit = 1.0 / relaxation_time
+    found = []
+    for name in FLOW_CLASSES:
+        if name in classes:
+            found += _MAKERS[name](unit, weissenberg_numbers, deborah_numbers)
+    return found
+
+
+def _experiment(title, kind, protocol, duration, unit) -> Experiment:
+    return Experiment(title, kind, protocol, np.linspace(0.0, duration / unit, N_SAMPLES))
+
+
+def _laos(unit, weissenberg, deborah):
+    return [
+        _experiment(
+            f"oscillatory shear at Wi = {wi:g}, De = {de:g}",
+            "laos",
+            oscillatory_shear(wi * unit, de * unit),
+            max(10.0, 2.5 * 2.0 * np.pi / de),
+            unit,
+        )
+        for wi in weissenberg
+        for de in deborah
+    ]
+
+
+def _start_up(unit, weissenberg, deborah):
+    del deborah
+    return [
+        _experiment(f"start-up of shear at Wi = {wi:g}", "start_up", start_up(wi * unit), 8.0, unit)
+        for wi in weissenberg
+    ]
+
+
+def _cessation(unit, weissenberg, deborah):
+    del deborah
+    stop = 5.0
+    return [
+        _experiment(
+            f"cessation of steady shear at Wi = {wi:g}",
+            "cessation",
+            step_rates([0.0, stop / unit], [wi * unit, 0.0]),
+            stop + 5.0,
+            unit,
+        )
+        for wi in weissenberg
+    ]
+
+
+def _steps(unit, weissenberg, deborah):
+    del deborah
+    found = []
+    for wi in weissenberg:
+        for factor, word in ((-1.0, "reversal of"), (0.25, "step down to a quarter from")):
+            protocol = step_rates([0.0, 4.0 / unit], [wi * unit, factor * wi * unit])
+            found.append(_experiment(f"{word} shear at Wi = {wi:g}", "steps", protocol, 9.0, unit))
+    return found
+
+
+def _superposed(unit, weissenberg, deborah):
+    found = []
+    for wi in weissenberg:
+        de = max(deborah)
+        times = np.linspace(0.0, 10.0, 801)
+        rates = wi * (1.0 + 0.5 * np.sin(de * times))
+        found.append(
+            _experiment(
+                f"steady shear at Wi = {wi:g} with an oscillation of half that rate at De = {de:g}",
+                "superposed",
+                measured_rate(times / unit, rates * unit),
+                10.0,
+                unit,
+            )
+        )
+    return found
+
+
+_MAKERS = {
+    "laos": _laos,
+    "start_up": _start_up,
+    "cessation": _cessation,
+    "steps": _steps,
+    "superposed": _superposed,
+}

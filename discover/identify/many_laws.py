@@ -1,0 +1,131 @@
+"""Many laws in one compiled simulation: rivals, or draws of one law's parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
+from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.solve import solve_on_grid
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A law that may be the right one, and how well its parameters are known.
+
+    Attributes
+    ----------
+    name
+        For tables and pictures.
+    terms
+        Canonical spelling → coefficient; empty for h = 0.
+    inner
+        Inner parameters by name.
+    covariance
+        Of the coefficients in the order of `terms`, then of the inner parameters in the order of
+        `inner`, shape (p, p); None where the parameters count as exact.
+    """
+
+    name: str
+    terms: Mapping[str, float]
+    inner: Mapping[str, float] = field(default_factory=dict)
+    covariance: Float[np.ndarray, "p p"] | None = None
+
+
+def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
+    """Return one fluid whose arrays have a leading axis of laws.
+
+    Every law is written in one library that holds the terms of all, so that one program serves
+    them. Take them apart with `jax.vmap`.
+
+    Parameters
+    ----------
+    contenders
+        The laws.
+    declared
+        The known part: its law is the base, its modes are shared.
+    """
+    names = sorted({name for c in contenders for name in c.terms}) or ["sigma"]
+    library = TermLibrary(tuple(parse_term(name) for name in names))
+    coefficients = np.array([[c.terms.get(n, 0.0) for n in names] for c in contenders])
+    inner = np.array(
+        [
+            [
+                c.inner.get(n, default)
+                for n, default in zip(library.inner_names, library.inner_default, strict=True)
+            ]
+            for c in contenders
+        ]
+    ).reshape(len(contenders), len(library.inner_names))
+
+    def make(coefficients, inner):
+        law = LibraryExpansion(
+            coefficients, inner, library, declared.law.linear_relaxation, declared.law
+        )
+        return Fluid(law, declared.modulus, declared.relaxation_time, declared.solvent_viscosity)
+
+    return eqx.filter_vmap(make)(jnp.asarray(coefficients), jnp.asarray(inner))
+
+
+def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple[Contender, ...]:
+    """Return laws with parameters drawn from the contender's uncertainty; itself comes first."""
+    if contender.covariance is None or n_draws == 0:
+        return (contender,)
+    names, inner = list(contender.terms), list(contender.inner)
+    centre = np.array([*contender.terms.values(), *contender.inner.values()])
+    drawn = rng.multivariate_normal(centre, contender.covariance, size=n_draws, method="eigh")
+    split = len(names)
+    return (
+        contender,
+        *(
+            Contender(
+                contender.name,
+                dict(zip(names, row[:split], strict=True)),
+                dict(zip(inner, row[split:], strict=True)),
+            )
+            for row in drawn
+        ),
+    )
+
+
+def predict_laws(
+    fluids: Fluid,
+    protocols: Sequence[ShearProtocol],
+    times: Sequence[Float[np.ndarray, " n"]],
+) -> Float[np.ndarray, "laws flows n 3"]:
+    """Return σ12, N1 and N2 in Pa of every law in every flow; not finite where a law runs away.
+
+    Flows with fewer samples than others repeat their last one.
+
+    Parameters
+    ----------
+    fluids
+        A fluid with a leading axis of laws on every array.
+    protocols, times
+        The flows and their sampling times.
+    """
+    grids = make_grids(protocols, times)
+    return np.asarray(_predict(fluids, stack_protocols(protocols), grids))
+
+
+@eqx.filter_jit
+def _predict(
+    fluids: Fluid, protocols: ShearProtocol, grids: IntegrationGrid
+) -> Float[Array, "laws flows n 3"]:
+    def of_law(fluid):
+        stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
+        normal = stress[..., :3]
+        first = normal[..., 0] - normal[..., 1]
+        return jnp.stack([stress[..., 3], first, normal[..., 1] - normal[..., 2]], axis=-1)
+
+    return eqx.filter_vmap(of_law)(fluids)

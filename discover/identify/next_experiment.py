@@ -1,0 +1,183 @@
+"""What to measure next: the experiment expected to tell the remaining laws apart.
+
+If law i is true, an experiment with noise of standard deviation s is expected to speak against law
+j with a log-likelihood ratio of
+
+    E_ij = ½ dᵀ (s² I + A_i A_iᵀ + A_j A_jᵀ)⁻¹ d,    d = y_i − y_j,
+
+where A Aᵀ is the covariance of a law's prediction that comes from its parameters: a difference
+that a readjustment within their present intervals would remove is no evidence   [design for the
+discrimination of models: Box & Hill 1967, Technometrics 9, 57].
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.identify.experiments import OBSERVED, Experiment
+from discover.identify.many_laws import Contender, draws, fluid_of, predict_laws
+from discover.laws.multimode import Fluid
+
+DECISIVE = 5.0
+"""Natural logarithm of the odds (150 to 1) from which an experiment counts as deciding."""
+
+MOST_EVIDENCE = 1e6
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """One experiment with one set of measured quantities, and what it would decide.
+
+    Attributes
+    ----------
+    experiment
+        The flow.
+    observed
+        What has to be measured: ``sigma12``, with ``N1``, with ``N2``.
+    evidence
+        Expected log-likelihood ratio of the chosen law over each rival, by the rival's name.
+    weakest
+        The smallest over all pairs of laws.
+    curves
+        Prediction of every law, shape (laws, n, 3), the chosen one's first.
+    """
+
+    experiment: Experiment
+    observed: tuple[str, ...]
+    evidence: dict[str, float]
+    weakest: float
+    curves: Float[np.ndarray, "laws n 3"]
+
+    @property
+    def falling(self) -> tuple[str, ...]:
+        """Rivals against which it is expected to decide."""
+        return tuple(name for name, value in self.evidence.items() if value >= DECISIVE)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the proposal without its curves."""
+        return {
+            "experiment": self.experiment.title,
+            "observed": list(self.observed),
+            "expected_evidence": dict(self.evidence),
+            "weakest_pair": self.weakest,
+            "separates": list(self.falling),
+        }
+
+
+def propose_experiments(
+    chosen: Contender,
+    rivals: Sequence[Contender],
+    declared: Fluid,
+    experiments: Sequence[Experiment],
+    noise: float,
+    observed: Sequence[str] = OBSERVED,
+    n_draws: int = 32,
+    seed: int = 0,
+) -> list[Proposal]:
+    """Return what to measure, best first.
+
+    The easiest kind of measurement comes first among those that decide against equally many
+    rivals; then the evidence against the hardest pair counts.
+
+    Parameters
+    ----------
+    chosen, rivals
+        The laws that the data leave, with the covariance of their parameters.
+    declared
+        The known part that they share.
+    experiments
+        What could be run.
+    noise
+        Standard deviation relative to the root-mean-square of each measured quantity; for N2, of
+        N1, which the same force sensor has to bear.
+    observed
+        What could be measured, of `OBSERVED`.
+    n_draws
+        Draws of each law's parameters.
+    seed
+        Of the draws.
+    """
+    laws = [chosen, *rivals]
+    rng = np.random.default_rng(seed)
+    groups = [draws(law, n_draws, rng) for law in laws]
+    flat = [law for group in groups for law in group]
+    starts = np.cumsum([0, *(len(group) for group in groups)])
+    predicted = predict_laws(
+        fluid_of(flat, declared), [e.protocol for e in experiments], [e.times for e in experiments]
+    )
+    proposals = []
+    for place, experiment in enumerate(experiments):
+        n = len(experiment.times)
+        runs = [predicted[a:b, place, :n] for a, b in itertools.pairwise(starts)]
+        if not np.all(np.isfinite(runs[0][0])):
+            continue  # not an experiment that the chosen law survives
+        for kinds in _measurements(observed):
+            evidence = _evidence(runs, kinds, noise)
+            proposals.append(
+                Proposal(
+                    experiment,
+                    tuple(OBSERVED[k] for k in kinds),
+                    {law.name: float(evidence[0, j]) for j, law in enumerate(laws) if j > 0},
+                    float(np.min(evidence[np.triu_indices(len(laws), 1)], initial=MOST_EVIDENCE)),
+                    np.stack([run[0] for run in runs]),
+                )
+            )
+    return sorted(
+        proposals,
+        key=lambda p: (
+            -len(p.falling),
+            max(map(OBSERVED.index, p.observed)),
+            -p.weakest,
+            -sum(p.evidence.values()),
+        ),
+    )
+
+
+def _measurements(observed: Sequence[str]) -> list[tuple[int, ...]]:
+    """Return σ12 alone, then with each quantity that the user can measure besides."""
+    extra = [OBSERVED.index(name) for name in observed if name != "sigma12"]
+    return [(0,), *((0, k) for k in extra)]
+
+
+def _evidence(runs, kinds, noise: float) -> Float[np.ndarray, "laws laws"]:
+    """Return E_ij for all pairs; a law that runs away is refuted by any record."""
+    centre = runs[0][0]
+    scale = np.sqrt(np.mean(centre**2, axis=0))
+    scale[2] = scale[1]
+    size = noise * np.maximum(scale, 1e-300)
+    measured = [(run[..., list(kinds)] / size[list(kinds)]).reshape(len(run), -1) for run in runs]
+    evidence = np.zeros((len(runs), len(runs)))
+    for i in range(len(runs)):
+        for j in range(i):
+            evidence[i, j] = evidence[j, i] = _pair(measured[i], measured[j])
+    return evidence
+
+
+def _pair(first: np.ndarray, second: np.ndarray) -> float:
+    difference = first[0] - second[0]
+    if not np.all(np.isfinite(difference)):
+        return MOST_EVIDENCE
+    factor = np.concatenate([spread_of(first), spread_of(second)], axis=0)
+    return float(min(0.5 * squared_distance(difference, factor), MOST_EVIDENCE))
+
+
+def squared_distance(
+    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
+) -> float:
+    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix (Woodbury)."""
+    inner = np.eye(len(factor)) + factor @ factor.T
+    reduced = difference - factor.T @ np.linalg.solve(inner, factor @ difference)
+    return float(difference @ reduced)
+
+
+def spread_of(group: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "k n"]:
+    """Return F with FᵀF the covariance of a law's prediction; the law itself comes first."""
+    drawn = group[1:]
+    drawn = drawn[np.all(np.isfinite(drawn), axis=1)]
+    if len(drawn) < 2:
+        return np.zeros((0, group.shape[1]))
+    return (drawn - group[0]) / np.sqrt(len(drawn))

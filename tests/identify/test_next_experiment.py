@@ -1,0 +1,146 @@
+"""Bands, proposed experiments, and what happens when they are run."""
+
+import numpy as np
+import pytest
+
+from discover.errors import InputError
+from discover.identify.bands import bands_of_predictions, prediction_bands
+from discover.identify.experiments import candidate_experiments
+from discover.identify.many_laws import Contender, fluid_of, predict_laws
+from discover.identify.next_experiment import DECISIVE, propose_experiments, squared_distance
+from discover.identify.weigh import weigh
+from discover.laws import Fluid, UpperConvectedMaxwell, make_law
+from discover.simulate import simulate
+
+MAXWELL = Fluid.dimensionless(UpperConvectedMaxwell())
+SMALL = np.array([[1e-3**2]])
+JOHNSON_SEGALMAN = Contender("slip", {"sigma.gammadot+gammadot.sigma": 0.2}, covariance=SMALL)
+TWIN = Contender("twin", {"tr(sigma)*gammadot": 0.32}, covariance=SMALL)
+GIESEKUS = Contender("mobility", {"sigma.sigma": 0.2}, covariance=SMALL)
+LINEAR_PTT = Contender("network", {"tr(sigma)*sigma": 0.1}, covariance=SMALL)
+EXPERIMENTS = candidate_experiments(1.0, ("laos", "start_up"), (1.0, 2.0), (0.5, 1.0))
+NOISE = 0.02
+
+
+@pytest.fixture(scope="module")
+def about_the_twin():
+    return propose_experiments(JOHNSON_SEGALMAN, [TWIN], MAXWELL, EXPERIMENTS, NOISE, n_draws=8)
+
+
+@pytest.fixture(scope="module")
+def about_giesekus():
+    return propose_experiments(GIESEKUS, [LINEAR_PTT], MAXWELL, EXPERIMENTS, NOISE, n_draws=8)
+
+
+def test_laws_in_one_library_are_simulated_as_each_alone():
+    experiment = EXPERIMENTS[-1]
+    together = predict_laws(
+        fluid_of([GIESEKUS, LINEAR_PTT], MAXWELL), [experiment.protocol], [experiment.times]
+    )
+    for i, (name, value) in enumerate(
+        (("giesekus", {"alpha": 0.2}), ("ptt_linear", {"epsilon": 0.1}))
+    ):
+        alone = simulate(
+            Fluid.dimensionless(make_law(name, value)), experiment.protocol, experiment.times
+        )
+        # accuracy of the fixed grid's default steps
+        np.testing.assert_allclose(together[i, 0, :, 0], alone.shear_stress, atol=2e-6)
+        np.testing.assert_allclose(
+            together[i, 0, :, 1], alone.first_normal_stress_difference, atol=2e-6
+        )
+
+
+def test_only_a_second_normal_stress_difference_separates_the_slip_twin(about_the_twin):
+    assert about_the_twin[0].observed == ("sigma12", "N2")
+    assert about_the_twin[0].falling == ("twin",)
+    others = [p for p in about_the_twin if "N2" not in p.observed]
+    # the two agree exactly: what is left is the integration error over the noise
+    assert max(p.evidence["twin"] for p in others) < 1e-6
+
+
+def test_shear_stress_suffices_where_it_separates(about_giesekus):
+    assert about_giesekus[0].observed == ("sigma12",)
+    assert about_giesekus[0].evidence["network"] > DECISIVE
+
+
+def test_evidence_falls_with_noise_squared_and_with_parameters_that_can_be_readjusted():
+    def evidence(noise, covariance):
+        laws = [Contender("a", {"sigma.sigma": 0.2}, covariance=covariance)]
+        laws += [Contender("b", {"sigma.sigma": 0.21}, covariance=covariance)]
+        found = propose_experiments(
+            laws[0], laws[1:], MAXWELL, EXPERIMENTS[-1:], noise, ["sigma12"]
+        )
+        return found[0].evidence["b"]
+
+    assert evidence(0.01, None) == pytest.approx(4.0 * evidence(0.02, None), rel=1e-9)
+    # a mobility known to 0.1 only is no evidence for one value against another 0.01 away
+    assert evidence(0.01, np.array([[0.1**2]])) < 0.1 < evidence(0.01, None)
+
+
+def test_the_squared_distance_is_that_of_the_dense_matrix():
+    rng = np.random.default_rng(0)
+    factor, difference = rng.normal(size=(3, 20)), rng.normal(size=20)
+    dense = difference @ np.linalg.solve(np.eye(20) + factor.T @ factor, difference)
+    assert squared_distance(difference, factor) == pytest.approx(dense, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("truth", "laws", "quantities"),
+    [
+        (("giesekus", {"alpha": 0.2}), (GIESEKUS, LINEAR_PTT), ("sigma12",)),
+        (("johnson_segalman", {"xi": 0.4}), (JOHNSON_SEGALMAN, TWIN), ("sigma12", "N2")),
+    ],
+)
+def test_the_rival_falls_when_the_proposed_experiment_is_run(truth, laws, quantities):
+    best = propose_experiments(laws[0], laws[1:], MAXWELL, EXPERIMENTS, NOISE, n_draws=8)[0]
+    assert best.observed == quantities
+    stress = simulate(
+        Fluid.dimensionless(make_law(*truth)), best.experiment.protocol, best.experiment.times
+    )
+    exact = {
+        "sigma12": stress.shear_stress,
+        "N1": stress.first_normal_stress_difference,
+        "N2": stress.second_normal_stress_difference,
+    }
+    size = {q: np.sqrt(np.mean(exact["N1" if q == "N2" else q] ** 2)) for q in quantities}
+    noise = {q: NOISE * size[q] for q in quantities}
+    rng = np.random.default_rng(1)
+    measured = {q: exact[q] + noise[q] * rng.normal(size=exact[q].size) for q in quantities}
+    right, wrong = weigh(laws, MAXWELL, best.experiment, measured, noise)
+    assert not right.refuted
+    assert wrong.refuted
+    # the negative control: without what was asked for, the twin stands
+    if quantities[-1] == "N2":
+        del measured["N2"]
+        assert not weigh(laws, MAXWELL, best.experiment, measured, noise)[1].refuted
+
+
+def test_a_band_holds_the_law_and_widens_with_its_uncertainty_and_its_rivals():
+    flows = EXPERIMENTS[-1:]
+    protocols, times = [e.protocol for e in flows], [e.times for e in flows]
+    narrow = prediction_bands(GIESEKUS, [LINEAR_PTT], MAXWELL, protocols, times)[0]
+    assert np.all(narrow.low <= narrow.chosen + 1e-12)
+    assert np.all(narrow.chosen <= narrow.high + 1e-12)
+    loose = Contender("mobility", GIESEKUS.terms, covariance=4.0 * SMALL)
+    wide = prediction_bands(loose, [LINEAR_PTT], MAXWELL, protocols, times)[0]
+    # same draws, twice as far; linear to a few per cent at this size
+    ratio = wide.widths(False)["N1"] / narrow.widths(False)["N1"]
+    assert ratio == pytest.approx(2.0, rel=0.05)
+    assert narrow.widths()["N2"] > 10 * narrow.widths(False)["N2"]
+    assert narrow.runaways == 0.0
+
+
+def test_draws_that_run_away_are_counted_and_left_out():
+    times = [np.linspace(0.0, 1.0, 5)]
+    predicted = np.ones((3, 1, 5, 3))
+    predicted[2] = np.nan
+    band = bands_of_predictions(predicted, [3], times)[0]
+    assert band.runaways == pytest.approx(1 / 3)
+    assert np.all(np.isfinite(band.low))
+
+
+def test_an_unknown_class_of_experiment_is_an_input_error():
+    with pytest.raises(InputError, match="squeeze"):
+        candidate_experiments(1.0, ["squeeze"])
+    with pytest.raises(InputError, match="Wi"):
+        candidate_experiments(1.0, weissenberg_numbers=[-1.0])
