@@ -15,12 +15,18 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
-from discover.learners.tensor_sindy.optimisers import check_optimiser, solve_sparse
+from discover.learners.tensor_sindy.optimisers import (
+    check_optimiser,
+    default_support,
+    solve_sparse,
+)
 from discover.learners.tensor_sindy.problem import as_runs, make_problem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.report import path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
+from discover.learners.tensor_sindy.selectors import compare_selectors
+from discover.learners.tensor_sindy.stability import selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.simulate.solve import solve_batch
 from tensor_library.library import TermLibrary, build_library
@@ -59,6 +65,8 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         Largest support.
     n_folds
         Groups of runs for the held-out misfit, at most one for each run; below 2 for none.
+    n_stability
+        Complementary pairs of halves of the data in which the selection is repeated; 0 for none.
     misfit_floor
         Relative misfit below which the data count as reproduced: what the fixed-step integration
         can promise. Laws that differ by less are ties.
@@ -87,6 +95,8 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         Inner parameters of the library's closed forms.
     uncertainty_ : ParameterUncertainty or None
         Covariance of coefficients and inner parameters; None for an empty law.
+    stability_ : Stability or None
+        How often each term is chosen from halves of the data.
     path_ : list of Fit
         The best fit of each size, from empty on.
     search_ : SupportSearch
@@ -106,6 +116,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         selection: str = "bic",
         max_terms: int = 5,
         n_folds: int = 8,
+        n_stability: int = 20,
         misfit_floor: float = 1e-5,
         strain_step: float = 0.2,
         random_state: int | None = 0,
@@ -122,6 +133,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         self.selection = selection
         self.max_terms = max_terms
         self.n_folds = n_folds
+        self.n_stability = n_stability
         self.misfit_floor = misfit_floor
         self.strain_step = strain_step
         self.random_state = random_state
@@ -189,6 +201,30 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         self.fluid_ = Fluid(
             self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
         )
+        self.stability_ = None
+        if self.n_stability:
+            self.stability_ = selection_stability(
+                problem,
+                fit,
+                self.optimizer,
+                search.largest,
+                self.misfit_floor,
+                [member.support for member in path],
+                self.n_stability,
+                self.random_state,
+            )
+        model = search.model_at(fit)
+        # the model's rows are divided by √n; a ridge penalty of pysindy's is meant for sums
+        rows = np.sqrt(problem.n_observations)
+        selectors = compare_selectors(
+            library.names,
+            path,
+            criterion,
+            held_out,
+            self.stability_,
+            default_support(self.optimizer, rows * model.design, rows * model.target),
+            self.misfit_floor,
+        )
         self.uncertainty_ = None
         if fit.support:
             self.uncertainty_ = parameter_uncertainty(problem, fit, self.misfit_floor)
@@ -207,6 +243,8 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
                 "path": path_table(search, path, criterion, held_out),
                 "chosen": chosen,
                 "selection": self.selection,
+                "selectors": selectors,
+                "selection_frequency": self._frequencies(library),
                 "rivals": rival_table(search, fit),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer
@@ -264,6 +302,21 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
             linear_relaxation=relaxes,
             base=self.base_law,
         )
+
+    def _frequencies(self, library: TermLibrary) -> list[dict[str, Any]]:
+        """Return how often each term was chosen from halves of the data, the most often first."""
+        if self.stability_ is None:
+            return []
+        rows = [
+            {"term": name, "frequency": float(alone), "with_twins": float(together)}
+            for name, alone, together in zip(
+                library.names,
+                self.stability_.frequency,
+                self.stability_.interchangeable,
+                strict=True,
+            )
+        ]
+        return sorted(rows, key=lambda row: (-row["with_twins"], -row["frequency"]))
 
     def _noise(self) -> dict[str, Any] | None:
         if self.uncertainty_ is None:
