@@ -11,9 +11,10 @@ from discover.report.equations import equations_tex
 from discover.report.mathml import law_element, term_element, term_mathml
 from discover.report.page import render
 from discover.report.plots.flows import flow_picture, start_up_picture, training_picture
+from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
-from discover.report.wording import comparison_verdict, interval
+from discover.report.wording import RULES, comparison_verdict, interval, selection_sentence
 from discover.study.run_folder import RunFolder
 
 _COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
@@ -40,7 +41,11 @@ def write_comparison(
     The page.
     """
     pictures, training = comparison_pictures(comparison)
-    for drawn in [*pictures, *training]:
+    selection = _selection(comparison)
+    drawings = [*pictures, *training]
+    if selection is not None and selection["picture"] is not None:
+        drawings.append(selection["picture"])
+    for drawn in drawings:
         folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
     folder.write("comparison.json", content + "\n")
@@ -59,6 +64,7 @@ def write_comparison(
         coefficients=_coefficients(comparison),
         pictures=pictures,
         training_pictures=training,
+        selection=selection,
         rivals=[_rival(rival) for rival in comparison.rivals],
         study_text=study_text,
     )
@@ -74,6 +80,34 @@ def comparison_pictures(comparison: Comparison) -> tuple[list[Picture], list[Pic
     pictures += [high_deborah_picture(comparison), sweep_picture(comparison)]
     training = [training_picture(comparison), loss_picture(comparison)]
     return [p for p in pictures if p is not None], training
+
+
+def _selection(comparison: Comparison) -> dict[str, Any] | None:
+    """Return the sparse learner's path as the page shows it, or None where there is none."""
+    sparse = comparison.outcomes.get("tensor_sindy")
+    path = [] if sparse is None else sparse.details.get("path", [])
+    if sparse is None or not path:
+        return None
+    chosen = (sparse.details.get("selectors") or {}).get("chosen", {})
+    lowest = min(row["bic"] for row in path)
+    rows = [
+        {
+            "size": row["size"],
+            "math": " ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
+            "misfit": row["misfit"],
+            "held_out": row["held_out"],
+            "bic": row["bic"] - lowest,
+            "rules": ", ".join(
+                RULES[rule] for rule, support in chosen.items() if support == row["support"]
+            ),
+        }
+        for row in path
+    ]
+    return {
+        "rows": rows,
+        "picture": selection_picture(sparse.details),
+        "sentence": selection_sentence(sparse),
+    }
 
 
 def safe_name(name: str) -> str:

@@ -61,6 +61,37 @@ def terms_text(outcome: LearnerOutcome) -> str:
     return ", ".join(parts)
 
 
+RULES = {
+    "bic": "BIC",
+    "held_out": "held-out runs",
+    "stability": "stability",
+    "pysindy": "pysindy at its default",
+}
+"""Rules for choosing a law, as readers know them."""
+
+
+def selection_sentence(outcome: LearnerOutcome) -> str:
+    """Return whether the rules for choosing a law agree, and on what."""
+    chosen: Mapping[str, Sequence[str]] = (outcome.details.get("selectors") or {}).get("chosen", {})
+    if not chosen:
+        return ""
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for rule, support in chosen.items():
+        groups.setdefault(tuple(support), []).append(RULES.get(rule, rule))
+    if len(groups) == 1:
+        return "All rules choose the same law: " + ", ".join(chosen_names(next(iter(groups)))) + "."
+    parts = [
+        f"{' and '.join(rules)}: {', '.join(chosen_names(support))}"
+        for support, rules in groups.items()
+    ]
+    return "The rules disagree. " + "; ".join(parts) + "."
+
+
+def chosen_names(support: Sequence[str]) -> list[str]:
+    """Return the terms of a support in the field's letters."""
+    return [spoken(name) for name in support] or ["no term"]
+
+
 def comparison_verdict(comparison: Comparison) -> list[str]:
     """Return the verdict on a comparison, a few sentences."""
     sentences = []

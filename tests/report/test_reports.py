@@ -10,14 +10,22 @@ import pytest
 from discover.closed_loop import CandidateScore
 from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.comparison import compare
+from discover.comparison.outcome import LearnerOutcome
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import comparison_pictures, safe_name, write_comparison
 from discover.report.loop_report import write_loop
 from discover.report.mathml import law_element, term_element
 from discover.report.mathtext import formula
 from discover.report.plots.flows import curves
+from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import third_harmonic
-from discover.report.wording import comparison_verdict, interval, percent, significant
+from discover.report.wording import (
+    comparison_verdict,
+    interval,
+    percent,
+    selection_sentence,
+    significant,
+)
 from discover.study import RunFolder, parse_study
 from tensor_library.library import build_library
 
@@ -104,6 +112,32 @@ def test_every_picture_is_well_formed_and_names_every_curve(comparison):
 def test_pictures_are_the_same_bytes_every_time(comparison):
     first, second = (comparison_pictures(comparison)[0][0].svg for _ in range(2))
     assert first == second
+
+
+PATH = [
+    {"size": 0, "support": [], "inner": {}, "misfit": 0.4, "held_out": 0.4, "bic": 900.0},
+    {
+        "size": 1,
+        "support": ["sigma.sigma"],
+        "inner": {},
+        "misfit": 0.02,
+        "held_out": 0.02,
+        "bic": 0.0,
+    },
+]
+SELECTORS = {"chosen": {"bic": ["sigma.sigma"], "stability": []}, "agree": False}
+FREQUENCY = [{"term": "sigma.sigma", "frequency": 0.5, "with_twins": 1.0}]
+
+
+def test_the_selection_path_shows_its_rules_and_their_disagreement():
+    details = {"path": PATH, "selectors": SELECTORS, "selection_frequency": FREQUENCY}
+    drawn = selection_picture(details)
+    assert drawn is not None
+    for label in ("chosen by BIC", "chosen by stability", "σ·σ", "runs left out"):
+        assert label in drawn.svg
+    outcome = LearnerOutcome("tensor_sindy", (), 1.0, (np.ones(1), np.ones(1)), details)
+    assert selection_sentence(outcome) == "The rules disagree. BIC: σ·σ; stability: no term."
+    assert selection_picture({"path": PATH[:1]}) is None
 
 
 def test_a_curve_that_ran_away_is_left_out(comparison):

@@ -22,7 +22,7 @@ from discover.learners.tensor_sindy.optimisers import (
 )
 from discover.learners.tensor_sindy.problem import as_runs, make_problem
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.report import path_table, rival_table
+from discover.learners.tensor_sindy.report import covariance_table, path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
 from discover.learners.tensor_sindy.selectors import compare_selectors
@@ -246,6 +246,7 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
                 "selectors": selectors,
                 "selection_frequency": self._frequencies(library),
                 "rivals": rival_table(search, fit),
+                "covariance": covariance_table(search, fit),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.search import SupportSearch
 
+_MOST_COVARIANCES = 8
 _CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
 
 
@@ -64,5 +66,18 @@ def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
             row = _describe(search, fit)
             row["difference"] = float(np.linalg.norm(fit.predicted - chosen.predicted))
             row["exact"] = exact
-            rivals.append(row)
-    return sorted(rivals, key=lambda row: row["difference"])
+            rivals.append((row, fit))
+    rivals.sort(key=lambda pair: pair[0]["difference"])
+    for row, fit in rivals[:_MOST_COVARIANCES]:
+        row["covariance"] = covariance_table(search, fit)
+    return [row for row, _ in rivals]
+
+
+def covariance_table(search: SupportSearch, fit: Fit) -> list[list[float]] | None:
+    """Return the covariance of a law's coefficients, then its inner parameters; None if empty."""
+    if not fit.support:
+        return None
+    uncertainty = parameter_uncertainty(search.problem, fit, search.floor)
+    # what integration cannot promise counts as one more, independent, error
+    total = uncertainty.covariance + np.diag((uncertainty.numerical / 1.96) ** 2)
+    return total.tolist()
