@@ -107,7 +107,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             drawing,
             "selection",
             "The best law of each size: its misfit, and its BIC above the lowest (linear below "
-            "10). Right: how often each term is chosen when half of the data are looked at; the line "
-            "marks what counts as stable. A pale bar beyond the full one: terms of identical "
+            "10). Right: how often each term is chosen when half of the data are looked at; the "
+            "line marks what counts as stable. A pale bar beyond the full one: terms of identical "
             "signature take each other's place.",
         )
