@@ -1,11 +1,12 @@
 """The result of comparing two learners on identical data."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival, Statement
+from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
 
@@ -64,6 +65,8 @@ class Comparison:
         The same again over a parameter.
     distillations
         What simpler laws learn from the true one, JSON-able rows.
+    next_measurement
+        Bands on the test flows, and what would separate the rivals.
     seed
         Seed of the learners.
     """
@@ -80,6 +83,7 @@ class Comparison:
     statements: Sequence[Statement]
     sweep: Sequence[SweepPoint] = ()
     distillations: Sequence[Mapping[str, Any]] = ()
+    next_measurement: NextMeasurement = field(default_factory=NextMeasurement)
     seed: int = 0
 
     def flows_of(self, kind: str) -> list[Flow]:
@@ -148,6 +152,7 @@ class Comparison:
                 for p in self.sweep
             ],
             "distillation": list(self.distillations),
+            "next_measurement": self.next_measurement.to_json(),
         }
         return plain(content)
 

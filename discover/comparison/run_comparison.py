@@ -5,6 +5,7 @@ from collections.abc import Callable
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.flows import Flow, comparison_flows, predict
 from discover.comparison.identifiability import find_rivals, undetermined_quantities
+from discover.comparison.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.training import Progress, require_numbers, silent, train
 from discover.comparison.truth import TrueTerm, true_terms
@@ -81,6 +82,12 @@ def compare(
     rivals = []
     if chosen is not None:
         rivals = find_rivals(chosen.terms, chosen.details.get("rivals", ()), model, flows)
+    following = NextMeasurement()
+    if chosen is not None:
+        judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+        following = next_measurement(
+            chosen, rivals, model.fluid, judged, options.next, learner_seed
+        )
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -96,6 +103,7 @@ def compare(
         statements=undetermined_quantities(flows, options.use_normal_stresses, rivals),
         sweep=points,
         distillations=distillations,
+        next_measurement=following,
         seed=learner_seed,
     )
 

@@ -25,6 +25,9 @@ from discover.laws.multimode import Fluid
 DECISIVE = 5.0
 """Natural logarithm of the odds (150 to 1) from which an experiment counts as deciding."""
 
+OVERWHELMING = 50.0
+"""More evidence than this makes no experiment better than another."""
+
 MOST_EVIDENCE = 1e6
 
 
@@ -81,7 +84,8 @@ def propose_experiments(
     """Return what to measure, best first.
 
     The easiest kind of measurement comes first among those that decide against equally many
-    rivals; then the evidence against the hardest pair counts.
+    rivals; then the evidence against the hardest pair counts, until it is overwhelming; then the
+    order in which the experiments are given, the gentlest first.
 
     Parameters
     ----------
@@ -126,15 +130,14 @@ def propose_experiments(
                     np.stack([run[0] for run in runs]),
                 )
             )
-    return sorted(
-        proposals,
-        key=lambda p: (
-            -len(p.falling),
-            max(map(OBSERVED.index, p.observed)),
-            -p.weakest,
-            -sum(p.evidence.values()),
-        ),
-    )
+    return sorted(proposals, key=_rank)
+
+
+def _rank(proposal: Proposal) -> tuple:
+    enough = min(proposal.weakest, OVERWHELMING)
+    total = sum(min(value, OVERWHELMING) for value in proposal.evidence.values())
+    hardest = max(OBSERVED.index(name) for name in proposal.observed)
+    return (-len(proposal.falling), hardest, -enough, -total)
 
 
 def _measurements(observed: Sequence[str]) -> list[tuple[int, ...]]:

@@ -10,7 +10,8 @@ from discover.learners.result import RecoveredTerm
 from discover.report.equations import equations_tex
 from discover.report.mathml import law_element, term_element, term_mathml
 from discover.report.page import render
-from discover.report.plots.flows import flow_picture, start_up_picture, training_picture
+from discover.report.plots.flows import SYMBOLS, flow_picture, start_up_picture, training_picture
+from discover.report.plots.next_experiment import next_picture
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
@@ -45,6 +46,9 @@ def write_comparison(
     drawings = [*pictures, *training]
     if selection is not None and selection["picture"] is not None:
         drawings.append(selection["picture"])
+    proposed = next_picture(comparison)
+    if proposed is not None:
+        drawings.append(proposed)
     for drawn in drawings:
         folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
@@ -65,6 +69,8 @@ def write_comparison(
         pictures=pictures,
         training_pictures=training,
         selection=selection,
+        proposed=proposed,
+        proposals=_proposals(comparison),
         rivals=[_rival(rival) for rival in comparison.rivals],
         study_text=study_text,
     )
@@ -181,6 +187,19 @@ def _coefficients(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {"math": term_element(name), "mean": row["mean"], "spread": row["spread"]}
         for name, row in table.items()
+    ]
+
+
+def _proposals(comparison: Comparison) -> list[dict[str, Any]]:
+    following = comparison.next_measurement
+    return [
+        {
+            "title": proposal.experiment.title,
+            "observed": ", ".join(SYMBOLS[name] for name in proposal.observed),
+            "falling": f"{len(proposal.falling)} of {len(following.laws) - 1}",
+            "weakest": min(proposal.evidence.values()),
+        }
+        for proposal in following.proposals
     ]
 
 

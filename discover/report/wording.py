@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 
+SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
 
 
@@ -87,6 +89,27 @@ def selection_sentence(outcome: LearnerOutcome) -> str:
     return "The rules disagree. " + "; ".join(parts) + "."
 
 
+def next_sentences(following: NextMeasurement) -> list[str]:
+    """Return what to measure next, or that nothing allowed would help."""
+    if not following.proposals:
+        return []
+    best = following.proposals[0]
+    n_rivals = len(following.laws) - 1
+    laws = f"{n_rivals} rival law{'s' if n_rivals > 1 else ''}"
+    if not best.falling:
+        return [
+            f"None of the experiments allowed is expected to separate the chosen law from the "
+            f"{laws} that these data leave."
+        ]
+    what = " and ".join(SYMBOLS[name] for name in best.observed)
+    fall = len(best.falling)
+    outcome = "all of them" if fall == n_rivals else f"{fall} of them"
+    return [
+        f"To decide, measure {what} in {best.experiment.title}: of the {laws} that these data "
+        f"leave, it is expected to rule out {outcome} at {percent(following.noise)} noise."
+    ]
+
+
 def chosen_names(support: Sequence[str]) -> list[str]:
     """Return the terms of a support in the field's letters."""
     return [spoken(name) for name in support] or ["no term"]
@@ -137,12 +160,5 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
             f"Not determined by these data: {names}. What is shown of it is the choice of the "
             "simplest law that fits, not a measurement."
         )
-    separations = [r.separated_by for r in comparison.rivals if r.separated_by]
-    if separations:
-        place = separations[0]
-        titles = {flow.name: flow.title for flow in comparison.judged}
-        where = titles.get(place["protocol"], place["protocol"])
-        sentences.append(
-            f"To decide, measure {place['quantity']} in {where}: rival laws differ most there."
-        )
+    sentences += next_sentences(comparison.next_measurement)
     return sentences

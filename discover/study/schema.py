@@ -94,6 +94,23 @@ class Sweep(_Section):
     values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
 
 
+class NextExperiment(_Section):
+    """What the user could measure next."""
+
+    flows: Annotated[
+        tuple[Literal["laos", "start_up", "cessation", "steps", "superposed"], ...],
+        Field(min_length=1),
+    ] = ("laos", "start_up", "cessation", "steps", "superposed")
+    observe: Annotated[tuple[Literal["sigma12", "N1", "N2"], ...], Field(min_length=1)] = (
+        "sigma12",
+        "N1",
+        "N2",
+    )
+    weissenberg_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.5, 1.0, 2.0, 4.0)
+    deborah_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.25, 0.5, 1.0, 2.0)
+    noise: Annotated[float, Field(gt=0, le=1)] | None = None
+
+
 class Compare(_Section):
     """Which learners, which candidate terms, which flows they are judged on."""
 
@@ -111,6 +128,7 @@ class Compare(_Section):
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
     sweep: Sweep | None = None
     distillation: bool = False
+    next: NextExperiment = NextExperiment()
 
     @model_validator(mode="after")
     def _at_least_one(self):

@@ -10,6 +10,7 @@ from discover.report.plots.style import (
     LEARNER_TITLES,
     MEASURED,
     SHADE,
+    SPARSE,
     TRUTH_STYLE,
     Picture,
     figure,
@@ -54,6 +55,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
                 if quantity in stresses:
                     in_time.plot(flow.times, stresses[quantity], label=label, **style)
                     lissajous.plot(flow.shear_rate[last], stresses[quantity][last], **style)
+            _draw_band(in_time, comparison, flow, quantity, flow.times >= 0)
             _mark_training(in_time, flow)
             _frame(in_time, comparison, flow, quantity, flow.times >= 0)
             _frame(lissajous, comparison, flow, quantity, last)
@@ -84,6 +86,7 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
             for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
+            _draw_band(panel, comparison, flow, quantity, shown)
             _frame(panel, comparison, flow, quantity, shown)
             panel.set_ylabel(SYMBOLS[quantity] + stress_unit)
             panel.set_xlabel(time_label)
@@ -133,6 +136,23 @@ def _seen(comparison: Comparison, flow: Flow) -> str:
     if flow.name in {f.name for f in comparison.flows_of("training")}:
         return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
     return "no learner saw this flow."
+
+
+def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
+    """Shade what the data leave open: the intervals of the parameters, and the rivals."""
+    band = comparison.next_measurement.bands.get(flow.key)
+    if band is None:
+        return
+    column = QUANTITIES.index(quantity)
+    panel.fill_between(
+        flow.times[shown],
+        band.rivals_low[shown, column],
+        band.rivals_high[shown, column],
+        color=SPARSE,
+        alpha=0.18,
+        linewidth=0,
+        label="left open by the data (95 %, with rivals)",
+    )
 
 
 def _mark_training(panel, flow: Flow) -> None:

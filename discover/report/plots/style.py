@@ -131,7 +131,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
             plt.close(drawing)
 
 
-def legend_above(drawing: Figure, axes, columns: int = 5) -> None:
+def legend_above(drawing: Figure, axes, columns: int = 4) -> None:
     """Put one legend for all panels above them."""
     entries = {}
     for panel in axes.ravel():

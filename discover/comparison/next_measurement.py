@@ -1,0 +1,146 @@
+"""After a comparison: bands on the test flows, and what to measure next."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.flows import Flow
+from discover.comparison.outcome import LearnerOutcome
+from discover.identify.bands import PredictionBand, prediction_bands
+from discover.identify.experiments import candidate_experiments
+from discover.identify.many_laws import Contender
+from discover.identify.next_experiment import Proposal, propose_experiments
+from discover.laws.multimode import Fluid
+from discover.study.schema import NextExperiment
+
+LEAST_NOISE = 0.01
+"""Relative noise assumed of the next experiment where the data at hand show less."""
+
+_MOST_RIVALS = 6
+_MOST_DRAWS = 40
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """What the laws that remain leave open, and what would close it.
+
+    Attributes
+    ----------
+    laws
+        Names of the laws, the chosen one first.
+    proposals
+        The best experiments, best first; empty where no rival is known.
+    bands
+        By the key of the flow.
+    noise
+        Relative noise that the evidence assumes.
+    """
+
+    laws: tuple[str, ...] = ()
+    proposals: Sequence[Proposal] = ()
+    bands: Mapping[str, PredictionBand] = field(default_factory=dict)
+    noise: float = LEAST_NOISE
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything but the curves."""
+        return {
+            "laws": list(self.laws),
+            "noise": self.noise,
+            "proposals": [proposal.to_json() for proposal in self.proposals],
+            "bands": {key: band.to_json() for key, band in self.bands.items()},
+        }
+
+
+def next_measurement(
+    outcome: LearnerOutcome,
+    rivals: Iterable[Any],
+    declared: Fluid,
+    flows: Sequence[Flow],
+    options: NextExperiment,
+    seed: int = 0,
+) -> NextMeasurement:
+    """Return bands and proposals for the law that sparse regression chose.
+
+    Parameters
+    ----------
+    outcome
+        Of the sparse learner.
+    rivals
+        Laws with ``terms`` and ``inner``, closest first.
+    declared
+        The known part.
+    flows
+        Flows to draw bands for.
+    options
+        What the user could run.
+    seed
+        Of the draws from the parameters' uncertainty.
+    """
+    chosen, others = contenders(outcome, rivals)
+    misfit = float(outcome.details.get("misfit") or 0.0)
+    noise = options.noise or max(misfit, LEAST_NOISE)
+    bands = {}
+    if flows:
+        found = prediction_bands(
+            chosen,
+            others,
+            declared,
+            [flow.protocol for flow in flows],
+            [flow.times for flow in flows],
+            n_draws=_MOST_DRAWS,
+            seed=seed,
+        )
+        bands = {flow.key: band for flow, band in zip(flows, found, strict=True)}
+    proposals = []
+    if others:
+        moduli, times = (np.asarray(v) for v in (declared.modulus, declared.relaxation_time))
+        # the mean time that the zero-shear normal stress over the viscosity shows
+        mean_time = float(np.sum(moduli * times**2) / np.sum(moduli * times))
+        experiments = candidate_experiments(
+            mean_time, options.flows, options.weissenberg_numbers, options.deborah_numbers
+        )
+        proposals = propose_experiments(
+            chosen, others, declared, experiments, noise, options.observe, seed=seed
+        )
+    names = (chosen.name, *(law.name for law in others))
+    return NextMeasurement(names, proposals[:_SHOWN], bands, noise)
+
+
+def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contender, list[Contender]]:
+    """Return the chosen law and its rivals, with the covariances that the search knows."""
+    details = outcome.details
+    known = {frozenset(row["support"]): row for row in details.get("rivals", ())}
+    terms = {term.term: term.coefficient for term in outcome.terms}
+    inner = {name: value for term in outcome.terms for name, value in term.inner.items()}
+    chosen = Contender(law_name(terms), terms, inner, _covariance(details, len(terms) + len(inner)))
+    others = []
+    for rival in list(rivals)[:_MOST_RIVALS]:
+        row = known.get(frozenset(rival.terms))
+        if row is not None and dict(zip(row["support"], row["coefficients"], strict=True)) == dict(
+            rival.terms
+        ):
+            size = len(row["support"]) + len(row["inner"])
+            fitted = dict(zip(row["support"], row["coefficients"], strict=True))
+            others.append(Contender(law_name(fitted), fitted, row["inner"], _covariance(row, size)))
+        else:
+            used = dict(rival.inner)
+            others.append(Contender(law_name(rival.terms), dict(rival.terms), used))
+    return chosen, others
+
+
+def law_name(terms: Mapping[str, float]) -> str:
+    """Return a law as the sum of its terms, for tables."""
+    text = " ".join(f"{value:+.3g} {name}" for name, value in terms.items())
+    return text.removeprefix("+") or "no term"
+
+
+def _covariance(row: Mapping[str, Any], size: int) -> np.ndarray | None:
+    matrix = row.get("covariance")
+    if matrix is None:
+        return None
+    values = np.asarray(matrix, dtype=float)
+    usable = values.shape == (size, size) and np.all(np.isfinite(values))
+    return values if usable else None
