@@ -29,14 +29,14 @@ def main() -> None:
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.learners.tbnn_ude.recipe_paper import make_network
     from discover.learners.tbnn_ude.variational import residual_and_jacobian
-    from discover.learners.tbnn_ude.weights import Rebuild, weights_of
+    from discover.learners.tbnn_ude.weights import Rebuild
     from discover.simulate import ExponentialRungeKutta4, synthetic_dataset
 
     data = synthetic_dataset("giesekus", {"alpha": 0.2})
     problem = make_problem(data.runs, np.ones(1), np.ones(1))
     law = make_network(jax.random.key(0), arguments.width, True)
-    weights = weights_of(law)
-    rebuild = Rebuild(law, jnp.ones(weights.shape, bool))
+    rebuild = Rebuild.everything(law)
+    weights = rebuild.start
     times = jnp.asarray(data.runs[0].time)
 
     def loss(weights, problem, adjoint):

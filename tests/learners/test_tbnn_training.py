@@ -23,7 +23,7 @@ from discover.learners.tbnn_ude.recipe_paper import (
     train_paper,
 )
 from discover.learners.tbnn_ude.variational import residual_and_jacobian
-from discover.learners.tbnn_ude.weights import Rebuild, trainable_mask, weights_of
+from discover.learners.tbnn_ude.weights import Rebuild
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
 
@@ -52,8 +52,8 @@ def trained(giesekus_problem):
 
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
     law = make_network(jax.random.key(1), 3, True)
-    weights = weights_of(law)
-    rebuild = Rebuild(law, jnp.ones(weights.shape, bool))
+    rebuild = Rebuild.everything(law)
+    weights = rebuild.start
     _, jacobian = eqx.filter_jit(residual_and_jacobian)(weights, rebuild, giesekus_problem)
     direction = jax.random.normal(jax.random.key(2), weights.shape)
     residual = eqx.filter_jit(lambda w, p: p.residual(rebuild(w)))
@@ -110,10 +110,10 @@ def test_a_start_that_runs_away_neither_crashes_nor_gives_nan(giesekus_problem):
     law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
     good = law
     law = eqx.tree_at(lambda tree: tree.constants, law, jnp.zeros(8).at[3].set(-8.0))
-    rebuild = Rebuild(law, trainable_mask(law, np.ones(8, bool), False))
+    rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
     cloud = sample_states(good, giesekus_problem)
     objective = Objective(giesekus_problem, rebuild, cloud, reweighted(good, cloud, 1e-3))
-    weights = minimise(weights_of(law), objective, 3)
+    weights = minimise(rebuild.start, objective, 3)
     assert np.all(np.isfinite(weights))
 
 

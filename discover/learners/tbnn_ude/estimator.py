@@ -17,6 +17,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, train_members
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
@@ -67,7 +68,9 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
     terms_ : tuple of RecoveredTerm
         The projection.
     members_ : list of TensorBasisNetwork
-        Every trained member.
+        Every trained member, the first one's tensors shared by all.
+    ensemble_ : str
+        How the members came about; where constants suffice they do not differ.
     """
 
     def __init__(
@@ -117,11 +120,12 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         if self.n_members < 1:
             raise InputError(f"n_members must be at least 1; got {self.n_members}.")
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
-        members = [self._train(problem, key, recipe) for key in keys]
-        best = min(members, key=lambda member: _or_infinite(member.misfit))
+        best, members, agreement = self._train_all(problem, keys, recipe)
+        misfits = member_misfits(stack_members(members), problem)
 
         self.n_features_in_ = 1
-        self.members_ = [member.law for member in members]
+        self.members_ = members
+        self.ensemble_ = agreement
         self.law_ = best.law
         total = float(np.sum(np.atleast_1d(np.asarray(self.modulus, dtype=float))))
         self.fluid_ = Fluid(best.law, problem.modulus * total, problem.relaxation_time)
@@ -142,14 +146,13 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
                 "coefficients": _coefficient_table(best.law, cloud),
                 "coefficients_vary": best.varies,
                 "projection_misfit": projection.misfit,
+                "ensemble": agreement,
                 "members": [
                     {
-                        "misfit": member.misfit,
-                        "coefficients": _coefficient_table(
-                            member.law, sample_states(member.law, problem)
-                        ),
+                        "misfit": float(misfit),
+                        "coefficients": _coefficient_table(law, sample_states(law, problem)),
                     }
-                    for member in members
+                    for law, misfit in zip(members, misfits, strict=True)
                 ],
             },
             message=best.message,
@@ -205,6 +208,28 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         if self.recipe == "paper":
             return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
+
+    def _train_all(
+        self, problem: TrainingProblem, keys, recipe
+    ) -> tuple[Trained, list[TensorBasisNetwork], str]:
+        """Return the member with the smallest misfit, all members, and how they came about."""
+        if isinstance(recipe, PaperRecipe):
+            trained = [self._train(problem, key, recipe) for key in keys]
+            best = min(trained, key=lambda member: _or_infinite(member.misfit))
+            return best, [member.law for member in trained], "trained one after the other"
+        first = self._train(problem, keys[0], recipe)
+        if len(keys) == 1:
+            return first, [first.law], "a single member"
+        if not first.varies:
+            # no initial weight takes part: every member would be this one
+            return first, [first.law] * len(keys), "constants suffice: members do not differ"
+        others = train_members(problem, first.law, keys[1:], recipe, self.progress)
+        members = [first.law, *others]
+        misfits = member_misfits(stack_members(others), problem)
+        if np.min(misfits) < first.misfit:
+            law = others[int(np.argmin(misfits))]
+            first = replace(first, law=law, misfit=float(np.min(misfits)))
+        return first, members, "trained side by side on the tensors that the first one found"
 
     def _train(self, problem: TrainingProblem, key, recipe) -> Trained:
         relaxes = (

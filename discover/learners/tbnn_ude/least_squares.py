@@ -20,7 +20,12 @@ from discover.learners.tbnn_ude.weights import Rebuild
 _SOLVER = optimistix.LevenbergMarquardt(
     rtol=1e-9, atol=1e-11, linear_solver=lineax.Normal(lineax.Cholesky())
 )
+# The solver's first damping is one. Residuals of relative size, by parameters in their own units,
+# have a curvature far below that: unscaled, every descent would begin as a slow gradient descent.
+_AMPLIFICATION = 30.0
 _PATIENCE = 4
+_LEAST_PROGRESS = 1e-3
+_MOST_REJECTED = 8
 
 Callback = Callable[[float], None]
 
@@ -57,21 +62,54 @@ def data_scale(problem: TrainingProblem) -> Float[Array, "runs 1"]:
 def residual_rows(
     weights: Float[Array, " p"], objective: Objective
 ) -> tuple[Float[Array, " rows"], Float[Array, "runs n"]]:
-    """Return data and prior as one vector of residuals, and the data's part by run."""
+    """Return data and prior as one amplified vector of residuals, and the data's part by run."""
     data = residual_of_weights(weights, rebuild=objective.rebuild, problem=objective.problem)
     data = data * data_scale(objective.problem)
     prior = prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
-    return jnp.concatenate([data.ravel(), prior]), data
+    return _AMPLIFICATION * jnp.concatenate([data.ravel(), prior]), data
+
+
+class Stopping:
+    """Decides when a descent has ended: at its target, or when steps no longer pay.
+
+    A rejected step is no sign of an end: it teaches the damping. Only steps taken count, unless
+    one rejection follows another.
+
+    Parameters
+    ----------
+    target
+        Misfit that is good enough.
+    """
+
+    def __init__(self, target: float):
+        self.target = target
+        self.taken: list[float] = []
+        self.rejected = 0
+
+    def done(self, misfit: float) -> bool:
+        """Return whether to stop, given the misfit after another step."""
+        if np.isfinite(misfit):
+            if self.taken and misfit == self.taken[-1]:
+                self.rejected += 1
+            else:
+                self.taken.append(misfit)
+                self.rejected = 0
+        if misfit < self.target or self.rejected >= _MOST_REJECTED:
+            return True
+        recent = self.taken[-_PATIENCE - 1 :]
+        return len(recent) > _PATIENCE and recent[0] - recent[-1] < _LEAST_PROGRESS * recent[0]
 
 
 @eqx.filter_jit
-def _start(weights, objective):
+def first_state(weights: Float[Array, " p"], objective: Objective):
+    """Return the solver's state before the first step."""
     rows, by_run = eqx.filter_eval_shape(residual_rows, weights, objective)
     return _SOLVER.init(residual_rows, weights, objective, {}, rows, by_run, frozenset())
 
 
 @eqx.filter_jit
-def _step(weights, objective, state):
+def next_state(weights: Float[Array, " p"], objective: Objective, state):
+    """Return weights, the solver's state and the residuals after one more step."""
     weights, state, aux = _SOLVER.step(residual_rows, weights, objective, {}, state, frozenset())
     return weights, state, aux
 
@@ -107,20 +145,20 @@ def minimise(
     target
         Stop when the norm of all residuals is below this.
     """
-    state = _start(weights, objective)
-    best, history = weights, []
+    state = first_state(weights, objective)
+    best, stopping = weights, Stopping(target)
     for _ in range(steps):
-        weights, state, _ = _step(weights, objective, state)
-        cost = float(state.f_info.as_min())
-        misfit = float(np.sqrt(max(2.0 * cost, 0.0)))
+        weights, state, _ = next_state(weights, objective, state)
+        misfit = norm_of_cost(state.f_info.as_min())
         if np.isfinite(misfit):
             best = weights
-            history.append(misfit)
         if callback is not None:
             callback(misfit)
-        if misfit < target:
-            break
-        recent = history[-_PATIENCE - 1 :]
-        if len(recent) > _PATIENCE and recent[0] - recent[-1] < 1e-3 * recent[0]:
+        if stopping.done(misfit):
             break
     return best
+
+
+def norm_of_cost(cost: Float[Array, ""]) -> float:
+    """Return the norm of residuals from half the sum of squares of the amplified ones."""
+    return float(np.sqrt(max(2.0 * float(cost), 0.0))) / _AMPLIFICATION

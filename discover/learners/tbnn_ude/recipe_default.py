@@ -31,7 +31,7 @@ from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwor
 from discover.learners.tbnn_ude.least_squares import Objective, law_misfit, minimise
 from discover.learners.tbnn_ude.prior import Cloud, parts, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.weights import Rebuild, trainable_mask, weights_of
+from discover.learners.tbnn_ude.weights import Rebuild
 from tensor_library.invariants import scalar_invariants
 
 Progress = Callable[[int, int, float], None]
@@ -127,6 +127,12 @@ def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     return jnp.where(size > 1e-12, size, 1.0)
 
 
+def constant_scale(cloud: Cloud) -> Float[Array, "8"]:
+    """Return the unit of each constant: one over the root mean square of its tensor."""
+    size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
+    return 1.0 / jnp.maximum(size, 1e-6)
+
+
 def is_white(residual: Float[np.ndarray, "runs n"], mask: np.ndarray) -> bool:
     """Return whether neighbouring residuals are uncorrelated, at three standard deviations."""
     pairs = mask[:, 1:] & mask[:, :-1]
@@ -163,14 +169,14 @@ class _Session:
         steps: int,
     ) -> TensorBasisNetwork:  # fmt: skip
         """Return a law trained for one round, with the prior reweighted at its start."""
-        rebuild = Rebuild(law, trainable_mask(law, tensors, network))
         cloud = sample_states(law, self.problem)
         if not bool(jnp.all(jnp.isfinite(cloud.stress))):
             return law
-        prior = reweighted(law, cloud, strength)
-        objective = Objective(self.problem, rebuild, cloud, prior)
+        make = Rebuild.with_network if network else Rebuild.of_constants
+        rebuild = make(law, tensors, constant_scale(cloud))
+        objective = Objective(self.problem, rebuild, cloud, reweighted(law, cloud, strength))
         target = 0.1 * self.recipe.exact
-        weights = minimise(weights_of(law), objective, steps, self.record, target)
+        weights = minimise(rebuild.start, objective, steps, self.record, target)
         trained = rebuild(weights)
         # a law that runs away in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
@@ -189,9 +195,16 @@ class _Session:
             if self.white(law):
                 break
         penalised = law
-        law = _without_empty_terms(law, sample_states(law, self.problem), self.recipe.removed_below)
-        kept = np.asarray(law.constants) != 0.0
-        return penalised, self.round(law, 0.0, kept, False, self.recipe.polish_steps)
+        for _ in range(_CLEARINGS):
+            before = law
+            law = _without_empty_terms(
+                law, sample_states(law, self.problem), self.recipe.removed_below
+            )
+            kept = np.asarray(law.constants) != 0.0
+            law = self.round(law, 0.0, kept, False, self.recipe.polish_steps)
+            if np.array_equal(kept, np.asarray(before.constants) != 0.0):
+                break
+        return penalised, law
 
     def functions(self, start: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
         """Return the best law of few tensors with varying coefficients, before and after polish."""
@@ -209,7 +222,7 @@ class _Session:
                 starts.append((self.misfit(start), int(tensor), start, tensors))
             trials = []
             for _, tensor, start, tensors in sorted(starts, key=lambda s: s[:2])[:_MOST_TRIALS]:
-                trial = self.round(start, _PRIOR_SHARE, tensors, True, self.recipe.steps)
+                trial = self.round(start, PRIOR_SHARE, tensors, True, self.recipe.steps)
                 trials.append((self.misfit(trial), tensor, trial))
             found = min(trials, key=lambda trial: trial[:2])
             if not found[0] < misfit:
@@ -217,7 +230,7 @@ class _Session:
             chosen[found[1]] = True
             law = penalised = found[2]
             if not self.settled(law):
-                share = _PRIOR_SHARE * min(1.0, found[0]) ** 2
+                share = PRIOR_SHARE * min(1.0, found[0]) ** 2
                 law = self.round(law, share, chosen, True, self.recipe.polish_steps)
             misfit = self.misfit(law)
             if misfit < self.recipe.resolved or self.settled(law):
@@ -225,10 +238,11 @@ class _Session:
         return penalised, law
 
 
+_CLEARINGS = 3
 _START_STEPS = 6
 _MOST_TRIALS = 4
 
-_PRIOR_SHARE = 1e-6
+PRIOR_SHARE = 1e-6
 """Strength of the prior while functions are learned. It only settles what the data leave open."""
 
 
