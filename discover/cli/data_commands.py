@@ -98,16 +98,26 @@ def check(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say everything that is wrong with a data folder; exit code 2 if anything is."""
+    """Say everything that is wrong or doubtful about a data folder; exit code 2 on errors."""
+    from dataclasses import asdict
+
     from discover.dataset.check import check_folder
 
-    problems = check_folder(folder, clock_factor)
+    findings = check_folder(folder, clock_factor)
+    by_severity = {
+        severity: [finding for finding in findings if finding.severity == severity]
+        for severity in ("error", "warning", "note")
+    }
     if as_json:
-        typer.echo(json.dumps({"folder": folder, "problems": problems}, indent=2))
-    elif not problems:
-        typer.echo(f"{folder}: nothing wrong was found.")
+        lists = {f"{key}s": [asdict(f) for f in found] for key, found in by_severity.items()}
+        typer.echo(json.dumps({"folder": folder, **lists}, indent=2))
     else:
-        for problem in problems:
-            typer.echo(problem, err=True)
-    if problems:
+        for finding in findings:
+            typer.echo(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        counts = ", ".join(
+            f"{len(found)} {key}{'' if len(found) == 1 else 's'}"
+            for key, found in by_severity.items()
+        )
+        typer.echo(f"{folder}: {counts}." if findings else f"{folder}: nothing wrong was found.")
+    if by_severity["error"]:
         raise typer.Exit(2)

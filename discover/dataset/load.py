@@ -142,7 +142,7 @@ def read_index(root: Path) -> Table:
     index = read_table(root / INDEX_FILE)
     if "file" not in index.columns:
         raise InputError(
-            f"{INDEX_FILE} has no column 'file'; its columns are {', '.join(index.columns)}. Add "
+            f"{INDEX_FILE} has no column 'file'; its columns are {index.listed}. Add "
             "it, with the file name of each run."
         )
     seen: set[str] = set()
@@ -184,7 +184,7 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
     if column not in index.columns:
         raise InputError(
             f"clock_factor names the column {column!r}, but {INDEX_FILE} has only "
-            f"{', '.join(index.columns)}. Correct the name, or leave clock_factor out."
+            f"{index.listed}. Correct the name, or leave clock_factor out."
         )
     factors = index.numbers(column)
     if np.any(factors <= 0):

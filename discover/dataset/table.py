@@ -49,6 +49,13 @@ class Table:
     def __len__(self) -> int:
         return len(self.lines)
 
+    @property
+    def listed(self) -> str:
+        """Names of the columns, as they can be printed in a message."""
+        names = [_shown(column) for column in self.columns]
+        more = f" and {len(names) - 12} more" if len(names) > 12 else ""
+        return ", ".join(names[:12]) + more
+
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
         """Return a column as finite numbers.
 
@@ -107,7 +114,7 @@ class Table:
         if values is None:
             raise InputError(
                 f"{self.name} has no column {quantity.column}; its columns are "
-                f"{_listed(self.columns)}. {_rename(quantity, self.columns)}"
+                f"{self.listed}. {_rename(quantity, self.columns)}"
             )
         return values
 
@@ -133,6 +140,8 @@ def read_bytes(path: Path, name: str) -> bytes:
                 "MB. Keep fewer samples of it."
             )
         return Path(path).read_bytes()
+    except InputError:
+        raise
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(
             f"There is no file {name} in {path.parent.name or path.parent}. Add it, or take its "
@@ -222,6 +231,11 @@ def _decode(content: bytes, name: str) -> str:
 
 def _header(cells: list[str], line: int, name: str) -> list[str]:
     columns = [cell.strip() for cell in cells]
+    if all(_NUMBER.fullmatch(column) for column in columns):
+        raise InputError(
+            f"{name} begins with numbers on line {line}, not with the names of its columns. Add a "
+            "header such as time_s,shear_rate_1_s,stress_Pa."
+        )
     if len(columns) == 1:
         for mark, word in ((";", "semicolons"), ("\t", "tabs")):
             if mark in columns[0]:
@@ -234,11 +248,6 @@ def _header(cells: list[str], line: int, name: str) -> list[str]:
             raise InputError(f"Column {i + 1} of {name} has no name. Name it or remove it.")
         if columns.index(column) != i:
             raise InputError(f"{name} has two columns named {_shown(column)}; keep one.")
-    if all(_NUMBER.fullmatch(column) for column in columns):
-        raise InputError(
-            f"{name} begins with numbers on line {line}, not with the names of its columns. Add a "
-            "header such as time_s,shear_rate_1_s,stress_Pa."
-        )
     return columns
 
 
@@ -290,8 +299,3 @@ def _shown(cell: str) -> str:
     """Return a cell as it can be printed: short and without control characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cell.strip())
     return (plain[:40] + "…" if len(plain) > 40 else plain) or "nothing"
-
-
-def _listed(columns: Mapping[str, Sequence[str]]) -> str:
-    names = [_shown(column) for column in columns]
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

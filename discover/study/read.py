@@ -68,6 +68,8 @@ def _read_text(path: Path) -> str:
         raise InputError(
             f"{path} cannot be read: {error.strerror}. Check the file and who may read it."
         ) from None
+    except InputError:
+        raise
     except ValueError:
         raise InputError(f"{str(path)!r} is no name that a file can have. Correct it.") from None
 
