@@ -177,6 +177,6 @@ def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]
             "error",
             "rate",
             "",
-            "The shear rate is zero in every run, so there is nothing to learn a law from. Add runs "
-            "with flow.",
+            "The shear rate is zero in every run, so there is nothing to learn a law from. Add "
+            "runs with flow.",
         )
