@@ -76,7 +76,7 @@ def against_linear_theory(
         )
     for run in start_ups:
         yield from _duration(run, mean_time)
-        yield from _small_strain(run, spectrum)
+        yield from _small_strain(run, sweep, spectrum)
         yield from _cox_merz(run, sweep, mean_time)
 
 
@@ -99,14 +99,16 @@ def _duration(run: ShearRun, mean_time: float) -> Iterator[Finding]:
         )
 
 
-def _small_strain(run: ShearRun, spectrum: RelaxationSpectrum) -> Iterator[Finding]:
+def _small_strain(
+    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> Iterator[Finding]:
     """Hold the first stresses against σ(t) = γ̇ Σ G_k λ_k (1 − exp(−t/λ_k))."""
     rate = run.shear_rate[0]
     times = run.time[:, None] / spectrum.relaxation_time
     linear = rate * (-np.expm1(-times) @ (spectrum.modulus * spectrum.relaxation_time))
     use = (abs(rate) * run.time < _LINEAR_STRAIN) & (np.abs(linear) > 5 * stress_noise(run))
-    # times below those of the sweep are extrapolation
-    use &= run.time > np.min(spectrum.relaxation_time)
+    # times shorter than those of the sweep are extrapolation
+    use &= run.time > 1.0 / np.max(sweep.angular_frequency)
     if np.sum(use) < 5:
         return
     ratio = float(np.median(run.shear_stress[use] / linear[use]))

@@ -52,7 +52,7 @@ class Table:
     @property
     def listed(self) -> str:
         """Names of the columns, as they can be printed in a message."""
-        names = [_shown(column) for column in self.columns]
+        names = [shown(column) for column in self.columns]
         more = f" and {len(names) - 12} more" if len(names) > 12 else ""
         return ", ".join(names[:12]) + more
 
@@ -73,7 +73,7 @@ class Table:
             more = f" ({missing - 1} more lines are like it.)" if missing > 1 else ""
             raise InputError(
                 f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
-                f"{_shown(text[row])}. {_remedy(text[row], row)}{more}"
+                f"{shown(text[row])}. {_remedy(text[row], row)}{more}"
             )
         large = np.abs(values) > LARGEST_VALUE
         if np.any(large):
@@ -247,7 +247,7 @@ def _header(cells: list[str], line: int, name: str) -> list[str]:
         if not column:
             raise InputError(f"Column {i + 1} of {name} has no name. Name it or remove it.")
         if columns.index(column) != i:
-            raise InputError(f"{name} has two columns named {_shown(column)}; keep one.")
+            raise InputError(f"{name} has two columns named {shown(column)}; keep one.")
     return columns
 
 
@@ -283,19 +283,19 @@ def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:
         if plain == quantity.column.lower():
             return f"Names are case-sensitive: rename {column} to {quantity.column}."
         if plain == stem or re.match(rf"{re.escape(stem)}\W", plain):
-            return f"Rename {_shown(column)} to {quantity.column}, if that is its unit."
+            return f"Rename {shown(column)} to {quantity.column}, if that is its unit."
         if plain.startswith(stem + "_"):
             return (
-                f"{_shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
+                f"{shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
                 "or put another unit after the underscore."
             )
     near = difflib.get_close_matches(quantity.column, list(columns), 1)
     if near:
-        return f"Is {_shown(near[0])} meant? Then rename it."
+        return f"Is {shown(near[0])} meant? Then rename it."
     return "Add it, or rename the column that holds it."
 
 
-def _shown(cell: str) -> str:
+def shown(cell: str) -> str:
     """Return a cell as it can be printed: short and without control characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cell.strip())
     return (plain[:40] + "…" if len(plain) > 40 else plain) or "nothing"

@@ -58,7 +58,8 @@ TOKENS = (
     "\ufeff", "\u2028", "\u202e", "\x1b[31m", "\x00", "../", "/etc/passwd", "~", "~nobody", "$HOME",
     "[", "]", "{", "}", "=", "[[", "99999999999999999999999", "9" * 5000, "0x" + "f" * 5000,
     "a" * 300, "time_s", "time_min", "time_parsec", "stress_furlong", "fit", "lve", "%s", "{0}",
-    "1979-05-27", "1 MPa", "١٢", "None", "null", "file", "a.csv", "runs.csv", "\\u0000", '"\\u0000"',
+    "1979-05-27", "1 MPa", "١٢", "None", "null", "file", "a.csv", "runs.csv", "\\u0000",
+    '"\\u0000"',
 )  # fmt: skip
 
 
@@ -223,9 +224,8 @@ def test_damaged_state_is_never_taken_for_a_result(tmp_path, name):
         target.write_bytes(mutate(text, source))
         try:
             again = RunFolder(tmp_path, "one")
-        except InputError as error:
-            assert "--overwrite" in str(error)
-            continue
+        except InputError:
+            continue  # taken for another study's: nothing of it is used
         assert not again.complete
         assert again.load("part") in (None, content)
         again._lock.release()

@@ -53,7 +53,8 @@ def rheocompass(path):
     for i, (t, s) in enumerate(zip(TIMES.tolist(), STRESS.tolist(), strict=True), start=1):
         strain = RATE * t
         rows.append(
-            f"\t{i}\t{t + 5!r}\t{t * 1e3!r}\t{RATE!r}\t{strain * 100!r}\t{s * 1e3!r}\tWMa,TruStrain™"
+            f"\t{i}\t{t + 5!r}\t{t * 1e3!r}\t{RATE!r}\t{strain * 100!r}\t{s * 1e3!r}\t"
+            "WMa,TruStrain™"
         )
         if i == 7:  # an invalid point, as the instrument writes it
             rows.append(f"\t{i}\t\t\t{RATE!r}\t\t\tinvalid")
@@ -259,11 +260,50 @@ def test_a_hundred_damaged_exports_are_imported_or_explained(tmp_path, writer):
             else:
                 content[at:at] = tokens[source.integers(len(tokens))]
         file.write_bytes(bytes(content))
+        message = None
         try:
             outcomes.append(len(import_files([Path(file)], Mapping()).files))
         except InputError as error:
-            assert len(str(error)) < 1000
-            assert "melt.txt" in str(error) or "block" in str(error)
+            message = str(error)
+        if message is not None:
+            assert len(message) < 1000
+            assert "melt.txt" in message or "block" in message
             outcomes.append(0)
     # German names need --column, so only the other two can succeed at all
     assert (max(outcomes) > 0) is (writer is not german)
+
+
+def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data, tmp_path):
+    original = load_dataset(measured_data / "pi95k-startup")
+    files = []
+    for run in original.runs[:4]:
+        rows = ["[step]", "Peak hold", "Step time\tShear rate\tStress\tN1", "min\t1/h\tkPa\tMPa"]
+        columns = (
+            run.time / 60,
+            run.shear_rate * 3600,
+            run.shear_stress / 1e3,
+            run.first_normal_stress_difference / 1e6,
+        )
+        rows += ["\t".join(map(repr, row)) for row in np.stack(columns, 1).tolist()]
+        files.append(tmp_path / run.name.replace(".csv", ".txt"))
+        files[-1].write_text("\n".join(rows).replace(".", ","), "utf-16")
+    assert original.linear_sweep is not None
+    sweep = original.linear_sweep
+    rows = ["Frequency\tStorage modulus\tLoss modulus", "Hz\tkPa\tkPa"]
+    columns = (sweep.angular_frequency / (2 * np.pi), sweep.storage_modulus / 1e3)
+    table = np.stack([*columns, sweep.loss_modulus / 1e3], 1)
+    rows += ["\t".join(map(repr, row)) for row in table.tolist()]
+    (tmp_path / "sweep.txt").write_text("\n".join(rows))
+    out = tmp_path / "data"
+    result = invoke(*files, "--lve", tmp_path / "sweep.txt", "--out", out)
+    assert result.exit_code == 0, result.output
+    again = load_dataset(out)
+    for run in original.runs[:4]:
+        for name in ("time", "shear_rate", "shear_stress", "first_normal_stress_difference"):
+            wanted = getattr(run, name)
+            np.testing.assert_allclose(getattr(again[run.name], name), wanted, rtol=EXACT)
+    assert again.linear_sweep is not None
+    for name in ("angular_frequency", "storage_modulus", "loss_modulus"):
+        np.testing.assert_allclose(
+            getattr(again.linear_sweep, name), getattr(sweep, name), rtol=EXACT
+        )

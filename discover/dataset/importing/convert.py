@@ -15,7 +15,7 @@ from discover.dataset.importing.mapping import Geometry, Mapping, Source
 from discover.dataset.importing.quantities import QUANTITIES, guess_columns, to_si
 from discover.dataset.importing.text_export import Block, is_number, read_blocks
 from discover.dataset.load import INDEX_FILE, SWEEP_FILE
-from discover.dataset.table import read_bytes
+from discover.dataset.table import read_bytes, shown
 from discover.errors import InputError
 
 
@@ -75,7 +75,7 @@ def import_files(
             if not _is_run(found, mapping.geometry):
                 folder.said.append(
                     f"{path.name}, block {number} {block.name}: not a run (columns "
-                    f"{', '.join(n for n, _ in block.columns if n)}); left out."
+                    f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
                 )
                 continue
             values, dropped = _values(block, found, mapping, path.name, units)
@@ -144,7 +144,7 @@ def _values(
     if not rows:
         raise InputError(
             f"{name}: no row from line {block.line} on has numbers in all of "
-            f"{', '.join(block.columns[at][0] for at in found.values())}. Name other columns."
+            f"{', '.join(shown(block.columns[at][0]) for at in found.values())}. Name other columns."
         )
     values = {}
     for key, at in found.items():
@@ -214,7 +214,7 @@ def _summary(
 
 
 def _no_run(path: Path, blocks: list[tuple[int, Block]]) -> str:
-    names = {name: None for _, block in blocks for name, _ in block.columns if name}
+    names = {shown(name): None for _, block in blocks for name, _ in block.columns if name}
     listed = ", ".join(list(names)[:15])
     return (
         f"No block of {path.name} has time, a stress and a shear rate or strain. Its columns are "

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from discover.dataset import units
 from discover.dataset.importing.text_export import Block
+from discover.dataset.table import shown
 from discover.dataset.units import Quantity
 from discover.errors import InputError
 
@@ -123,7 +124,7 @@ def to_si(
         if not quantity.unit:
             return values
         raise InputError(
-            f"{name} gives no unit for {column}. Give it, as in --unit {key}="
+            f"{name} gives no unit for {shown(column)}. Give it, as in --unit {key}="
             f"{quantity.column.removeprefix(quantity.stem + '_').replace('_', '/')}."
         )
     registry = units._registry()
@@ -134,7 +135,7 @@ def to_si(
         parsed = registry.Quantity(1.0, registry.parse_units(text))
     except Exception as error:  # pint raises many kinds for what is no unit
         raise InputError(
-            f"{name}: the unit {unit[:40]!r} of {column} is not known. Give it in another way, as "
+            f"{name}: the unit {shown(unit)!r} of {shown(column)} is not known. Give it in another way, as "
             f"in --unit {key}={quantity.unit or '%'}."
         ) from error
     # pint counts a cycle and a radian alike as one
@@ -143,7 +144,7 @@ def to_si(
         factor = parsed.to(quantity.unit).magnitude
     except Exception as error:
         raise InputError(
-            f"{name}: {column} is in {unit}, which is no unit of {key}. Name another column for "
+            f"{name}: {shown(column)} is in {shown(unit)}, which is no unit of {key}. Name another column for "
             f"{key}, or correct the unit with --unit {key}=…."
         ) from error
     return values * (cycles * float(factor))
