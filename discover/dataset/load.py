@@ -233,18 +233,12 @@ def read_run(
             )
     stress = table.required(units.SHEAR_STRESS)
     _check_sign(name, time, rate, stress)
-    columns = {
-        "shear_rate": rate,
-        "shear_stress": stress,
-        "first_normal_stress_difference": table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE),
-        "second_normal_stress_difference": table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE),
-        "strain": strain,
-    }
+    normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
+    second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
     if len(time) > MOST_SAMPLES:
         keep, metadata["thinned"] = thin(time, rate, stress)
-        time = time[keep]
-        columns = {key: v if v is None else v[keep] for key, v in columns.items()}
-        rate = columns["shear_rate"]
+        time, rate, stress = time[keep], rate[keep], stress[keep]
+        normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
     if derived:
         protocol = measured_rate(time, rate)
         source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
@@ -255,9 +249,13 @@ def read_run(
         name=name,
         time=time,
         protocol=protocol,
+        shear_rate=rate,
+        shear_stress=stress,
+        first_normal_stress_difference=normal,
+        second_normal_stress_difference=second,
+        strain=strain,
         clock_factor=float(clock_factor),
         metadata=metadata,
-        **columns,
     )
 
 

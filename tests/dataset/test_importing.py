@@ -131,6 +131,22 @@ def test_an_import_is_repeated_from_its_mapping_file_alone(tmp_path):
     assert invoke("--mapping", first / "import.toml", "--out", second).exit_code == 2
 
 
+def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
+    for name, unit, factor in (("a", "kPa", 1e-3), ("b", "Pa", 1.0)):
+        rows = [f"Time [s],Shear rate [1/s],{'Stress' if name == 'a' else 'Shear stress'} [{unit}]"]
+        rows += [
+            f"{t!r},{RATE!r},{s * factor!r}"
+            for t, s in zip(TIMES.tolist(), STRESS.tolist(), strict=True)
+        ]
+        (tmp_path / f"{name}.csv").write_text("\n".join(rows))
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert invoke(tmp_path / "a.csv", tmp_path / "b.csv", "--out", one).exit_code == 0
+    assert invoke("--mapping", one / "import.toml", "--out", two).exit_code == 0
+    for folder in (one, two):
+        for run in load_dataset(folder):
+            assert_equals_original(run)
+
+
 @pytest.mark.parametrize("tool", ["cone_plate", "plate_plate"])
 def test_torque_and_speed_become_stress_and_rate_by_geometry(tmp_path, tool):
     radius, angle, gap = 12.5e-3, math.radians(2.0), 0.8e-3
@@ -184,6 +200,7 @@ def test_the_clock_may_have_started_before_the_flow(tmp_path):
 BAD = {
     "unknown quantity": (["--column", "viscosity=x"], "viscosity"),
     "no equals sign": (["--column", "stress"], "name=value"),
+    "column that is not there": (["--column", "N2=Second"], "'Second'"),
     "unit of something else": (["--unit", "stress=s"], "no unit of stress"),
     "unknown unit": (["--unit", "stress=blorp"], "not known"),
     "no code in units": (["--unit", "stress=__import__('os')"], "not known"),

@@ -62,8 +62,8 @@ def import_files(
         If a file cannot be understood; says which columns it has.
     """
     folder = ImportedFolder()
-    columns: dict[str, str] = dict(mapping.columns)
-    units: dict[str, str] = dict(mapping.units)
+    given = {str(key): name for key, name in mapping.columns.items()}
+    seen: dict[str, set[str]] = {}
     sources: list[Source] = []
     index: list[tuple[str, str, str]] = []
     for path in paths:
@@ -71,27 +71,27 @@ def import_files(
         used = 0
         for number, block in blocks:
             name = f"{_plain(path.stem)}{f'-{number}' if len(blocks) > 1 else ''}.csv"
-            found = guess_columns(block, mapping.columns, sweep=False)
+            found = _needed(guess_columns(block, given, sweep=False), block, mapping.geometry)
             if not _is_run(found, mapping.geometry):
                 folder.said.append(
                     f"{path.name}, block {number} {block.name}: not a run (columns "
                     f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
                 )
                 continue
-            values, dropped = _values(block, found, mapping, path.name, units)
+            values, dropped = _values(block, found, mapping, path.name)
             run = _run(values, mapping)
             if name in folder.files or name in (INDEX_FILE, SWEEP_FILE):
                 raise InputError(f"Two runs would be named {name}; rename one of the files.")
             folder.files[name] = _csv(run)
             index.append((name, path.name, block.name))
-            columns |= {key: block.columns[at][0] for key, at in found.items()}
+            _note_names(seen, block, found)
             used += 1
             folder.said.append(_summary(name, path.name, block, found, run, dropped))
         if not used:
             raise InputError(_no_run(path, blocks))
         sources.append(_source(path, False))
     if sweep is not None:
-        folder.files[SWEEP_FILE] = _sweep(sweep, mapping, folder.said, columns, units)
+        folder.files[SWEEP_FILE] = _sweep(sweep, mapping, folder.said, seen)
         sources.append(_source(sweep, True))
     if not index:
         raise InputError("No file to import was given. Name one or more exports.")
@@ -99,8 +99,18 @@ def import_files(
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([("file", "source_file", "source_block"), *index])
     folder.files[INDEX_FILE] = text.getvalue()
+    unmatched = set(given) - set(seen) - (set() if sweep else {"omega", "Gp", "Gpp"})
+    if unmatched:
+        key = sorted(unmatched)[0]
+        raise InputError(
+            f"No run in these files has a column {given[key]!r} for {key}, or needs it (torque, "
+            "angle and force need --geometry). Correct --column."
+        )
+    # a name that differs from block to block is guessed again when the import is repeated, and
+    # units are read again from the files
+    same = {key: next(iter(names)) for key, names in seen.items() if len(names) == 1}
     folder.mapping = mapping.model_copy(
-        update={"columns": columns, "units": units, "source": tuple(sources)}
+        update={"columns": {**same, **given}, "source": tuple(sources)}
     )
     return folder
 
@@ -124,6 +134,26 @@ def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     return chosen
 
 
+_INSTRUMENT = {
+    "torque": "stress",
+    "angular_velocity": "shear_rate",
+    "angle": "strain",
+    "normal_force": "N1",
+}
+
+
+def _needed(found: dict[str, int], block: Block, geometry: Geometry | None) -> dict[str, int]:
+    """Leave out columns without a single number, and raw signals that nothing is made of."""
+    filled = {
+        key: at for key, at in found.items() if any(is_number(row[at]) for row in block.cells)
+    }
+    return {
+        key: at
+        for key, at in filled.items()
+        if key not in _INSTRUMENT or (geometry is not None and _INSTRUMENT[key] not in filled)
+    }
+
+
 def _is_run(found: dict[str, int], geometry: Geometry | None) -> bool:
     motion = {"shear_rate", "strain"} & set(found)
     force = "stress" in found
@@ -134,7 +164,7 @@ def _is_run(found: dict[str, int], geometry: Geometry | None) -> bool:
 
 
 def _values(
-    block: Block, found: dict[str, int], mapping: Mapping, name: str, units: dict[str, str]
+    block: Block, found: dict[str, int], mapping: Mapping, name: str
 ) -> tuple[dict[str, np.ndarray], int]:
     """Return the found columns in SI units, and how many rows were dropped."""
     whole = [
@@ -142,9 +172,10 @@ def _values(
     ]
     rows = [row for row, keep in zip(block.cells, whole, strict=True) if keep]
     if not rows:
+        names = ", ".join(shown(block.columns[at][0]) for at in found.values())
         raise InputError(
-            f"{name}: no row from line {block.line} on has numbers in all of "
-            f"{', '.join(shown(block.columns[at][0]) for at in found.values())}. Name other columns."
+            f"{name}: no row from line {block.line} on has numbers in all of {names}. Name other "
+            "columns."
         )
     values = {}
     for key, at in found.items():
@@ -152,38 +183,36 @@ def _values(
         unit = str(mapping.units.get(key, unit))  # type: ignore[call-overload]
         raw = np.array([float(row[at]) for row in rows])
         values[key] = to_si(raw, key, unit, column, name)
-        units.setdefault(key, unit)
     return values, len(block.cells) - len(rows)
 
 
 def _run(values: dict[str, np.ndarray], mapping: Mapping) -> dict[str, np.ndarray]:
-    geometry = mapping.geometry
+    geometry, values = mapping.geometry, dict(values)
     run = {"time_s": values["time"] - mapping.start_time_s}
     if geometry is not None:
         strain = geometry.strain_per_angle
-        derived = {
-            "shear_rate": ("angular_velocity", strain),
-            "strain": ("angle", strain),
-            "stress": ("torque", geometry.stress_per_torque),
-            "N1": ("normal_force", geometry.normal_stress_per_force),
+        factors = {
+            "angular_velocity": strain,
+            "angle": strain,
+            "torque": geometry.stress_per_torque,
+            "normal_force": geometry.normal_stress_per_force,
         }
-        for key, (raw, factor) in derived.items():
-            if key not in values and raw in values and factor is not None:
-                values[key] = values[raw] * factor
+        for raw, factor in factors.items():
+            if raw in values and factor is not None:
+                values[_INSTRUMENT[raw]] = values[raw] * factor
     for key in ("shear_rate", "stress", "N1", "N2", "strain"):
         if key in values:
             run[QUANTITIES[key].column] = values[key]
     return run
 
 
-def _sweep(
-    path: Path, mapping: Mapping, said: list[str], columns: dict[str, str], units: dict[str, str]
-) -> str:
+def _sweep(path: Path, mapping: Mapping, said: list[str], seen: dict[str, set[str]]) -> str:
+    given = {str(key): name for key, name in mapping.columns.items()}
     for _, block in _blocks(path, mapping.model_copy(update={"blocks": None})):
-        found = guess_columns(block, mapping.columns, sweep=True)
+        found = guess_columns(block, given, sweep=True)
         if {"omega", "Gp", "Gpp"} <= set(found):
-            values, dropped = _values(block, found, mapping, path.name, units)
-            columns |= {key: block.columns[at][0] for key, at in found.items()}
+            values, dropped = _values(block, found, mapping, path.name)
+            _note_names(seen, block, found)
             table = {QUANTITIES[key].column: values[key] for key in ("omega", "Gp", "Gpp")}
             said.append(_summary(SWEEP_FILE, path.name, block, found, table, dropped))
             return _csv(table)
@@ -191,6 +220,11 @@ def _sweep(
         f"{path.name} holds no sweep: a block with angular frequency, storage and loss modulus is "
         'needed. Name its columns with --column omega="…" --column Gp="…" --column Gpp="…".'
     )
+
+
+def _note_names(seen: dict[str, set[str]], block: Block, found: dict[str, int]) -> None:
+    for key, at in found.items():
+        seen.setdefault(key, set()).add(block.columns[at][0])
 
 
 def _csv(table: dict[str, Float[np.ndarray, " _"]]) -> str:

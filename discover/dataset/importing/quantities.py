@@ -135,8 +135,8 @@ def to_si(
         parsed = registry.Quantity(1.0, registry.parse_units(text))
     except Exception as error:  # pint raises many kinds for what is no unit
         raise InputError(
-            f"{name}: the unit {shown(unit)!r} of {shown(column)} is not known. Give it in another way, as "
-            f"in --unit {key}={quantity.unit or '%'}."
+            f"{name}: the unit {shown(unit)!r} of {shown(column)} is not known. Give it in "
+            f"another way, as in --unit {key}={quantity.unit or '%'}."
         ) from error
     # pint counts a cycle and a radian alike as one
     cycles = 2.0 * np.pi if key in ("omega", "angular_velocity") and "hertz" in str(parsed) else 1.0
@@ -144,8 +144,8 @@ def to_si(
         factor = parsed.to(quantity.unit).magnitude
     except Exception as error:
         raise InputError(
-            f"{name}: {shown(column)} is in {shown(unit)}, which is no unit of {key}. Name another column for "
-            f"{key}, or correct the unit with --unit {key}=…."
+            f"{name}: {shown(column)} is in {shown(unit)}, which is no unit of {key}. Name "
+            f"another column for {key}, or correct the unit with --unit {key}=…."
         ) from error
     return values * (cycles * float(factor))
 
