@@ -140,11 +140,11 @@ def assert_clear(message: str, names):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_two_hundred_and_forty_mutations_of_a_file_are_accepted_or_explained(tmp_path, name):
+def test_two_hundred_mutations_of_a_file_are_accepted_or_explained(tmp_path, name):
     source = random.Random(f"bad days of {name}")
     refused = 0
     write(tmp_path)
-    for _ in range(240):
+    for _ in range(200):
         content = mutate(FILES[name], source)
         (tmp_path / name).write_bytes(content)
         started = time.perf_counter()
@@ -160,8 +160,16 @@ def test_two_hundred_and_forty_mutations_of_a_file_are_accepted_or_explained(tmp
         if message is not None:
             refused += 1
             assert_clear(message, places)
+            if refused % 60 == 1:  # and so the command ends: one line, exit code 2
+                study = str(tmp_path / "study.toml")
+                result = CliRunner().invoke(
+                    app, ["close-loop", study, "--out", str(tmp_path / "o")]
+                )
+                assert result.exit_code == 2, result.output
+                assert result.stderr.startswith("discover: ")
+                assert result.stderr.count("\n") == 1
     # a fuzzer that breaks nothing tests nothing; one that breaks all never reaches the depths
-    assert 60 <= refused <= 235, refused
+    assert 50 <= refused <= 195, refused
 
 
 cells = st.one_of(
@@ -352,7 +360,7 @@ def test_folders_pipes_and_forbidden_files_are_refused_without_waiting(tmp_path,
 
 
 def test_a_long_record_is_thinned_with_a_word_and_its_samples_are_the_recorded_ones(tmp_path):
-    n = 200_000
+    n = 60_000
     times = np.linspace(0, 100, n)
     generator = np.random.default_rng(0)
     stress = 1 - np.exp(-times) + 3 * times * np.exp(-5 * times)
@@ -365,7 +373,7 @@ def test_a_long_record_is_thinned_with_a_word_and_its_samples_are_the_recorded_o
     assert run.time[-1] == pytest.approx(100.0)
     # the overshoot's height and the early decades are kept
     assert np.max(run.shear_stress) == pytest.approx(np.max(noisy), abs=1e-8)
-    assert np.sum(run.time < 0.1) > 0.9 * np.sum(times < 0.1)
+    assert np.sum(run.time < 0.05) > 0.9 * np.sum(times < 0.05)
     # noise is neither smoothed nor selected: its size stays within sampling error, 3 / sqrt(2 n)
     expected = np.interp(run.time, times, stress)
     assert np.std(run.shear_stress - expected) == pytest.approx(1e-3, rel=3 / np.sqrt(2 * len(run)))
