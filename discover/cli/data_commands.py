@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from discover.cli.guard import guarded
-from discover.cli.options import JsonOption
+from discover.cli.options import JsonOption, OverwriteOption
 from discover.errors import InputError
 
 data_app = typer.Typer(help="Look at data folders.", no_args_is_help=True)
@@ -98,16 +98,117 @@ def check(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say everything that is wrong with a data folder; exit code 2 if anything is."""
+    """Say everything that is wrong or doubtful about a data folder; exit code 2 on errors."""
+    from dataclasses import asdict
+
     from discover.dataset.check import check_folder
 
-    problems = check_folder(folder, clock_factor)
+    findings = check_folder(folder, clock_factor)
+    by_severity = {
+        severity: [finding for finding in findings if finding.severity == severity]
+        for severity in ("error", "warning", "note")
+    }
     if as_json:
-        typer.echo(json.dumps({"folder": folder, "problems": problems}, indent=2))
-    elif not problems:
-        typer.echo(f"{folder}: nothing wrong was found.")
+        lists = {f"{key}s": [asdict(f) for f in found] for key, found in by_severity.items()}
+        typer.echo(json.dumps({"folder": folder, **lists}, indent=2))
     else:
-        for problem in problems:
-            typer.echo(problem, err=True)
-    if problems:
+        for finding in findings:
+            typer.echo(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        counts = ", ".join(
+            f"{len(found)} {key}{'' if len(found) == 1 else 's'}"
+            for key, found in by_severity.items()
+        )
+        typer.echo(f"{folder}: {counts}." if findings else f"{folder}: nothing wrong was found.")
+    if by_severity["error"]:
+        raise typer.Exit(2)
+
+
+@data_app.command("import")
+@guarded
+def import_data(
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Text exports, one or more runs in each.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    mapping: Annotated[
+        Path | None, typer.Option("--mapping", help="TOML file with the options below.")
+    ] = None,
+    column: Annotated[
+        list[str] | None, typer.Option("--column", help="Which column is what: stress='Stress'.")
+    ] = None,
+    unit: Annotated[
+        list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
+    ] = None,
+    geometry: Annotated[
+        str | None,
+        typer.Option(
+            "--geometry",
+            help="For torque, angle and force: cone_plate:radius_mm=25,angle_deg=1 or "
+            "plate_plate:radius_mm=25,gap_mm=1.",
+        ),
+    ] = None,
+    lve: Annotated[
+        Path | None, typer.Option("--lve", help="Export of a linear frequency sweep.")
+    ] = None,
+    block: Annotated[
+        list[int] | None, typer.Option("--block", min=1, help="Only these blocks of a file.")
+    ] = None,
+    start_time: Annotated[
+        float | None,
+        typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
+    ] = None,
+    delimiter: Annotated[
+        str | None, typer.Option("--delimiter", help="tab, semicolon or comma.")
+    ] = None,
+    decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign, . or ,")] = None,
+    header_row: Annotated[
+        int | None, typer.Option("--header-row", min=1, help="Line with the names of columns.")
+    ] = None,
+    encoding: Annotated[str | None, typer.Option("--encoding", help="Such as cp1252.")] = None,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Make a data folder from text exports of a rheometer (CSV, TRIOS, RheoCompass)."""
+    from discover.cli.import_options import merge_mapping, sources_of, write_folder
+    from discover.dataset.check import check_folder
+    from discover.dataset.importing import import_files
+
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    merged = merge_mapping(
+        mapping,
+        columns=column,
+        units=unit,
+        geometry=geometry,
+        blocks=block,
+        start_time_s=start_time,
+        layout={
+            "delimiter": delimiter,
+            "decimal": decimal,
+            "header_row": header_row,
+            "encoding": encoding,
+        },
+    )
+    paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
+    imported = import_files(paths, merged, sweep)
+    write_folder(imported, out, overwrite)
+    findings = check_folder(out)
+    errors = [finding for finding in findings if finding.severity == "error"]
+    said = [*changed, *imported.said]
+    if as_json:
+        content = {
+            "folder": str(out),
+            "files": sorted(imported.files),
+            "said": said,
+            "errors": [str(finding) for finding in errors],
+            "warnings": [str(f) for f in findings if f.severity == "warning"],
+        }
+        typer.echo(json.dumps(content, indent=2))
+    else:
+        for line in said:
+            typer.echo(line)
+        for finding in findings:
+            typer.echo(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        typer.echo(f"{out}: {len(imported.files) + 1} files written.")
+    if errors:
         raise typer.Exit(2)

@@ -47,5 +47,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _fail(message: str, code: int) -> None:
-    typer.echo(f"discover: {message}", err=True)
+    # a message may quote a file: one line, and nothing that a terminal would obey
+    plain = "".join(c if c.isprintable() else " " for c in " ".join(message.split()))
+    typer.echo(f"discover: {plain}", err=True)
     raise typer.Exit(code)

@@ -1,28 +1,47 @@
-"""Check a data folder and say everything that is wrong with it, not only the first thing."""
+"""Check a data folder and say everything that is wrong or doubtful, not only the first thing."""
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from discover.dataset import units
+from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
+from discover.dataset.check_run import doubts_of_run
+from discover.dataset.finding import Finding
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import (
+    INDEX_FILE,
     SWEEP_FILE,
+    find_sweep,
     read_clock_factors,
     read_index,
     read_run,
-    read_sweep,
     resolve_folder,
 )
-from discover.dataset.run import ShearRun
+from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.table import Table, read_table
 from discover.errors import InputError
 
-FEWEST_SAMPLES = 10
-"""Runs with fewer samples than this say little about a law."""
+_RUN_QUANTITIES = (
+    units.TIME,
+    units.SHEAR_RATE,
+    units.SHEAR_STRESS,
+    units.FIRST_NORMAL_STRESS_DIFFERENCE,
+    units.SECOND_NORMAL_STRESS_DIFFERENCE,
+    units.STRAIN,
+)
+_CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
 
 def check_folder(
     folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None
-) -> list[str]:
-    """Return what is wrong with a data folder, in plain language; empty if it is sound.
+) -> tuple[Finding, ...]:
+    """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
+
+    Nothing is simulated: the checks compare a run with itself, with what a passive fluid at rest
+    can do, and with linear viscoelasticity.
 
     Parameters
     ----------
@@ -31,33 +50,133 @@ def check_folder(
     """
     try:
         root = resolve_folder(folder, base)
+    except InputError as error:
+        return (Finding("error", "folder", "", str(error)),)
+    try:
         index = read_index(root)
     except InputError as error:
-        return [str(error)]
-    problems: list[str] = []
+        return (Finding("error", "runs", INDEX_FILE, str(error)),)
+    findings = list(_clock(index, clock_factor))
+    runs: list[ShearRun] = []
+    unused: dict[str, list[str]] = {}
+    for row, name in enumerate(index.columns["file"]):
+        try:
+            runs.append(read_run(root, index, row))
+        except InputError as error:
+            findings.append(Finding("error", "run", name, str(error)))
+            continue
+        findings += doubts_of_run(runs[-1])
+        findings += _unused_columns(root, name, unused)
+    for column, files in unused.items():
+        where = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more files"
+        text = f"The column {column} in {where} is not used."
+        findings.append(Finding("note", "columns", files[0], text))
+    sweep, spectrum, said = _sweep(root)
+    findings += said
+    findings += against_linear_theory(runs, sweep, spectrum)
+    findings += _folder(root, index, runs)
+    rank = {"error": 0, "warning": 1, "note": 2}
+    return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
+
+
+def _clock(index: Table, column: str | None) -> Iterator[Finding]:
+    if column is None:
+        for name in index.columns:
+            if name.lower() in _CLOCK_WORDS:
+                yield Finding(
+                    "note",
+                    "clock",
+                    INDEX_FILE,
+                    f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
+                    f'temperature, write clock_factor = "{name}" in the study, so that effects of '
+                    "the instrument are looked for on the instrument's clock.",
+                )
+        return
     try:
-        read_clock_factors(index, clock_factor)
+        factors = read_clock_factors(index, column)
     except InputError as error:
-        problems.append(str(error))
-    for row in range(len(index)):
-        try:
-            problems += _doubts(read_run(root, index, row))
-        except InputError as error:
-            problems.append(str(error))
-    if (root / SWEEP_FILE).exists():
-        try:
-            read_sweep(root / SWEEP_FILE)
-        except InputError as error:
-            problems.append(str(error))
-    return problems
+        yield Finding("error", "clock", INDEX_FILE, str(error))
+        return
+    if np.all(factors == 1.0):
+        yield Finding(
+            "note", "clock", INDEX_FILE, f"{column} is 1 in every run, so it changes nothing."
+        )
 
 
-def _doubts(run: ShearRun) -> list[str]:
-    doubts = []
-    if len(run) < FEWEST_SAMPLES:
-        doubts.append(f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}.")
-    if not np.any(run.shear_rate):
-        doubts.append(f"The shear rate in {run.name} is zero throughout, so nothing flows.")
-    if not np.any(run.shear_stress):
-        doubts.append(f"The stress in {run.name} is zero throughout.")
-    return doubts
+def _unused_columns(root: Path, name: str, unused: dict[str, list[str]]) -> Iterator[Finding]:
+    """Collect the columns nobody reads; yield those that look like a slip of the pen."""
+    try:
+        columns = tuple(read_table(root / name, name).columns)
+        found = [units.find_column(columns, quantity) for quantity in _RUN_QUANTITIES]
+    except InputError:
+        return
+    used = {column[0] for column in found if column is not None}
+    missing = [q for q, column in zip(_RUN_QUANTITIES, found, strict=True) if column is None]
+    for column in columns:
+        if column in used:
+            continue
+        meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
+        if meant and column.lower() != "strain":
+            yield Finding(
+                "warning",
+                "columns",
+                name,
+                f"The column {column} in {name} is not read. If it holds {meant[0].stem}, rename "
+                f"it to {meant[0].column}.",
+            )
+        else:
+            unused.setdefault(column, []).append(name)
+
+
+def _sweep(
+    root: Path,
+) -> tuple[LinearSweep | None, RelaxationSpectrum | None, list[Finding]]:
+    try:
+        sweep = find_sweep(root)
+    except InputError as error:
+        return None, None, [Finding("error", "sweep", SWEEP_FILE, str(error))]
+    if sweep is None:
+        text = (
+            f"The folder has no {SWEEP_FILE}. Without a linear sweep the relaxation times must be "
+            "declared or fitted, and a wrong one looks like a missing effect."
+        )
+        return None, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
+    try:
+        spectrum = relaxation_spectrum(sweep)
+    except (InputError, RuntimeError, np.linalg.LinAlgError) as error:
+        text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
+        return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
+    return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
+
+
+def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]:
+    listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE}
+    try:
+        others = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
+    except OSError:
+        others = []
+    for name in others:
+        if name not in listed:
+            yield Finding(
+                "note", "runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used."
+            )
+    seen: dict[tuple[bytes, bytes], str] = {}
+    for run in runs:
+        key = (run.time.tobytes(), run.shear_stress.tobytes())
+        if key in seen:
+            yield Finding(
+                "warning",
+                "runs",
+                run.name,
+                f"{run.name} holds the same samples as {seen[key]}. Held out, a copy of a fitted "
+                "run proves nothing: remove one.",
+            )
+        seen.setdefault(key, run.name)
+    if runs and not any(np.any(run.shear_rate) for run in runs):
+        yield Finding(
+            "error",
+            "rate",
+            "",
+            "The shear rate is zero in every run, so there is nothing to learn a law from. Add "
+            "runs with flow.",
+        )

@@ -10,6 +10,8 @@ DEFAULT_WINDOW = 15
 
 _DEGREE = 3
 
+_CHUNK = 50_000
+
 
 def differentiate(
     times: Float[np.ndarray, " n"],
@@ -44,9 +46,22 @@ def differentiate(
             "column shear_rate_1_s."
         )
     window = min(window, n)
-    first = np.clip(np.arange(n) - window // 2, 0, n - window)
+    if n > _CHUNK:
+        # a window of its own for each sample: in parts, so that a million samples fit in memory
+        parts = [
+            _slopes(times, values, window, np.arange(i, min(i + _CHUNK, n)))
+            for i in range(0, n, _CHUNK)
+        ]
+        return np.concatenate(parts)
+    return _slopes(times, values, window, np.arange(n))
+
+
+def _slopes(
+    times: np.ndarray, values: np.ndarray, window: int, samples: np.ndarray
+) -> Float[np.ndarray, " m"]:
+    first = np.clip(samples - window // 2, 0, len(times) - window)
     index = first[:, None] + np.arange(window)
-    offset = times[index] - times[:, None]
+    offset = times[index] - times[samples, None]
     # scaled to the window's width: the normal equations stay well conditioned
     width = np.max(np.abs(offset), axis=1, keepdims=True)
     powers = (offset / width)[:, :, None] ** np.arange(_DEGREE + 1)

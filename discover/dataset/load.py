@@ -1,6 +1,7 @@
 """Load a folder of measured runs: ``runs.csv``, one CSV a run, optionally ``lve.csv``."""
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ from jaxtyping import Float
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
-from discover.dataset.table import Table, read_table
+from discover.dataset.table import Table, read_bytes, read_table
+from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
 from discover.protocols.shear import ShearProtocol, measured_rate, start_up
 
@@ -21,6 +23,12 @@ SWEEP_FILE = "lve.csv"
 
 # A rate column is a command, repeated, if it varies no more than rounding to text does
 _CONSTANT = 1e-6
+
+# From rest a passive fluid cannot return more work than it was given. A record that is noise around
+# zero comes near 0, one with the wrong sign near -1
+_WRONG_SIGN = -0.5
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
@@ -39,18 +47,31 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
     InputError
         If there is no such folder, or it has no ``runs.csv``.
     """
-    path = Path(folder).expanduser()
+    try:
+        path = Path(folder).expanduser()
+    except RuntimeError:
+        raise InputError(f"{str(folder)!r} names a user who is not known here.") from None
     data = os.environ.get(DATA_VARIABLE)
     roots = [Path(root) for root in (base, data, ".") if root]
     candidates = [path] if path.is_absolute() else [root / path for root in roots]
+    # os.path answers False where Path raises: no permission, names too long, zero bytes
     for candidate in candidates:
-        if (candidate / INDEX_FILE).is_file():
+        if os.path.isfile(candidate / INDEX_FILE):
             return candidate
     for candidate in candidates:
-        if candidate.is_dir():
+        if os.path.isdir(candidate):
+            if not os.access(candidate, os.R_OK | os.X_OK):
+                raise InputError(
+                    f"The folder {str(folder)!r} may not be read. Ask for the right to read it."
+                )
             raise InputError(
                 f"The folder {str(folder)!r} has no {INDEX_FILE}. A data folder needs one, with a "
                 "column 'file' and one line a run."
+            )
+        if os.path.isfile(candidate):
+            raise InputError(
+                f"{str(folder)!r} is a file. Name the folder that holds {INDEX_FILE}; for a single "
+                "file make one with: discover data import."
             )
     hint = "" if data else f" The environment variable {DATA_VARIABLE} is not set."
     raise InputError(
@@ -70,7 +91,8 @@ def load_dataset(
 
     A column may carry another unit in its name, such as ``stress_kPa`` or ``time_ms``. A run
     without a shear rate must have the strain; its rate is then derived from it, and its metadata
-    say so under ``shear_rate_source``.
+    say so under ``shear_rate_source``. A run of more than `MOST_SAMPLES` samples is thinned, and
+    its metadata say how under ``thinned``.
 
     Parameters
     ----------
@@ -100,8 +122,12 @@ def load_dataset(
     return ShearDataset(
         name=root.resolve().name,
         runs=runs,
-        linear_sweep=read_sweep(root / SWEEP_FILE) if (root / SWEEP_FILE).exists() else None,
-        provenance=provenance.read_text("utf-8", "replace") if provenance.is_file() else "",
+        linear_sweep=find_sweep(root),
+        provenance=(
+            read_bytes(provenance, provenance.name).decode("utf-8", "replace")
+            if provenance.is_file()
+            else ""
+        ),
     )
 
 
@@ -116,22 +142,33 @@ def read_index(root: Path) -> Table:
     index = read_table(root / INDEX_FILE)
     if "file" not in index.columns:
         raise InputError(
-            f"{INDEX_FILE} has no column 'file'; its columns are {', '.join(index.columns)}. Add "
+            f"{INDEX_FILE} has no column 'file'; its columns are {index.listed}. Add "
             "it, with the file name of each run."
         )
-    names = [name.strip() for name in index.columns["file"]]
-    inside = root.resolve()
-    for row, name in enumerate(names):
+    seen: set[str] = set()
+    for line, name in zip(index.lines, index.columns["file"], strict=True):
         if not name:
-            raise InputError(f"Line {row + 2} of {INDEX_FILE} names no file.")
-        if names.count(name) > 1:
-            raise InputError(f"{INDEX_FILE} names {name} twice; keep one line.")
-        if "\0" in name or not (root / name).resolve().is_relative_to(inside):
             raise InputError(
-                f"{INDEX_FILE} names {name!r}, which lies outside the folder. Put the file in the "
-                "folder and name it without a path."
+                f"Line {line} of {INDEX_FILE} names no file. Name one, or remove the line."
+            )
+        if not name.isprintable():
+            raise InputError(f"Line {line} of {INDEX_FILE} names {name!r}; no file is named so.")
+        if name in seen:
+            raise InputError(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
+        seen.add(name)
+        if not _is_inside(root, name):
+            raise InputError(
+                f"Line {line} of {INDEX_FILE} names {name!r}, which lies outside the folder or is "
+                "a link to there. Put the file itself in the folder and name it without a path."
             )
     return index
+
+
+def _is_inside(root: Path, name: str) -> bool:
+    try:
+        return (root / name).resolve().is_relative_to(root.resolve())
+    except (OSError, RuntimeError, ValueError):  # too long, or a link to itself
+        return False
 
 
 def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
@@ -147,13 +184,14 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
     if column not in index.columns:
         raise InputError(
             f"clock_factor names the column {column!r}, but {INDEX_FILE} has only "
-            f"{', '.join(index.columns)}."
+            f"{index.listed}. Correct the name, or leave clock_factor out."
         )
     factors = index.numbers(column)
     if np.any(factors <= 0):
         row = int(np.argmax(factors <= 0))
         raise InputError(
-            f"{column} in {INDEX_FILE} must be positive; line {row + 2} holds {factors[row]:g}."
+            f"{column} in {INDEX_FILE} must be positive; line {index.lines[row]} holds "
+            f"{factors[row]:g}. Instrument time is time / {column}; correct that line."
         )
     return factors
 
@@ -173,24 +211,13 @@ def read_run(
     InputError
         If its file is missing or wrong.
     """
-    name = index.columns["file"][row].strip()
+    name = index.columns["file"][row]
     table = read_table(root / name, name)
-    time = table.required(units.TIME)
-    if time[0] < 0:
-        raise InputError(
-            f"time in {name} must start at or after 0, when the flow starts; line 2 holds "
-            f"{time[0]:g} s. Remove what came before the flow."
-        )
-    backwards = np.flatnonzero(np.diff(time) <= 0)
-    if backwards.size:
-        line = int(backwards[0]) + 3
-        raise InputError(
-            f"time in {name} must increase strictly; line {line} holds {time[line - 2]:g} s after "
-            f"{time[line - 3]:g} s. Sort the rows and remove repeated times."
-        )
+    time = _checked_time(table)
     metadata = _metadata(index, row)
     strain = table.quantity(units.STRAIN)
     rate = table.quantity(units.SHEAR_RATE)
+    derived = rate is None
     if rate is None:
         if strain is None:
             # said in the words of the commoner mistake
@@ -199,8 +226,22 @@ def read_run(
             rate = differentiate(time, strain, rate_window)
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
-        source = f"derived from strain: moving cubic over {min(rate_window, len(time))} samples"
+        if not np.all(np.isfinite(rate)):
+            raise InputError(
+                f"{name}: no shear rate can be derived from its strain and time; their values are "
+                "too far apart. Check their units."
+            )
+    stress = table.required(units.SHEAR_STRESS)
+    _check_sign(name, time, rate, stress)
+    normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
+    second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
+    if len(time) > MOST_SAMPLES:
+        keep, metadata["thinned"] = thin(time, rate, stress)
+        time, rate, stress = time[keep], rate[keep], stress[keep]
+        normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
+    if derived:
         protocol = measured_rate(time, rate)
+        source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
     else:
         protocol, source = _protocol(time, rate, rate_is_measured)
     metadata["shear_rate_source"] = source
@@ -209,13 +250,45 @@ def read_run(
         time=time,
         protocol=protocol,
         shear_rate=rate,
-        shear_stress=table.required(units.SHEAR_STRESS),
-        first_normal_stress_difference=table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE),
-        second_normal_stress_difference=table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE),
+        shear_stress=stress,
+        first_normal_stress_difference=normal,
+        second_normal_stress_difference=second,
         strain=strain,
         clock_factor=float(clock_factor),
         metadata=metadata,
     )
+
+
+def _checked_time(table: Table) -> Float[np.ndarray, " n"]:
+    time = table.required(units.TIME)
+    if time[0] < 0:
+        raise InputError(
+            f"time in {table.name} must start at or after 0, when the flow starts; line "
+            f"{table.lines[0]} holds {time[0]:g} s. Remove what came before the flow."
+        )
+    backwards = np.flatnonzero(np.diff(time) <= 0)
+    if backwards.size:
+        row = int(backwards[0]) + 1
+        more = f" ({backwards.size - 1} more lines are like it.)" if backwards.size > 1 else ""
+        raise InputError(
+            f"time in {table.name} must increase strictly; line {table.lines[row]} holds "
+            f"{time[row]:g} s after {time[row - 1]:g} s. Sort the rows and remove repeated "
+            f"times.{more}"
+        )
+    return time
+
+
+def _check_sign(name: str, time: np.ndarray, rate: np.ndarray, stress: np.ndarray) -> None:
+    """Refuse a record in which the fluid drives the rheometer."""
+    if len(time) < 2:
+        return
+    power = rate * stress
+    work, size = np.trapezoid(power, time), np.trapezoid(np.abs(power), time)
+    if work < _WRONG_SIGN * size:
+        raise InputError(
+            f"The stress in {name} is opposite to the shear rate over most of the run: the fluid "
+            "would drive the rheometer. Change the sign of one of the two columns."
+        )
 
 
 def _protocol(
@@ -232,11 +305,27 @@ def _metadata(index: Table, row: int) -> dict[str, float | str]:
     for column, cells in index.columns.items():
         if column == "file":
             continue
-        try:
-            metadata[column] = float(cells[row])
-        except ValueError:
-            metadata[column] = cells[row]
+        # float() would also read 1_2, nan or inf, which are labels here
+        cell = cells[row]
+        metadata[column] = float(cell) if _NUMBER.fullmatch(cell) else cell
     return metadata
+
+
+def find_sweep(root: Path) -> LinearSweep | None:
+    """Return the linear sweep of a folder, or None if it has none.
+
+    Raises
+    ------
+    InputError
+        If the file is wrong, or is a link to outside the folder.
+    """
+    if not os.path.lexists(root / SWEEP_FILE):
+        return None
+    if not _is_inside(root, SWEEP_FILE):
+        raise InputError(
+            f"{SWEEP_FILE} is a link to outside the folder. Put the file itself in the folder."
+        )
+    return read_sweep(root / SWEEP_FILE)
 
 
 def read_sweep(path: Path) -> LinearSweep:
@@ -255,7 +344,8 @@ def read_sweep(path: Path) -> LinearSweep:
         if np.any(values <= 0):
             row = int(np.argmax(values <= 0))
             raise InputError(
-                f"{label} in {table.name} must be positive; line {row + 2} holds {values[row]:g}. "
+                f"{label} in {table.name} must be positive; line {table.lines[row]} holds "
+                f"{values[row]:g}. "
                 "Remove that line."
             )
     order = np.argsort(frequency, kind="stable")

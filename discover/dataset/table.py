@@ -1,5 +1,11 @@
 """Text tables, read safely and with errors that name file, column and line."""
 
+import csv
+import difflib
+import io
+import os
+import re
+import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +16,16 @@ from jaxtyping import Float
 
 from discover.dataset.units import Quantity, find_column
 from discover.errors import InputError
+
+LARGEST_FILE = 300_000_000
+"""Bytes; some five million samples. More cannot be looked at, let alone fitted."""
+
+LARGEST_VALUE = 1e15
+"""No rheometer quantity in SI units is larger; squares of such numbers still compute."""
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_IMPORT = "discover data import"
 
 
 @dataclass(frozen=True)
@@ -22,13 +38,23 @@ class Table:
         Name of the file, for messages.
     columns
         Text of every column.
+    lines
+        Line of the file on which each row stands; blank lines count but are no rows.
     """
 
     name: str
     columns: Mapping[str, Sequence[str]]
+    lines: Sequence[int]
 
     def __len__(self) -> int:
-        return len(next(iter(self.columns.values())))
+        return len(self.lines)
+
+    @property
+    def listed(self) -> str:
+        """Names of the columns, as they can be printed in a message."""
+        names = [shown(column) for column in self.columns]
+        more = f" and {len(names) - 12} more" if len(names) > 12 else ""
+        return ", ".join(names[:12]) + more
 
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
         """Return a column as finite numbers.
@@ -36,17 +62,26 @@ class Table:
         Raises
         ------
         InputError
-            If a cell is not a finite number.
+            If a cell is not a finite number, or is larger than any measurement.
         """
         text = self.columns[column]
         values = np.asarray(pd.to_numeric(pd.Series(text), errors="coerce"), dtype=float)
-        if not np.all(np.isfinite(values)):
-            row = int(np.argmin(np.isfinite(values)))
-            cell = str(text[row]).strip() or "nothing"
-            # line 1 is the header
+        finite = np.isfinite(values)
+        if not np.all(finite):
+            row = int(np.argmin(finite))
+            missing = int(np.sum(~finite))
+            more = f" ({missing - 1} more lines are like it.)" if missing > 1 else ""
             raise InputError(
-                f"{column} in {self.name} must hold finite numbers; line {row + 2} holds {cell}. "
-                "Correct that line or remove it."
+                f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
+                f"{shown(text[row])}. {_remedy(text[row], row)}{more}"
+            )
+        large = np.abs(values) > LARGEST_VALUE
+        if np.any(large):
+            row = int(np.argmax(large))
+            raise InputError(
+                f"{column} in {self.name} holds {values[row]:g} on line {self.lines[row]}, more "
+                f"than any measurement (the limit is {LARGEST_VALUE:g}). Correct or remove that "
+                "line."
             )
         return values
 
@@ -79,13 +114,52 @@ class Table:
         if values is None:
             raise InputError(
                 f"{self.name} has no column {quantity.column}; its columns are "
-                f"{', '.join(self.columns)}. Add it, or rename the column that holds it."
+                f"{self.listed}. {_rename(quantity, self.columns)}"
             )
         return values
 
 
+def read_bytes(path: Path, name: str) -> bytes:
+    """Return the content of a regular file of reasonable size.
+
+    Raises
+    ------
+    InputError
+        If it is missing, cannot be read, is no regular file (a pipe would never end), or is larger
+        than `LARGEST_FILE`.
+    """
+    try:
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"{name} is a folder; a file is wanted there. Name the file itself.")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{name} is a pipe or device, not a file. Save the data in a file.")
+        if status.st_size > LARGEST_FILE:
+            raise InputError(
+                f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {LARGEST_FILE / 1e6:.0f} "
+                "MB. Keep fewer samples of it."
+            )
+        return Path(path).read_bytes()
+    except InputError:
+        raise
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(
+            f"There is no file {name} in {path.parent.name or path.parent}. Add it, or take its "
+            "line out of runs.csv."
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"{name} cannot be read: {error.strerror or error}. Check the file and who may read it."
+        ) from None
+    except ValueError:
+        raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+
+
 def read_table(path: Path, name: str | None = None) -> Table:
     """Return a CSV file with a header line as text.
+
+    A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
+    commas and other encodings are recognised and refused, since guessing at numbers is no help.
 
     Parameters
     ----------
@@ -100,34 +174,128 @@ def read_table(path: Path, name: str | None = None) -> Table:
         If the file is missing, empty or not a table.
     """
     name = path.name if name is None else name
+    text = _decode(read_bytes(path, name), name)
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+    header: list[str] = []
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    start = 1
     try:
-        frame = pd.read_csv(
-            path,
-            dtype=str,
-            keep_default_na=False,
-            encoding="utf-8-sig",
-            skipinitialspace=True,
-            index_col=False,
-            on_bad_lines="error",
+        for cells in reader:
+            first, start = start, reader.line_num + 1
+            if not any(cell.strip() for cell in cells):
+                continue
+            if not header:
+                header = _header(cells, first, name)
+                continue
+            if len(cells) != len(header):
+                raise InputError(_ragged(name, cells, len(header), first))
+            rows.append(cells)
+            lines.append(first)
+    except csv.Error as error:
+        raise InputError(
+            f"{name} is not a comma-separated table: line {start} ({error}). Mend the quotes there."
+        ) from None
+    if not header:
+        raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
+    if not rows:
+        raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
+    return Table(
+        name,
+        {column: [row[i].strip() for row in rows] for i, column in enumerate(header)},
+        lines,
+    )
+
+
+def _decode(content: bytes, name: str) -> str:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(
+            f"{name} is in UTF-16, as some instruments export it; UTF-8 is wanted. Save it as CSV "
+            f"UTF-8, or use {_IMPORT}."
         )
-    except FileNotFoundError as error:
+    if b"\0" in content:
+        line = content[: content.index(b"\0")].count(b"\n") + 1
         raise InputError(
-            f"There is no file {name} in {path.parent.name or path.parent}. Add it, or take its "
-            "line out of runs.csv."
-        ) from error
-    except pd.errors.EmptyDataError as error:
-        raise InputError(f"{name} is empty; it must hold a header and rows.") from error
-    except (pd.errors.ParserError, UnicodeDecodeError) as error:
-        reason = str(error).strip().splitlines()[-1]
+            f"{name} is not text: line {line} holds a zero byte, as spreadsheets and other binary "
+            "files do. Save it as CSV."
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
         raise InputError(
-            f"{name} is not a comma-separated table in UTF-8: {reason}. Save it as CSV."
-        ) from error
-    except OSError as error:
-        raise InputError(f"{name} cannot be read: {error.strerror or error}.") from error
-    columns = [str(column).strip() for column in frame.columns]
-    repeated = [column for column in columns if columns.count(column) > 1]
-    if repeated:
-        raise InputError(f"{name} has two columns named {repeated[0]}; keep one.")
-    if len(frame) == 0:
-        raise InputError(f"{name} has a header but no rows.")
-    return Table(name, {column: frame.iloc[:, i].tolist() for i, column in enumerate(columns)})
+            f"{name} is not a comma-separated table in UTF-8: line {line} holds the byte "
+            f"0x{content[error.start]:02x}. Save it as CSV UTF-8, or use {_IMPORT}."
+        ) from None
+
+
+def _header(cells: list[str], line: int, name: str) -> list[str]:
+    columns = [cell.strip() for cell in cells]
+    if all(_NUMBER.fullmatch(column) for column in columns):
+        raise InputError(
+            f"{name} begins with numbers on line {line}, not with the names of its columns. Add a "
+            "header such as time_s,shear_rate_1_s,stress_Pa."
+        )
+    if len(columns) == 1:
+        for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in columns[0]:
+                raise InputError(
+                    f"{name} separates its columns by {word} (line {line}), not commas. Save it "
+                    f"with commas and decimal points, or use {_IMPORT}."
+                )
+    for i, column in enumerate(columns):
+        if not column:
+            raise InputError(f"Column {i + 1} of {name} has no name. Name it or remove it.")
+        if columns.index(column) != i:
+            raise InputError(f"{name} has two columns named {shown(column)}; keep one.")
+    return columns
+
+
+def _ragged(name: str, cells: list[str], wanted: int, line: int) -> str:
+    if len(cells) > wanted and all(_NUMBER.fullmatch(cell.strip()) for cell in cells):
+        why = " Decimal commas look so too: write decimal points."
+    else:
+        why = " Correct that line."
+    return (
+        f"{name} is not a comma-separated table: line {line} has {len(cells)} cells, the header "
+        f"{wanted}.{why}"
+    )
+
+
+def _remedy(cell: str, row: int) -> str:
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return f"Write decimal points, not commas, or use {_IMPORT}."
+    if row == 0 and cell and not any(c.isdigit() for c in cell.replace("1/", "")):
+        return (
+            "That looks like a row of units: put them into the header, as in time_s, and remove "
+            f"the row, or use {_IMPORT}."
+        )
+    if cell and _NUMBER.fullmatch(cell):
+        return "That is beyond what a computer holds as a number; correct that line."
+    return "Correct that line or remove it."
+
+
+def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:
+    """Point to the column that was probably meant."""
+    stem = quantity.stem.lower()
+    for column in columns:
+        plain = column.lower()
+        if plain == quantity.column.lower():
+            return f"Names are case-sensitive: rename {column} to {quantity.column}."
+        if plain == stem or re.match(rf"{re.escape(stem)}\W", plain):
+            return f"Rename {shown(column)} to {quantity.column}, if that is its unit."
+        if plain.startswith(stem + "_"):
+            return (
+                f"{shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
+                "or put another unit after the underscore."
+            )
+    near = difflib.get_close_matches(quantity.column, list(columns), 1)
+    if near:
+        return f"Is {shown(near[0])} meant? Then rename it."
+    return "Add it, or rename the column that holds it."
+
+
+def shown(cell: str) -> str:
+    """Return a cell as it can be printed: short and without control characters."""
+    plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cell.strip())
+    return (plain[:40] + "…" if len(plain) > 40 else plain) or "nothing"

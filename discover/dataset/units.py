@@ -47,6 +47,7 @@ def _registry():
     return pint.UnitRegistry()
 
 
+@cache
 def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
 

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from discover.errors import InputError
 
+PART_SUFFIX = ".discover-part"
+"""Ends the name of a file that is being written."""
+
 
 def write_text(path: str | Path, text: str) -> Path:
     """Write a text file so that no reader ever sees half of it.
@@ -19,9 +22,16 @@ def write_text(path: str | Path, text: str) -> Path:
         The file; its folder must exist.
     text
         The content, written as UTF-8.
+
+    Raises
+    ------
+    OSError
+        If the disk is full, say; names the file. What the file held before is still there.
     """
     path = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    handle, temporary = tempfile.mkstemp(
+        dir=path.parent, prefix=f".{path.name}.", suffix=PART_SUFFIX
+    )
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
             stream.write(text)
@@ -29,9 +39,12 @@ def write_text(path: str | Path, text: str) -> Path:
             os.fsync(stream.fileno())
         os.chmod(temporary, 0o644)  # mkstemp makes files that only their owner can read
         os.replace(temporary, path)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
+        if isinstance(error, OSError) and error.errno is not None and error.filename is None:
+            # a full disk is reported without a name
+            raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
         raise
     return path
 
@@ -50,7 +63,11 @@ def make_folder(path: str | Path) -> Path:
     except FileExistsError:
         raise InputError(f"{path} is a file; give a folder for the results.") from None
     except OSError as error:
-        raise InputError(f"The folder {path} cannot be made: {error.strerror}.") from None
+        raise InputError(
+            f"The folder {path} cannot be made: {error.strerror}. Choose another with --out."
+        ) from None
+    except ValueError:
+        raise InputError(f"{str(path)!r} is no name that a folder can have. Correct it.") from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"The folder {path} cannot be written to. Choose another with --out.")
     return path

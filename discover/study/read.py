@@ -1,6 +1,7 @@
 """Read a study file, with one clear error for whatever is wrong in it."""
 
 import hashlib
+import stat
 import tomllib
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from pydantic import ValidationError
 
 from discover import __version__
 from discover.dataset.load import resolve_folder
+from discover.dataset.table import read_bytes
 from discover.errors import InputError
 from discover.study.schema import Study
 
@@ -29,27 +31,47 @@ def read_study(path: str | Path) -> Study:
         If the file cannot be read, is not TOML, or holds an unknown key or a wrong value.
     """
     path = Path(path)
-    try:
-        if path.is_dir():
-            raise InputError(f"{path} is a folder; give the study file, such as {path}/study.toml.")
-        if path.stat().st_size > LARGEST_STUDY_FILE:
-            raise InputError(f"{path} is larger than a study file can be; is it a data file?")
-        text = path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"There is no study file {path}. Check its path.") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text, so it is not a study file.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    text = _read_text(path)
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path} is not valid TOML: {error}. Mend that line.") from None
     except RecursionError:
-        raise InputError(f"{path} is nested too deeply to be a study file.") from None
+        raise InputError(
+            f"{path} is nested too deeply to be a study file. Write it like those in studies/."
+        ) from None
+    except ValueError as error:  # TOML's own error, or a number of thousands of digits
+        raise InputError(f"{path} is not valid TOML: {error}. Mend that line.") from None
     study = parse_study(content, str(path))
     study._path = path
     return study
+
+
+def _read_text(path: Path) -> str:
+    try:
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"{path} is a folder; give the study file, such as {path}/study.toml.")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{path} is a pipe or device; give a study file.")
+        if status.st_size > LARGEST_STUDY_FILE:
+            raise InputError(
+                f"{path} is larger than a study file can be; is it a data file? Give a TOML file."
+            )
+        # editors on Windows write a byte order mark, which TOML does not know
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError:
+        raise InputError(f"There is no study file {path}. Check its path.") from None
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{path} is not UTF-8 text, so it is not a study file. Save it as UTF-8."
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be read: {error.strerror}. Check the file and who may read it."
+        ) from None
+    except InputError:
+        raise
+    except ValueError:
+        raise InputError(f"{str(path)!r} is no name that a file can have. Correct it.") from None
 
 
 def parse_study(content: dict, where: str = "the study") -> Study:
@@ -92,7 +114,7 @@ def _explain(error: ValidationError, where: str) -> str:
     elif first["type"] == "missing":
         text = f"{place!r} is missing"
     else:
-        got = repr(first.get("input"))
+        got = _shown(first.get("input"))
         # the branches of a union fail one by one; users see one key
         wishes = [_plain(p["msg"]) for p, at in zip(problems, places, strict=True) if at == place]
         wishes = [wishes[0], *(wish.removeprefix("should be ") for wish in wishes[1:])]
@@ -102,6 +124,13 @@ def _explain(error: ValidationError, where: str) -> str:
     more = len(set(places)) - 1
     tail = f" (and {more} more problem{'s' if more > 1 else ''} in this file)" if more else ""
     return f"{where}: {text}.{tail}"
+
+
+def _shown(value: object) -> str:
+    try:
+        return repr(value)
+    except ValueError:  # Python does not print integers of thousands of digits
+        return "a number of thousands of digits"
 
 
 def _plain(message: str) -> str:
@@ -143,6 +172,11 @@ def fingerprint(study: Study, *extra: object) -> str:
 
     Used to tell whether a result folder belongs to this study: the study, the measured files it
     names, the version of this software, and what the caller adds (task, seed).
+
+    Raises
+    ------
+    InputError
+        If the data folder or a file in it cannot be read.
     """
     digest = hashlib.sha256(study.model_dump_json().encode())
     for item in (__version__, *extra):
@@ -150,6 +184,6 @@ def fingerprint(study: Study, *extra: object) -> str:
     if study.data.folder is not None:
         base = None if study.path is None else study.path.parent
         for path in sorted(resolve_folder(study.data.folder, base).glob("*.csv")):
-            digest.update(path.name.encode())
-            digest.update(path.read_bytes())
+            digest.update(path.name.encode("utf-8", "surrogateescape"))
+            digest.update(read_bytes(path, path.name))
     return digest.hexdigest()[:16]

@@ -1,5 +1,7 @@
 """A folder of results that knows which study it belongs to and what is already done."""
 
+import contextlib
+import hashlib
 import json
 import shutil
 from collections.abc import Mapping
@@ -7,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from discover.errors import InputError
-from discover.study.atomic import make_folder, write_text
+from discover.study.atomic import PART_SUFFIX, make_folder, write_text
+from discover.study.lock import lock_folder
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"
@@ -17,7 +20,9 @@ class RunFolder:
     """The folder that a command writes to.
 
     ``state/study.json`` holds the study's fingerprint and whether it is complete; every finished
-    part lies beside it as JSON, so that a run that was stopped goes on where it was.
+    part lies beside it as JSON, so that a run that was stopped goes on where it was. A part carries
+    the fingerprint and a hash: one that was damaged, edited or left by another study is computed
+    again. While the object lives, no other process can open the folder.
 
     Parameters
     ----------
@@ -31,18 +36,20 @@ class RunFolder:
     Raises
     ------
     InputError
-        If the folder holds another study's results, or other files, and `overwrite` is not set.
+        If the folder holds another study's results and `overwrite` is not set, cannot be written
+        to, or is in use by another process.
     """
 
     def __init__(self, path: str | Path, fingerprint: str, overwrite: bool = False):
         self.path = make_folder(path)
         self.fingerprint = fingerprint
         self._state = self.path / STATE_FOLDER
+        self._lock = _locked(self.path)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home
             if found is not None:
-                shutil.rmtree(self._state)
+                _remove(self._state)
             found = None
         elif found is not None and found.get("fingerprint") != fingerprint:
             if not found.get("complete") and not self._has_parts():
@@ -52,19 +59,28 @@ class RunFolder:
                     f"{self.path} holds the results of another study, or of this one before it "
                     "was changed. Use --overwrite to replace them, or another --out."
                 )
-        self.complete = bool(found and found.get("complete"))
-        make_folder(self._state)
-        make_folder(self.path / "figures")
+        self.complete = bool(found and found.get("complete") is True)
+        for folder in (self.path, make_folder(self._state), make_folder(self.path / "figures")):
+            _sweep_up(folder)
         if found is None:
             self._write_state(False)
 
     def load(self, part: str) -> dict[str, Any] | None:
         """Return a finished part, or None if it has to be computed."""
-        return _read_json(self._state / f"{part}.json")
+        kept = _read_json(self._state / f"{part}.json")
+        if kept is None or kept.get("hash") != self._hash(kept.get("content")):
+            return None
+        return kept["content"]
 
     def save(self, part: str, content: Mapping[str, Any]) -> None:
         """Keep a finished part."""
-        write_text(self._state / f"{part}.json", json.dumps(content, allow_nan=True))
+        content = json.loads(json.dumps(content))  # as it will be read: keys become text
+        kept = {"hash": self._hash(content), "content": content}
+        write_text(self._state / f"{part}.json", json.dumps(kept))
+
+    def _hash(self, content: object) -> str:
+        text = json.dumps(content, sort_keys=True)
+        return hashlib.sha256(f"{self.fingerprint}|{text}".encode()).hexdigest()[:16]
 
     def write(self, name: str, text: str) -> Path:
         """Write one of the results."""
@@ -74,6 +90,7 @@ class RunFolder:
         """Mark the study as complete; called last."""
         self._write_state(True)
         self.complete = True
+        self._lock.release()
 
     def _has_parts(self) -> bool:
         return any(file.name != STATE_FILE for file in self._state.glob("*.json"))
@@ -81,6 +98,33 @@ class RunFolder:
     def _write_state(self, complete: bool) -> None:
         content = {"fingerprint": self.fingerprint, "complete": complete}
         write_text(self._state / STATE_FILE, json.dumps(content))
+
+
+def _locked(folder: Path):
+    try:
+        return lock_folder(folder)
+    except OSError as error:
+        raise InputError(
+            f"The folder {folder} cannot be written to: {error.strerror}. Choose another with "
+            "--out."
+        ) from None
+
+
+def _remove(folder: Path) -> None:
+    try:
+        shutil.rmtree(folder)
+    except OSError as error:
+        raise InputError(
+            f"The old results in {folder} cannot be removed: {error.strerror}. Choose another "
+            "folder with --out."
+        ) from None
+
+
+def _sweep_up(folder: Path) -> None:
+    """Remove what a killed process was about to write; it is ours, and only we are here."""
+    for rest in folder.glob(f".*{PART_SUFFIX}"):
+        with contextlib.suppress(OSError):
+            rest.unlink()
 
 
 def _read_json(path: Path) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ SyntheticLaw = Literal[
 LawName = Literal[
     "ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential", "fene_p", "learned"
 ]
+Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -25,7 +26,7 @@ class Synthetic(_Section):
     parameters: dict[str, float] = {}
     protocol: Literal["paper"] = "paper"
     noise: Annotated[float, Field(ge=0, le=10)] = 0.0
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     samples: Annotated[int, Field(ge=10, le=100_000)] = 201
 
 
@@ -123,7 +124,7 @@ class Compare(_Section):
     recipe: Literal["default", "paper"] = "default"
     quick: bool = False
     members: Annotated[int, Field(ge=1, le=64)] = 1
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     use_normal_stresses: bool = False
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
     sweep: Sweep | None = None

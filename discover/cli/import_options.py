@@ -1,0 +1,123 @@
+"""What ``discover data import`` does around the import itself: options, sources, writing."""
+
+import hashlib
+import os
+from collections.abc import Mapping as AnyMapping
+from collections.abc import Sequence
+from pathlib import Path
+
+from discover.dataset.importing.convert import ImportedFolder
+from discover.dataset.importing.mapping import (
+    MAPPING_FILE,
+    Mapping,
+    make_mapping,
+    read_mapping,
+    write_mapping,
+)
+from discover.dataset.load import INDEX_FILE
+from discover.dataset.table import read_bytes
+from discover.errors import InputError
+from discover.study.atomic import make_folder, write_text
+
+
+def merge_mapping(
+    path: Path | None,
+    columns: Sequence[str] | None = None,
+    units: Sequence[str] | None = None,
+    geometry: str | None = None,
+    blocks: Sequence[int] | None = None,
+    start_time_s: float | None = None,
+    layout: AnyMapping[str, object] | None = None,
+) -> Mapping:
+    """Return the mapping of a file with the options of the command line on top.
+
+    Parameters
+    ----------
+    path
+        The mapping file, if any.
+    columns, units
+        Options of the form ``stress=Shear stress``.
+    geometry
+        Such as ``cone_plate:radius_mm=25,angle_deg=1``.
+    blocks, start_time_s, layout
+        As in `discover.dataset.importing.Mapping`.
+
+    Raises
+    ------
+    InputError
+        If the file or an option is wrong.
+    """
+    content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
+    for key, options, example in (
+        ("columns", columns, "stress='Shear stress'"),
+        ("units", units, "stress=kPa"),
+    ):
+        content[key] = {**content.get(key, {}), **_pairs(options or (), example)}
+    if geometry is not None:
+        kind, _, rest = geometry.partition(":")
+        numbers = _pairs(filter(None, rest.split(",")), "radius_mm=25")
+        content["geometry"] = {"type": kind.strip().replace("-", "_"), **numbers}
+    if blocks:
+        content["blocks"] = list(blocks)
+    if start_time_s is not None:
+        content["start_time_s"] = start_time_s
+    known = {key: value for key, value in (layout or {}).items() if value is not None}
+    content["layout"] = {**content.get("layout", {}), **known}
+    return make_mapping(content, "the options" if path is None else f"{path.name} and the options")
+
+
+def _pairs(options, example: str) -> dict[str, str]:
+    pairs = {}
+    for option in options:
+        key, equals, value = option.partition("=")
+        if not equals or not key.strip() or not value.strip():
+            raise InputError(f"Cannot read {option!r}; write it as name=value, such as {example}.")
+        pairs[key.strip()] = value.strip()
+    return pairs
+
+
+def sources_of(
+    mapping: Mapping, path: Path | None, files: Sequence[Path], sweep: Path | None
+) -> tuple[list[Path], Path | None, list[str]]:
+    """Return the files to import: those given, or else those that the mapping file names.
+
+    The third value says which of the latter have changed since.
+    """
+    if files or path is None:
+        return list(files), sweep, []
+    runs: list[Path] = []
+    changed = []
+    for source in mapping.source:
+        file = path.parent / source.file
+        digest = hashlib.sha256(read_bytes(file, source.file)).hexdigest()
+        if source.sha256 is not None and digest != source.sha256:
+            changed.append(f"{source.file} has changed since it was imported before.")
+        if source.sweep:
+            sweep = sweep or file
+        else:
+            runs.append(file)
+    return runs, sweep, changed
+
+
+def write_folder(imported: ImportedFolder, out: Path, overwrite: bool) -> None:
+    """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
+
+    Raises
+    ------
+    InputError
+        If the folder holds data already and `overwrite` is not set, or cannot be written to.
+    """
+    make_folder(out)
+    if not overwrite and os.path.lexists(out / INDEX_FILE):
+        raise InputError(
+            f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
+            "another --out."
+        )
+    sources = tuple(
+        source.model_copy(update={"file": Path(os.path.relpath(source.file, out)).as_posix()})
+        for source in imported.mapping.source
+    )
+    mapping = imported.mapping.model_copy(update={"source": sources})
+    write_text(out / MAPPING_FILE, write_mapping(mapping))
+    for name in sorted(imported.files, key=lambda name: name == INDEX_FILE):
+        write_text(out / name, imported.files[name])

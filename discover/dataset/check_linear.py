@@ -1,0 +1,172 @@
+"""Doubts about runs held against linear viscoelasticity, and about the sweep itself."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from discover.dataset.check_run import stress_noise
+from discover.dataset.finding import Finding
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset.load import SWEEP_FILE
+from discover.dataset.run import LinearSweep, ShearRun
+
+# Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
+_LINEAR_STRAIN = 0.2
+# What gap, loading and temperature leave open between two instruments' stresses
+_STRESS_TOLERANCE = 0.15
+# Below a Weissenberg number of one the Cox–Merz rule holds to some ten per cent for simple fluids;
+# above it laws differ, and it is theirs to say
+_COX_MERZ_FACTOR = 1.3
+_COX_MERZ_RATE = 1.0
+_SWEEP_TOLERANCE = 0.05
+# Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number
+_SLOW = 0.3
+
+
+def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterator[Finding]:
+    """Yield what is doubtful about a linear sweep.
+
+    That a sum of Maxwell modes with positive moduli fits G′ and G″ together is the practical form
+    of the Kramers–Kronig relations.
+    """
+    if spectrum.best_error > _SWEEP_TOLERANCE:
+        yield Finding(
+            "warning",
+            "sweep",
+            SWEEP_FILE,
+            f"No sum of Maxwell modes fits {SWEEP_FILE} better than "
+            f"{100 * spectrum.best_error:.0f} %: G' and G'' contradict each other. Inertia of the "
+            "instrument at high frequency, a shift of one column, or too large an amplitude do "
+            "that.",
+        )
+    if len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency):
+        yield Finding(
+            "note", "sweep", SWEEP_FILE, f"{SWEEP_FILE} holds some frequencies more than once."
+        )
+
+
+def against_linear_theory(
+    runs: Sequence[ShearRun], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
+) -> Iterator[Finding]:
+    """Yield where runs and the linear sweep, or runs among themselves, do not fit together.
+
+    Parameters
+    ----------
+    runs
+        Those that load.
+    sweep, spectrum
+        The linear sweep and its relaxation modes, if there are any.
+    """
+    start_ups = [run for run in runs if _is_start_up(run)]
+    yield from _second_order(start_ups, spectrum)
+    if sweep is None or spectrum is None:
+        return
+    # mean relaxation time, weighted by what each mode adds to the viscosity
+    moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
+    mean_time = moment / spectrum.zero_shear_viscosity
+    fastest = max((np.max(np.abs(run.shear_rate)) for run in runs), default=0.0)
+    if runs and fastest * mean_time < 0.1:
+        yield Finding(
+            "warning",
+            "rate",
+            "",
+            f"The largest shear rate times the mean relaxation time ({mean_time:.3g} s) is "
+            f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
+            "learned. Add faster runs.",
+        )
+    for run in start_ups:
+        yield from _duration(run, mean_time)
+        yield from _small_strain(run, sweep, spectrum)
+        yield from _cox_merz(run, sweep, mean_time)
+
+
+def _is_start_up(run: ShearRun) -> bool:
+    rate = run.shear_rate
+    return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
+
+
+def _duration(run: ShearRun, mean_time: float) -> Iterator[Finding]:
+    strain = abs(run.shear_rate[0]) * run.time[-1]
+    # strongly sheared melts are steady after some strain, however slow they relax
+    if run.time[-1] < mean_time and strain < 5.0:
+        yield Finding(
+            "warning",
+            "duration",
+            run.name,
+            f"{run.name} lasts {run.time[-1]:.3g} s and strains by {strain:.2g}; the mean "
+            f"relaxation time is {mean_time:.3g} s. It does not reach its steady state, and slow "
+            "modes hardly show. Run longer, or do not expect it to tell.",
+        )
+
+
+def _small_strain(
+    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> Iterator[Finding]:
+    """Hold the first stresses against σ(t) = γ̇ Σ G_k λ_k (1 − exp(−t/λ_k))."""
+    rate = run.shear_rate[0]
+    times = run.time[:, None] / spectrum.relaxation_time
+    linear = rate * (-np.expm1(-times) @ (spectrum.modulus * spectrum.relaxation_time))
+    use = (abs(rate) * run.time < _LINEAR_STRAIN) & (np.abs(linear) > 5 * stress_noise(run))
+    # times shorter than those of the sweep are extrapolation
+    use &= run.time > 1.0 / np.max(sweep.angular_frequency)
+    if np.sum(use) < 5:
+        return
+    ratio = float(np.median(run.shear_stress[use] / linear[use]))
+    if abs(ratio - 1.0) > _STRESS_TOLERANCE:
+        yield Finding(
+            "warning",
+            "linear",
+            run.name,
+            f"At strains below {_LINEAR_STRAIN:g} the stress in {run.name} is {ratio:.2g} times "
+            f"what {SWEEP_FILE} foretells. Units, temperature, sample loading, a slow start or a "
+            "soft instrument do that; the closed loop can tell some of them apart.",
+        )
+
+
+def _cox_merz(run: ShearRun, sweep: LinearSweep, mean_time: float) -> Iterator[Finding]:
+    rate = abs(run.shear_rate[0])
+    frequency = sweep.angular_frequency
+    tail = run.shear_stress[run.time > 0.8 * run.time[-1]]
+    level = float(np.median(tail)) if len(tail) else 0.0
+    steady = len(tail) >= 3 and np.ptp(tail) < 0.1 * abs(level)
+    if rate * mean_time > _COX_MERZ_RATE or not steady:
+        return
+    if not frequency[0] <= rate <= frequency[-1]:
+        return
+    complex_viscosity = np.hypot(sweep.storage_modulus, sweep.loss_modulus) / frequency
+    expected = np.exp(np.interp(np.log(rate), np.log(frequency), np.log(complex_viscosity)))
+    ratio = abs(level) / rate / float(expected)
+    if not 1 / _COX_MERZ_FACTOR < ratio < _COX_MERZ_FACTOR:
+        yield Finding(
+            "warning",
+            "Cox-Merz",
+            run.name,
+            f"The steady viscosity in {run.name} is {ratio:.2g} times the complex viscosity of "
+            f"{SWEEP_FILE} at the same rate (Cox–Merz rule). Slip, edge fracture, units or "
+            "another sample do that; so do structured fluids.",
+        )
+
+
+def _second_order(
+    start_ups: Sequence[ShearRun], spectrum: RelaxationSpectrum | None
+) -> Iterator[Finding]:
+    """Hold the last N1 of slow runs against N1 = 2 γ̇² Σ G_k λ_k²   [Coleman & Markovitz 1964]."""
+    if spectrum is None:
+        return
+    moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
+    mean_time = moment / spectrum.zero_shear_viscosity
+    for run in start_ups:
+        normal, rate = run.first_normal_stress_difference, abs(run.shear_rate[0])
+        if normal is None or rate * mean_time > _SLOW:
+            continue
+        last = float(np.median(normal[-max(3, len(run) // 10) :]))
+        most = 2.0 * moment * rate**2
+        if last > 3.0 * most or last < 0:
+            yield Finding(
+                "warning",
+                "N1",
+                run.name,
+                f"N1 in {run.name} ends at {last:.3g} Pa; at this slow rate {SWEEP_FILE} foretells "
+                f"a value between 0 and {most:.3g} Pa, quadratic in the rate. The normal force is "
+                "below what the transducer resolves, or has a baseline.",
+            )

@@ -1,0 +1,235 @@
+"""Doubts about one run, from the run alone."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.finding import Finding
+from discover.dataset.run import ShearRun
+
+FEWEST_SAMPLES = 10
+"""Runs with fewer samples than this say little about a law."""
+
+# A spike stands out of its neighbours by this many standard deviations of the local noise, and by
+# this part of the largest stress: the first keeps noisy runs quiet, the second rounded ones
+_SPIKE_SIGMAS = 10.0
+_SPIKE_SHARE = 0.03
+
+# Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
+_FEWEST_ON_THE_RISE = 5
+_FEWEST_PER_CYCLE = 16
+
+# Elastic limit: N1 = σ12 γ where all modes are still elastic, less later. Beyond this factor of it,
+# or below zero by as much, the transducer speaks, not the fluid
+_NORMAL_STRESS_FACTOR = 2.0
+_SMALL_STRAIN = 0.5
+
+
+def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
+    """Yield what is doubtful about a run.
+
+    Parameters
+    ----------
+    run
+        A run that loads.
+    """
+
+    def warn(subject: str, text: str) -> Finding:
+        return Finding("warning", subject, run.name, text)
+
+    if "thinned" in run.metadata:
+        yield Finding("note", "samples", run.name, f"{run.name}: {run.metadata['thinned']}.")
+    if str(run.metadata.get("shear_rate_source", "")).startswith("derived"):
+        source = run.metadata["shear_rate_source"]
+        yield Finding("note", "rate", run.name, f"{run.name}: the shear rate is {source}.")
+    if len(run) < FEWEST_SAMPLES:
+        yield warn(
+            "samples", f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
+        )
+    if not np.any(run.shear_rate):
+        yield warn(
+            "rate",
+            f"The shear rate in {run.name} is zero throughout, so nothing flows. Leave the run "
+            "out, unless it follows a flow.",
+        )
+        return
+    if not np.any(run.shear_stress):
+        yield warn("stress", f"The stress in {run.name} is zero throughout. Check the column.")
+        return
+    if len(run) < 3:
+        return
+    if np.ptp(run.shear_stress) <= 1e-9 * np.max(np.abs(run.shear_stress)):
+        yield warn(
+            "stress",
+            f"The stress in {run.name} is the same in every sample: a steady value or a command "
+            "rather than a record. Check the column.",
+        )
+        return
+    yield from _outliers(run)
+    yield from _clock_start(run)
+    yield from _strain(run)
+    if np.ptp(run.shear_rate) <= 1e-6 * np.max(np.abs(run.shear_rate)):
+        yield from _start_up(run)
+        yield from _normal_stress(run)
+    else:
+        yield from _cycles(run)
+
+
+def spikes(run: ShearRun) -> Float[np.ndarray, " k"]:
+    """Return the times, in s, of single samples of stress that stand out of their neighbours.
+
+    A sample is compared with the straight line between its neighbours. A lone spike also bends
+    the lines at its neighbours the other way; a corner or a fast rise does not.
+    """
+    off = _bends(run.time, run.shear_stress)
+    if len(off) < 5:
+        return np.empty(0)
+    width = min(41, len(off))
+    first = np.clip(np.arange(len(off)) - width // 2, 0, len(off) - width)
+    windows = np.lib.stride_tricks.sliding_window_view(np.abs(off), width)
+    noise = 1.4826 * np.median(windows, axis=1)[first]
+    large = np.abs(off) > np.maximum(
+        _SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.shear_stress))
+    )
+    alone = np.zeros(len(off), dtype=bool)
+    alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
+    # the neighbours of a spike bend too, but less
+    alone[1:-1] &= (np.abs(off[1:-1]) > np.abs(off[:-2])) & (np.abs(off[1:-1]) > np.abs(off[2:]))
+    return run.time[1:-1][large & alone]
+
+
+def stress_noise(run: ShearRun) -> float:
+    """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
+    off = _bends(run.time, run.shear_stress)
+    # a sample minus the mean of two neighbours: variance 1 + 1/4 + 1/4
+    return float(1.4826 * np.median(np.abs(off)) / np.sqrt(1.5)) if len(off) else 0.0
+
+
+def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
+    return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
+
+
+def _outliers(run: ShearRun) -> Iterator[Finding]:
+    found = spikes(run)
+    if len(found):
+        where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
+        count = "one sample" if len(found) == 1 else f"{len(found)} samples"
+        yield Finding(
+            "warning",
+            "outliers",
+            run.name,
+            f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
+            "them; remove them if the instrument made them.",
+        )
+
+
+def _clock_start(run: ShearRun) -> Iterator[Finding]:
+    if run.time[0] > 0.2 * run.time[-1]:
+        yield Finding(
+            "warning",
+            "time",
+            run.name,
+            f"{run.name} starts at {run.time[0]:.4g} s of {run.time[-1]:.4g} s. Time counts from "
+            "the start of the flow, from rest; if the clock started earlier, subtract its reading "
+            "then.",
+        )
+
+
+def _strain(run: ShearRun) -> Iterator[Finding]:
+    if run.strain is None or "derived" in str(run.metadata.get("shear_rate_source", "")):
+        return
+    steps = 0.5 * (run.shear_rate[1:] + run.shear_rate[:-1]) * np.diff(run.time)
+    expected = np.concatenate([[0.0], np.cumsum(steps)])
+    measured = run.strain - run.strain[0]
+    size = np.max(np.abs(expected))
+    off = float(np.max(np.abs(measured - expected)) / size) if size > 0 else 0.0
+    if off > 0.1:
+        yield Finding(
+            "warning",
+            "strain",
+            run.name,
+            f"The strain in {run.name} differs from its shear rate summed over time by up to "
+            f"{100 * off:.0f} %. Check the units of both (per cent?), or whether the commanded "
+            "rate was reached.",
+        )
+
+
+def _start_up(run: ShearRun) -> Iterator[Finding]:
+    stress = run.shear_stress * np.sign(run.shear_rate[0])
+    half = int(np.argmax(stress >= 0.5 * np.max(stress)))
+    if half < _FEWEST_ON_THE_RISE:
+        yield Finding(
+            "warning",
+            "sampling",
+            run.name,
+            f"{run.name} has {half} samples before the stress reaches half its largest value, so "
+            f"the start-up is hardly seen. Sample faster at the start, evenly in log time (at "
+            f"least {_FEWEST_ON_THE_RISE}).",
+        )
+    noise = stress_noise(run)
+    low = np.abs(stress) < 3.0 * noise
+    below = float(np.mean(low | (stress < 0)))
+    if below > 0.2:
+        last = run.time[np.flatnonzero(low | (stress < 0))[-1]]
+        yield Finding(
+            "warning",
+            "stress",
+            run.name,
+            f"{100 * below:.0f} % of the stresses in {run.name} are below three times their noise "
+            f"({noise:.2g} Pa) or negative, the last at {last:.4g} s: the transducer's floor. "
+            "These samples teach nothing; a strain window ([loop] strain) leaves them out.",
+        )
+
+
+def _cycles(run: ShearRun) -> Iterator[Finding]:
+    turns = int(np.sum(np.diff(np.sign(run.shear_rate[run.shear_rate != 0])) != 0))
+    if turns < 2:
+        return
+    per_cycle = 2.0 * len(run) / turns
+    if per_cycle < _FEWEST_PER_CYCLE:
+        yield Finding(
+            "warning",
+            "sampling",
+            run.name,
+            f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign {turns} "
+            f"times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the rate if "
+            "the sign changes are noise.",
+        )
+
+
+def _normal_stress(run: ShearRun) -> Iterator[Finding]:
+    """Hold N1 against what elasticity allows in start-up from rest: 0 ≤ N1 ≤ σ12 γ, about.
+
+    With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
+    only lowers it.
+    """
+    normal = run.first_normal_stress_difference
+    if normal is None:
+        return
+    rate = abs(run.shear_rate[0])
+    strain = rate * run.time
+    limit = np.abs(run.shear_stress) * strain
+    small = strain < _SMALL_STRAIN
+    bad = (normal > _NORMAL_STRESS_FACTOR * limit) | (normal < -0.5 * limit)
+    if np.sum(small) >= 5 and np.mean(bad[small]) > 0.3:
+        until = run.time[np.flatnonzero(bad & small)[-1]]
+        yield Finding(
+            "warning",
+            "N1",
+            run.name,
+            f"N1 in {run.name} cannot be right early: {100 * np.mean(bad[small]):.0f} % of its "
+            f"samples below strain {_SMALL_STRAIN:g} (the last at {until:.4g} s) are negative or "
+            f"above {_NORMAL_STRESS_FACTOR:g} times stress × strain, the elastic limit. Do not "
+            "judge a law by them.",
+        )
+    late = normal[-max(3, len(run) // 10) :]
+    if np.median(late) < 0 and strain[-1] > _SMALL_STRAIN:
+        yield Finding(
+            "warning",
+            "N1",
+            run.name,
+            f"N1 in {run.name} ends negative ({np.median(late):.3g} Pa). Few fluids do that; "
+            "check its sign and the baseline of the normal force.",
+        )

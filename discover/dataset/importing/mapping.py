@@ -1,0 +1,174 @@
+"""What an import needs to know: which column is what, in which unit, on which geometry."""
+
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from discover.dataset.table import read_bytes
+from discover.errors import InputError
+
+MAPPING_FILE = "import.toml"
+
+QuantityName = Literal[
+    "time",
+    "shear_rate",
+    "stress",
+    "strain",
+    "N1",
+    "N2",
+    "torque",
+    "angular_velocity",
+    "angle",
+    "normal_force",
+    "omega",
+    "Gp",
+    "Gpp",
+]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Geometry(_Section):
+    """The tool, needed where the file holds torque, angle or force instead of stress and strain.
+
+    Cone and plate: σ12 = 3M/(2πR³), γ = θ/β, N1 = 2F/(πR²). Plates: σ12 = 2M/(πR³), γ = θR/h at the
+    rim   [Macosko 1994, Rheology, ch. 5]. The stress of plates is the apparent one: it is the
+    stress at the rim only for a linear fluid, and the force gives N1 − N2, so it is not read.
+    """
+
+    type: Literal["cone_plate", "plate_plate"]
+    radius_mm: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+    angle_deg: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = None
+    gap_mm: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+
+    @model_validator(mode="after")
+    def _complete(self):
+        needed = "angle_deg" if self.type == "cone_plate" else "gap_mm"
+        if getattr(self, needed) is None:
+            raise ValueError(f"{self.type} needs {needed}")
+        return self
+
+    @property
+    def stress_per_torque(self) -> float:
+        """σ12/M in Pa/(N m)."""
+        factor = 1.5 if self.type == "cone_plate" else 2.0
+        return factor / (math.pi * (self.radius_mm * 1e-3) ** 3)
+
+    @property
+    def strain_per_angle(self) -> float:
+        """γ/θ, per radian."""
+        if self.angle_deg is not None and self.type == "cone_plate":
+            return 1.0 / math.radians(self.angle_deg)
+        return self.radius_mm / (self.gap_mm or math.nan)
+
+    @property
+    def normal_stress_per_force(self) -> float | None:
+        """N1/F in Pa/N, or None where the force does not give N1."""
+        if self.type == "plate_plate":
+            return None
+        return 2.0 / (math.pi * (self.radius_mm * 1e-3) ** 2)
+
+
+class Layout(_Section):
+    """How the text is laid out; whatever is left out is found from the file."""
+
+    delimiter: Literal["tab", "semicolon", "comma"] | None = None
+    decimal: Literal[".", ","] | None = None
+    header_row: Annotated[int, Field(ge=1)] | None = None
+    encoding: str | None = None
+
+
+class Source(_Section):
+    """A file that was imported, with its hash."""
+
+    file: str
+    sha256: str | None = None
+    sweep: bool = False
+
+
+class Mapping(_Section):
+    """Everything that decides an import; written beside the result so that it can be repeated."""
+
+    columns: dict[QuantityName, str] = {}
+    units: dict[QuantityName, str] = {}
+    layout: Layout = Layout()
+    geometry: Geometry | None = None
+    start_time_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    blocks: tuple[Annotated[int, Field(ge=1)], ...] | None = None
+    source: tuple[Source, ...] = ()
+
+
+def make_mapping(content: dict, where: str) -> Mapping:
+    """Return a mapping from nested dictionaries.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown or a value is wrong; names it.
+    """
+    try:
+        return Mapping.model_validate(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the mapping"
+        known = ""
+        if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
+            known = f" Known keys are {', '.join(Mapping.model_fields)}."
+        reason = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"{where}: {place}: {reason}. Correct it.{known}") from None
+
+
+def read_mapping(path: Path) -> Mapping:
+    """Return the mapping in a TOML file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is wrong.
+    """
+    try:
+        content = tomllib.loads(read_bytes(path, path.name).decode("utf-8-sig"))
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path.name} is not valid TOML: {error}. Mend that line.") from None
+    return make_mapping(content, path.name)
+
+
+def write_mapping(mapping: Mapping) -> str:
+    """Return a mapping as TOML."""
+    lines = [
+        "# How this folder was imported. Repeat it with",
+        "#   discover data import --mapping ",
+    ]
+    lines[1] += "import.toml --out FOLDER"
+    if mapping.start_time_s:
+        lines.append(f"start_time_s = {mapping.start_time_s!r}")
+    if mapping.blocks is not None:
+        lines.append(f"blocks = {list(mapping.blocks)}")
+    for name in ("columns", "units", "layout", "geometry"):
+        section = getattr(mapping, name)
+        content = section if isinstance(section, dict) else section and section.model_dump()
+        known = {key: value for key, value in (content or {}).items() if value is not None}
+        if known:
+            lines += ["", f"[{name}]", *(f"{key} = {_toml(known[key])}" for key in known)]
+    for source in mapping.source:
+        lines += ["", "[[source]]", f"file = {_toml(source.file)}"]
+        if source.sha256:
+            lines.append(f"sha256 = {_toml(source.sha256)}")
+        if source.sweep:
+            lines.append("sweep = true")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: object) -> str:
+    # a JSON string is a TOML string as long as it is not escaped to ASCII
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

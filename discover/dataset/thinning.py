@@ -1,0 +1,69 @@
+"""Fewer samples of a very long record, chosen so that what a law is judged on stays."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+MOST_SAMPLES = 20_000
+"""A record with more samples is thinned: they cost time and say nothing new about a law."""
+
+
+def thin(
+    time: Float[np.ndarray, " n"],
+    shear_rate: Float[np.ndarray, " n"],
+    shear_stress: Float[np.ndarray, " n"],
+    most: int = MOST_SAMPLES,
+) -> tuple[Bool[np.ndarray, " n"], str]:
+    """Return which samples to keep, and a word on what was kept.
+
+    Kept are the first and the last sample; samples evenly spaced in log time, since a start-up has
+    its information per decade; samples evenly spaced in time, since an oscillation has it per
+    cycle; and the largest and smallest stress and rate. Values are the recorded ones, and all but
+    those four are chosen by their time alone, so that noise keeps its size and distribution.
+
+    Parameters
+    ----------
+    time
+        Sampling times in s, increasing.
+    shear_rate
+        In 1/s.
+    shear_stress
+        In Pa.
+    most
+        How many samples may stay.
+    """
+    n = len(time)
+    keep = np.zeros(n, dtype=bool)
+    if n <= most:
+        keep[:] = True
+        return keep, f"kept all {n:,} samples"
+    keep[[0, -1]] = True
+    half = (most - 6) // 2
+    positive = time[time > 0]
+    keep[_nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
+    keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
+    for values in (shear_stress, shear_rate):
+        keep[[int(np.argmin(values)), int(np.argmax(values))]] = True
+    lost = _strain_error(time, shear_rate, keep)
+    note = (
+        f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half "
+        "evenly in time, and the extremes of stress and rate"
+    )
+    if lost > 1e-3:
+        note += (
+            f"; the strain between them is then off by {100 * lost:.2g} % of its range, so the "
+            "rate varies faster than the samples kept: give a shorter record"
+        )
+    return keep, note
+
+
+def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    return after - (wanted - time[after - 1] < time[after] - wanted)
+
+
+def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float:
+    """Return the largest error of the integrated rate at the samples kept, over its range."""
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
+    t, r = time[keep], rate[keep]
+    part = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))

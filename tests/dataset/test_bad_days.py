@@ -1,0 +1,382 @@
+"""A thousand bad days: whatever a file holds, one clear message, never a traceback."""
+
+import json
+import os
+import random
+import time
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import check_folder, load_dataset
+from discover.errors import InputError
+from discover.study import RunFolder, fingerprint, read_study
+from discover.study.build import declared_model, load_study_data
+
+RUN = "time_s,shear_rate_1_s,stress_Pa,N1_Pa\n" + "".join(
+    f"{0.1 * i:.1f},0.5,{2 * (1 - 0.9**i):.6f},{0.1 * i:.2f}\n" for i in range(14)
+)
+LAOS = "time_ms,strain,stress_kPa\n" + "".join(
+    f"{i},{np.sin(0.3 * i):.6f},{np.cos(0.3 * i - 0.3):.6f}\n" for i in range(24)
+)
+FILES = {
+    "runs.csv": "file,factor,label\na.csv,2.0,first\nb.csv,4.0,second\n",
+    "a.csv": RUN,
+    "b.csv": LAOS,
+    "lve.csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n10,50,5\n1,25,25\n0.1,1,5\n",
+    "study.toml": """[data]
+folder = "."
+fit = ["a.csv"]
+held_out = ["b.csv"]
+clock_factor = "factor"
+[model]
+law = "giesekus"
+modulus_Pa = "fit"
+relaxation_time_s = 1.0
+parameters = { alpha = 0.3 }
+known_relaxation = true
+[loop]
+max_effects = 3
+strain = [0.02, 25]
+noise = 0.01
+[compare]
+learners = ["tensor_sindy", "tbnn_ude"]
+library = { degree = 1, closed_forms = ["exp"] }
+test = "paper"
+seed = 0
+high_deborah = [1.5]
+sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1] }
+""",
+}
+TOKENS = (
+    "nan", "inf", "-inf", "1e400", "-1", "0", "1e300", "1e-320", "", " ", "\t", ";", ",", ",,", '"',
+    "'", "\n", "\r\n", "\r", "\n\n", "#", "0,5", "1.2.3", "--", "true", "0x10", "1_000", "é", "µ",
+    "\ufeff", "\u2028", "\u202e", "\x1b[31m", "\x00", "../", "/etc/passwd", "~", "~nobody", "$HOME",
+    "[", "]", "{", "}", "=", "[[", "99999999999999999999999", "9" * 5000, "0x" + "f" * 5000,
+    "a" * 300, "time_s", "time_min", "time_parsec", "stress_furlong", "fit", "lve", "%s", "{0}",
+    "1979-05-27", "1 MPa", "١٢", "None", "null", "file", "a.csv", "runs.csv", "\\u0000",
+    '"\\u0000"',
+)  # fmt: skip
+
+
+def mutate(text: str, source: random.Random) -> bytes:
+    """Return the text with one to four things done to it that users and disks do."""
+    data = text
+    for _ in range(source.randint(1, 4)):
+        lines = data.split("\n")
+        i = source.randrange(len(data) + 1)
+        row = source.randrange(len(lines))
+        match source.randrange(11):
+            case 0:
+                data = data[:i] + source.choice(TOKENS) + data[i:]
+            case 1:
+                data = data[:i] + data[i + source.randint(1, 9) :]
+            case 2:
+                data = data[:i]
+            case 3:
+                del lines[row]
+                data = "\n".join(lines)
+            case 4:
+                lines.insert(row, lines[source.randrange(len(lines))])
+                data = "\n".join(lines)
+            case 5:
+                cells = lines[row].split(",")
+                cells[source.randrange(len(cells))] = source.choice(TOKENS)
+                lines[row] = ",".join(cells)
+                data = "\n".join(lines)
+            case 6:
+                data = data.replace(*source.choice(((",", ";"), (".", ","), ("\n", "\r\n"))))
+            case 7:
+                source.shuffle(lines)
+                data = "\n".join(lines)
+            case 8:
+                key, equals, _ = lines[row].partition("=")
+                lines[row] = f"{key}= {source.choice(TOKENS)}" if equals else lines[row]
+                data = "\n".join(lines)
+            case 9:
+                data = source.choice(TOKENS) + data
+            case _:
+                data += source.choice(TOKENS)
+    raw = data.encode("utf-8", "surrogatepass")
+    match source.randrange(12):
+        case 0:
+            raw = raw[: source.randrange(len(raw) + 1)] + source.randbytes(3)
+        case 1:
+            raw = data.encode("utf-16", "replace")
+        case 2:
+            raw = data.encode("latin-1", "replace")
+    return raw
+
+
+def write(root, changes=None):
+    for name, content in {**FILES, **(changes or {})}.items():
+        raw = content if isinstance(content, bytes) else content.encode()
+        (root / name).write_bytes(raw)
+    return root
+
+
+def use(root) -> str | None:
+    """Do all that a command does before it simulates; return the message, if there is one."""
+    try:
+        study = read_study(root / "study.toml")
+        fingerprint(study, "task", 0)
+        data = load_study_data(study)
+        declared_model(study, data.dataset)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def assert_clear(message: str, names):
+    """Hold a message to what the user needs: where, in words, and what to do."""
+    assert "Traceback" not in message
+    assert len(message) < 1000, message
+    assert any(name in message for name in names), message
+    assert len(message.split()) >= 4, message
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_two_hundred_mutations_of_a_file_are_accepted_or_explained(tmp_path, name):
+    source = random.Random(f"bad days of {name}")
+    refused = 0
+    write(tmp_path)
+    for _ in range(200):
+        content = mutate(FILES[name], source)
+        (tmp_path / name).write_bytes(content)
+        started = time.perf_counter()
+        message = use(tmp_path)
+        findings = check_folder(tmp_path, "factor")
+        # generous: one case takes about 10 ms, only a hang takes seconds
+        assert time.perf_counter() - started < 5.0, content
+        # a broken runs.csv is seen through the run it names, a bad run through runs.csv
+        places = (*FILES, str(tmp_path), "parameter", "law")
+        for finding in findings:
+            assert finding.text
+            assert "Traceback" not in finding.text
+        if message is not None:
+            refused += 1
+            assert_clear(message, places)
+            if refused % 60 == 1:  # and so the command ends: one line, exit code 2
+                study = str(tmp_path / "study.toml")
+                result = CliRunner().invoke(
+                    app, ["close-loop", study, "--out", str(tmp_path / "o")]
+                )
+                assert result.exit_code == 2, result.output
+                assert result.stderr.startswith("discover: ")
+                assert result.stderr.count("\n") == 1
+    # a fuzzer that breaks nothing tests nothing; one that breaks all never reaches the depths
+    assert 50 <= refused <= 195, refused
+
+
+cells = st.one_of(
+    st.floats().map(str),
+    st.integers().map(str),
+    st.text(max_size=8),
+    st.sampled_from(TOKENS),
+)
+
+
+@settings(
+    max_examples=200,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+@given(
+    header=st.lists(
+        st.sampled_from(
+            [
+                "time_s",
+                "time_min",
+                "shear_rate_1_s",
+                "stress_Pa",
+                "stress_kPa",
+                "strain",
+                "N1_Pa",
+                "",
+            ]
+        ),
+        min_size=1,
+        max_size=5,
+    ),
+    rows=st.lists(st.lists(cells, max_size=5), max_size=6),
+    separator=st.sampled_from([",", ",", ",", ";", "\t"]),
+    end=st.sampled_from(["\n", "\r\n", "\r"]),
+)
+def test_any_table_is_a_run_or_one_message(tmp_path, header, rows, separator, end):
+    text = end.join(separator.join(row) for row in [header, *rows])
+    write(tmp_path, {"a.csv": text.encode("utf-8", "surrogatepass")})
+    message = use(tmp_path)
+    if message is None:
+        run = load_dataset(tmp_path)["a.csv"]
+        assert np.all(np.isfinite(run.shear_stress))
+        assert np.all(np.diff(run.time) > 0)
+    else:
+        assert_clear(message, FILES)
+
+
+@pytest.mark.parametrize("name", ["study.json", "part.json", ".discover-lock"])
+def test_damaged_state_is_never_taken_for_a_result(tmp_path, name):
+    source = random.Random(name)
+    content = {"coefficients": [0.1, 2.0], "rows": {"x": None}}
+    for _ in range(50):
+        folder = RunFolder(tmp_path, "one", overwrite=True)
+        folder.save("part", content)
+        folder._lock.release()
+        target = tmp_path / name if name.startswith(".") else tmp_path / "state" / name
+        text = target.read_text() if target.exists() else json.dumps({"pid": 1, "host": "x"})
+        target.write_bytes(mutate(text, source))
+        try:
+            again = RunFolder(tmp_path, "one")
+        except InputError:
+            continue  # taken for another study's: nothing of it is used
+        assert not again.complete
+        assert again.load("part") in (None, content)
+        again._lock.release()
+
+
+HEADER = "time_s,shear_rate_1_s,stress_Pa\n"
+BY_HAND = {
+    "units row": (HEADER + "s,1/s,Pa\n0,1,1\n", "row of units"),
+    "semicolons": (HEADER.replace(",", ";") + "0;1;1\n", "semicolons"),
+    "tabs": (HEADER.replace(",", "\t") + "0\t1\t1\n", "tabs"),
+    "decimal commas": (HEADER + '"0,5",1,1\n', "decimal points"),
+    "decimal commas unquoted": (HEADER + "0,5,1,0,1,0\n", "decimal points"),
+    "no header": ("0,1,1\n1,1,1\n", "begins with numbers on line 1"),
+    "header only": (HEADER, "no rows"),
+    "duplicate columns": ("time_s,time_s,stress_Pa\n0,1,1\n", "two columns named time_s"),
+    "unnamed column": ("time_s,,stress_Pa\n0,1,1\n", "Column 2"),
+    "binary": (b"PK\x03\x04\x00\x00" + bytes(range(256)), "zero byte"),
+    "latin-1": (HEADER.encode() + b"0,1,1\n1,1,\xb5\n", "line 3 holds the byte 0xb5"),
+    "UTF-16": ((HEADER + "0,1,1\n").encode("utf-16"), "UTF-16"),
+    "gap": (HEADER + "0,1,1\n1,1,\n2,1,1\n", "line 3 holds nothing"),
+    "gigantic": (HEADER + "0,1,1\n1,1,1e300\n", "more than any measurement"),
+    "overflow": (HEADER + "0,1,1\n1,1,1e999\n", "beyond what a computer"),
+    "blank lines count": (HEADER + "\n\n0,1,1\n\n1,1,x\n", "line 6 holds x"),
+    "repeated time": (HEADER + "0,1,1\n1,1,1\n1,1,2\n", "line 4 holds 1 s after 1 s"),
+    "falling time": (HEADER + "0,1,1\n2,1,1\n1,1,2\n", "increase strictly"),
+    "negative time": (HEADER + "-1,1,1\n2,1,1\n", "start at or after 0"),
+    "opposite sign": (HEADER + "0,1,0\n1,1,-1\n2,1,-2\n", "opposite to the shear rate"),
+    "unknown unit": ("time_blorp,shear_rate_1_s,stress_Pa\n0,1,1\n", "ends in no unit"),
+    "unit of something else": ("time_Pa,shear_rate_1_s,stress_Pa\n0,1,1\n", "not a unit of time"),
+    "capitals": ("Time_s,shear_rate_1_s,stress_Pa\n0,1,1\n", "case-sensitive"),
+    "brackets": ("time [s],shear_rate_1_s,stress_Pa\n0,1,1\n", "Rename time [s] to time_s"),
+    "quote left open": (HEADER + '0,1,"1\n', "Mend the quotes"),
+    "one sample of strain": ("time_s,strain,stress_Pa\n0,1,1\n", "1 samples of strain"),
+}
+
+
+@pytest.mark.parametrize("case", BY_HAND)
+def test_what_users_bring_is_refused_with_file_place_and_remedy(tmp_path, case):
+    content, words = BY_HAND[case]
+    write(tmp_path, {"a.csv": content})
+    message = use(tmp_path)
+    assert message is not None
+    assert words in message
+    assert "a.csv" in message
+    result = CliRunner().invoke(app, ["data", "check", str(tmp_path)])
+    assert result.exit_code == 2
+    assert words in result.output
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "\ufeff" + RUN,
+        RUN.replace("\n", "\r\n"),
+        RUN.replace("\n", "\n\n"),
+        RUN.replace(",", " , "),
+        RUN.rstrip("\n"),
+    ],
+    ids=["BOM", "CRLF", "blank lines", "spaces", "no last line end"],
+)
+def test_harmless_habits_of_editors_change_nothing(tmp_path, content):
+    write(tmp_path)
+    wanted = load_dataset(tmp_path)["a.csv"]
+    write(tmp_path, {"a.csv": content, "study.toml": "\ufeff" + FILES["study.toml"]})
+    assert use(tmp_path) is None
+    run = load_dataset(tmp_path)["a.csv"]
+    np.testing.assert_array_equal(run.shear_stress, wanted.shear_stress)
+    np.testing.assert_array_equal(run.time, wanted.time)
+
+
+def test_minutes_in_the_header_are_minutes(tmp_path):
+    write(tmp_path, {"a.csv": RUN.replace("time_s", "time_min")})
+    assert load_dataset(tmp_path)["a.csv"].time[1] == pytest.approx(6.0, rel=1e-12)
+
+
+def test_labels_stay_labels_and_numbers_become_numbers(tmp_path):
+    write(tmp_path, {"runs.csv": "file,a,b,c,d\na.csv,1_2,nan,-1.5e3,\n"})
+    metadata = load_dataset(tmp_path)["a.csv"].metadata
+    assert [metadata[key] for key in "abcd"] == ["1_2", "nan", -1500.0, ""]
+
+
+def test_links_out_of_the_folder_are_refused_and_links_within_followed(tmp_path):
+    inside, outside = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    outside.mkdir()
+    write(inside)
+    (outside / "secret.csv").write_text(RUN)
+    (inside / "a.csv").unlink()
+    (inside / "a.csv").symlink_to(outside / "secret.csv")
+    assert "outside the folder" in str(use(inside))
+    (inside / "a.csv").unlink()
+    (inside / "real").write_text(RUN)
+    (inside / "a.csv").symlink_to("real")
+    assert use(inside) is None
+    (inside / "a.csv").unlink()
+    (inside / "a.csv").symlink_to("a.csv")  # to itself
+    assert "a.csv" in str(use(inside))
+    (inside / "a.csv").unlink()
+    write(inside)
+    (inside / "lve.csv").unlink()
+    (inside / "lve.csv").symlink_to(outside / "secret.csv")
+    assert "lve.csv is a link to outside" in str(use(inside))
+
+
+def test_folders_pipes_and_forbidden_files_are_refused_without_waiting(tmp_path, monkeypatch):
+    write(tmp_path)
+    (tmp_path / "a.csv").unlink()
+    (tmp_path / "a.csv").mkdir()
+    assert "a.csv is a folder" in str(use(tmp_path))
+    (tmp_path / "a.csv").rmdir()
+    os.mkfifo(tmp_path / "a.csv")  # reading it would wait for ever
+    assert "pipe or device" in str(use(tmp_path))
+    (tmp_path / "a.csv").unlink()
+    write(tmp_path)
+    from pathlib import Path
+
+    def forbidden(self):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "read_bytes", forbidden)  # the tests may run as root
+    message = str(use(tmp_path))
+    assert "Permission denied" in message
+    assert "study.toml" in message
+
+
+def test_a_long_record_is_thinned_with_a_word_and_its_samples_are_the_recorded_ones(tmp_path):
+    n = 60_000
+    times = np.linspace(0, 100, n)
+    generator = np.random.default_rng(0)
+    stress = 1 - np.exp(-times) + 3 * times * np.exp(-5 * times)
+    noisy = stress + 1e-3 * generator.standard_normal(n)
+    rows = [f"{t:.7f},1,{s:.9f}" for t, s in zip(times, noisy, strict=True)]
+    write(tmp_path, {"a.csv": HEADER + "\n".join(rows)})
+    run = load_dataset(tmp_path)["a.csv"]
+    assert 10_000 < len(run) <= 20_000
+    assert f"of {n:,} samples" in str(run.metadata["thinned"])
+    assert run.time[-1] == pytest.approx(100.0)
+    # the overshoot's height and the early decades are kept
+    assert np.max(run.shear_stress) == pytest.approx(np.max(noisy), abs=1e-8)
+    assert np.sum(run.time < 0.05) > 0.9 * np.sum(times < 0.05)
+    # noise is neither smoothed nor selected: its size stays within sampling error, 3 / sqrt(2 n)
+    expected = np.interp(run.time, times, stress)
+    assert np.std(run.shear_stress - expected) == pytest.approx(1e-3, rel=3 / np.sqrt(2 * len(run)))
+    findings = [f for f in check_folder(tmp_path) if f.file == "a.csv"]
+    assert any("half evenly in log time" in f.text for f in findings if f.severity == "note")
+    assert "thinned" not in load_dataset(tmp_path)["b.csv"].metadata

@@ -1,0 +1,202 @@
+"""What a check says of a folder, and what it does not say of a good one."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import check_folder
+
+MODULUS, RELAXATION_TIME = 100.0, 2.0
+TIMES = np.concatenate([[0.0], np.geomspace(2e-3, 20.0, 120)])
+
+
+def start_up(rate=1.0, time=TIMES):
+    """Start-up of an upper-convected Maxwell fluid, with its analytic stresses."""
+    x = time / RELAXATION_TIME
+    viscosity = MODULUS * RELAXATION_TIME
+    return {
+        "time_s": time.copy(),
+        "shear_rate_1_s": np.full(len(x), rate),
+        "stress_Pa": viscosity * rate * -np.expm1(-x),
+        "N1_Pa": 2 * viscosity * RELAXATION_TIME * rate**2 * (1 - np.exp(-x) * (1 + x)),
+    }
+
+
+def sweep_table():
+    omega = np.geomspace(1e-2, 1e2, 30)
+    x = omega * RELAXATION_TIME
+    return {
+        "omega_rad_s": omega,
+        "Gp_Pa": MODULUS * x**2 / (1 + x**2),
+        "Gpp_Pa": MODULUS * x / (1 + x**2),
+    }
+
+
+def csv(table):
+    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
+    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    def write(*runs, sweep=True, **files):
+        names = [f"r{i}.csv" for i in range(len(runs))]
+        (tmp_path / "runs.csv").write_text("\n".join(["file", *names]))
+        for name, run in zip(names, runs, strict=True):
+            (tmp_path / name).write_text(csv(run))
+        if sweep:
+            (tmp_path / "lve.csv").write_text(csv(sweep_table() if sweep is True else sweep))
+        for name, text in files.items():
+            (tmp_path / name.replace("__", ".")).write_text(text)
+        return tmp_path
+
+    return write
+
+
+def subjects(findings, severity="warning"):
+    return {finding.subject for finding in findings if finding.severity == severity}
+
+
+def with_column(run, **columns):
+    return {**run, **columns}
+
+
+def test_nothing_is_said_of_a_maxwell_fluid_with_its_own_sweep(folder):
+    assert check_folder(folder(start_up(0.05), start_up(0.5), start_up(2.0))) == ()
+
+
+def test_nothing_is_said_of_it_with_one_per_cent_noise_either(folder):
+    generator = np.random.default_rng(3)
+    runs = []
+    for rate in (0.05, 0.5, 2.0):
+        table = start_up(rate)
+        for name in ("stress_Pa", "N1_Pa"):
+            table[name] = table[name] * (1 + 0.01 * generator.standard_normal(len(TIMES)))
+        runs.append(table)
+    assert check_folder(folder(*runs)) == ()
+
+
+def spiked():
+    table = start_up()
+    table["stress_Pa"][60] *= 1.5
+    return table
+
+
+def floored():
+    table = start_up(0.01)
+    generator = np.random.default_rng(0)
+    table["stress_Pa"] = table["stress_Pa"] + 0.5 * generator.standard_normal(len(TIMES))
+    return table
+
+
+DOUBTS = {
+    "outliers": (spiked(), "one sample (time 0.192"),
+    "sampling": (start_up(time=np.linspace(0.0, 60.0, 20)), "samples before the stress reaches"),
+    "duration": (start_up(time=TIMES / 20), "mean relaxation time is 2 s"),
+    "time": (start_up(time=TIMES[1:] + 30.0), "subtract its reading"),
+    "rate": (start_up(0.0), "zero throughout"),
+    "linear": (
+        with_column(start_up(), stress_Pa=2 * start_up()["stress_Pa"]),
+        "is 2 times what lve.csv",
+    ),
+    "Cox-Merz": (
+        with_column(start_up(0.05), stress_Pa=0.5 * start_up(0.05)["stress_Pa"]),
+        "0.5 times the complex viscosity",
+    ),
+    "strain": (with_column(start_up(), strain=100 * TIMES), "per cent?"),
+    "samples": (start_up(time=TIMES[::20]), "only 7 samples"),
+    "N1": (
+        with_column(start_up(0.05), N1_Pa=start_up(0.05)["N1_Pa"] - 5.0),
+        "negative or above 2 times",
+    ),
+    "stress": (floored(), "transducer's floor"),
+    "columns": (
+        {("n1_pa" if k == "N1_Pa" else k): v for k, v in start_up().items()},
+        "rename it to N1_Pa",
+    ),
+}
+
+
+@pytest.mark.parametrize("subject", DOUBTS)
+def test_each_doubt_is_raised_by_the_fault_it_is_for(folder, subject):
+    bad, words = DOUBTS[subject]
+    findings = check_folder(folder(bad, start_up(0.5)))
+    assert subjects(findings, "error") == set()
+    mine = [f for f in findings if f.subject == subject and f.severity == "warning"]
+    assert any(words in f.text for f in mine), findings
+    # the sound run beside it is left alone
+    assert {f.file for f in mine} <= {"r0.csv", ""}
+
+
+def test_a_constant_stress_is_doubted(folder):
+    bad = with_column(start_up(), stress_Pa=np.full(len(TIMES), 3.0))
+    assert any("the same in every sample" in f.text for f in check_folder(folder(bad)))
+
+
+def test_a_large_normal_force_on_a_slow_run_is_held_against_second_order(folder):
+    bad = with_column(start_up(0.05), N1_Pa=np.full(len(TIMES), 50.0))
+    findings = check_folder(folder(bad))
+    # 2 G λ² γ̇² = 2 · 100 · 4 · 0.0025 = 2 Pa
+    assert any("between 0 and 2 Pa" in f.text for f in findings)
+
+
+def test_runs_that_are_all_linear_teach_nothing(folder):
+    assert any("every run is linear" in f.text for f in check_folder(folder(start_up(0.01))))
+
+
+def test_a_sweep_that_contradicts_itself_is_doubted(folder):
+    sweep = sweep_table()
+    sweep["Gp_Pa"] = sweep["Gp_Pa"] * sweep["omega_rad_s"]
+    findings = check_folder(folder(start_up(), sweep=sweep))
+    assert any("contradict each other" in f.text for f in findings)
+
+
+def test_a_missing_sweep_a_copy_and_a_file_left_over_are_told(folder):
+    findings = check_folder(folder(start_up(), start_up(), sweep=False, steady__csv="a,b\n1,2\n"))
+    assert {"sweep", "runs"} <= subjects(findings)
+    assert any("same samples as r0.csv" in f.text for f in findings)
+    assert any("steady.csv is not named" in f.text for f in findings)
+
+
+def test_the_clock_column_is_told_when_it_is_not_used(folder):
+    root = folder(start_up(), runs__csv="file,time_factor\nr0.csv,3\n")
+    assert "clock" in subjects(check_folder(root), "note")
+    assert "clock" not in subjects(check_folder(root, "time_factor"), "note")
+    assert "clock" in subjects(check_folder(root, "other"), "error")
+
+
+def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
+    for samples, doubted in ((30, True), (300, False)):
+        t = np.linspace(0, 20, samples)
+        table = {"time_s": t, "shear_rate_1_s": np.cos(2 * t), "stress_Pa": np.cos(2 * t - 0.5)}
+        assert ("sampling" in subjects(check_folder(folder(table)))) is doubted
+
+
+def test_a_folder_without_flow_is_an_error(folder):
+    assert "rate" in subjects(check_folder(folder(start_up(0.0))), "error")
+
+
+def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
+    def check(root, *options):
+        return CliRunner().invoke(app, ["data", "check", str(root), *options])
+
+    doubtful = check(folder(spiked()))
+    assert doubtful.exit_code == 0
+    assert "warning: " in doubtful.stdout
+    report = json.loads(check(folder(spiked()), "--json").stdout)
+    assert report["errors"] == []
+    assert report["warnings"][0]["subject"] == "outliers"
+    wrong = check(folder(with_column(start_up(), stress_Pa=-start_up()["stress_Pa"])))
+    assert wrong.exit_code == 2
+    assert "opposite to the shear rate" in wrong.stderr
+
+
+def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measured_data):
+    findings = check_folder(measured_data / "pi95k-startup", "time_factor")
+    assert subjects(findings, "error") == set()
+    normal = {f.file for f in findings if f.subject == "N1"}
+    assert {"pi_Tm10_rate0p01.csv", "pi_Tm10_rate0p03.csv"} <= normal
+    assert "pi_Tm10_rate0p1.csv" not in normal

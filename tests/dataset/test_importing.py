@@ -1,0 +1,326 @@
+"""Text exports of rheometers become data folders, number for number."""
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import load_dataset
+from discover.dataset.importing.text_export import read_blocks
+
+# the mangled numbers are written with 17 digits; unit factors cost a rounding or two
+EXACT = 1e-12
+
+TIMES = np.geomspace(0.01, 30.0, 40)
+RATE = 0.7
+STRESS = 120.0 * (1 - np.exp(-TIMES)) + 3.0 * TIMES * np.exp(-TIMES)
+NORMAL = 50.0 * (1 - np.exp(-TIMES) * (1 + TIMES))
+OMEGA = np.geomspace(0.1, 100.0, 12)
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["data", "import", *(str(a) for a in arguments)])
+
+
+def trios(path, comma=False):
+    rows = [
+        "Filename\tC:\\data\\melt 1.tri", "Instrument serial number\t5343-0123",
+        "Geometry name\t25 mm cone, 2°", "", "[step]", "Conditioning - 1",
+        "Step time\tTemperature", "s\t°C", "0.0\t25.0", "1.0\t25.1", "",
+        "[step]", "Peak hold - 2",
+        "Step time\tTime\tShear rate\tStress\tN1\tStatus", "min\ts\t1/min\tkPa\tPa\t",
+    ]  # fmt: skip
+    for t, s, n in zip(TIMES, STRESS, NORMAL, strict=True):
+        rows.append(f"{t / 60!r}\t{t + 99!r}\t{RATE * 60!r}\t{s / 1000!r}\t{n!r}\tok")
+    text = "\r\n".join(row.replace("np.float64(", "").replace(")", "") for row in rows)
+    if comma:
+        head, body = text.split("Peak hold", 1)
+        text = head.replace("0.0\t25.0", "0,0\t25,0").replace("1.0\t25.1", "1,0\t25,1")
+        text += "Peak hold" + body.replace(".", ",")
+    path.write_bytes(text.encode("cp1252"))
+
+
+def rheocompass(path):
+    rows = [
+        "Project:\tmelt", "Test:\tstart-up", "Result:\tstart-up 1",
+        f"Interval and data points:\t1\t{len(TIMES)}",
+        "Interval data:\tPoint No.\tTime\tInterval Time\tShear Rate\tShear Strain\tShear Stress"
+        "\tStatus",
+        "\t\t\t\t\t\t\t", "\t\t[s]\t[ms]\t[1/s]\t[%]\t[mPa]\t",
+    ]  # fmt: skip
+    for i, (t, s) in enumerate(zip(TIMES.tolist(), STRESS.tolist(), strict=True), start=1):
+        strain = RATE * t
+        rows.append(
+            f"\t{i}\t{t + 5!r}\t{t * 1e3!r}\t{RATE!r}\t{strain * 100!r}\t{s * 1e3!r}\t"
+            "WMa,TruStrain™"
+        )
+        if i == 7:  # an invalid point, as the instrument writes it
+            rows.append(f"\t{i}\t\t\t{RATE!r}\t\t\tinvalid")
+    path.write_bytes("\r\n".join(rows).encode("utf-16"))
+
+
+def german(path):
+    rows = ["Zeit [s];Schergeschwindigkeit [1/s];Schubspannung [Pa]"]
+    for t, s in zip(TIMES.tolist(), STRESS.tolist(), strict=True):
+        rows.append(f"{t!r};{RATE!r};{s!r}".replace(".", ","))
+    path.write_bytes(("\ufeff" + "\n".join(rows)).encode())
+
+
+def assert_equals_original(run, normal=False, strain=False):
+    np.testing.assert_allclose(run.time, TIMES, rtol=EXACT)
+    np.testing.assert_allclose(run.shear_rate, RATE, rtol=EXACT)
+    np.testing.assert_allclose(run.shear_stress, STRESS, rtol=EXACT)
+    if normal:
+        np.testing.assert_allclose(run.first_normal_stress_difference, NORMAL, rtol=EXACT)
+    if strain:
+        np.testing.assert_allclose(run.strain, RATE * TIMES, rtol=EXACT)
+
+
+@pytest.mark.parametrize("comma", [False, True])
+def test_a_trios_export_is_read_number_for_number(tmp_path, comma):
+    trios(tmp_path / "melt.txt", comma)
+    result = invoke(tmp_path / "melt.txt", "--out", tmp_path / "data")
+    assert result.exit_code == 0, result.output
+    assert "block 1 Conditioning - 1: not a run" in result.stdout
+    run = load_dataset(tmp_path / "data")["melt-2.csv"]
+    assert_equals_original(run, normal=True)
+    assert run.metadata["source_block"] == "Peak hold - 2"
+
+
+def test_a_rheocompass_export_is_read_and_its_invalid_point_left_out_with_a_word(tmp_path):
+    rheocompass(tmp_path / "melt.csv")
+    result = invoke(tmp_path / "melt.csv", "--out", tmp_path / "data")
+    assert result.exit_code == 0, result.output
+    assert "1 without all these numbers left out" in result.stdout
+    assert_equals_original(load_dataset(tmp_path / "data")["melt.csv"], strain=True)
+
+
+def test_names_in_another_language_are_given_by_hand(tmp_path):
+    german(tmp_path / "a.csv")
+    refused = invoke(tmp_path / "a.csv", "--out", tmp_path / "data")
+    assert refused.exit_code == 2
+    assert "Schubspannung" in refused.stderr
+    assert "--column" in refused.stderr
+    assert not (tmp_path / "data").exists()
+    names = ("time=Zeit", "shear_rate=Schergeschwindigkeit", "stress=Schubspannung")
+    options = [part for name in names for part in ("--column", name)]
+    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data", *options)
+    assert result.exit_code == 0, result.output
+    assert_equals_original(load_dataset(tmp_path / "data")["a.csv"])
+
+
+def test_an_import_is_repeated_from_its_mapping_file_alone(tmp_path):
+    german(tmp_path / "a.csv")
+    (tmp_path / "map.toml").write_text(
+        '[columns]\ntime = "Zeit"\nshear_rate = "Schergeschwindigkeit"\nstress = "Schubspannung"\n'
+    )
+    first, second = tmp_path / "deep" / "one", tmp_path / "two"
+    made = invoke(tmp_path / "a.csv", "--mapping", tmp_path / "map.toml", "--out", first)
+    assert made.exit_code == 0, made.output
+    again = invoke("--mapping", first / "import.toml", "--out", second)
+    assert again.exit_code == 0, again.output
+    assert (second / "a.csv").read_bytes() == (first / "a.csv").read_bytes()
+    assert (second / "runs.csv").read_bytes() == (first / "runs.csv").read_bytes()
+    assert str(tmp_path) not in (first / "import.toml").read_text()  # a folder may be given away
+    with (tmp_path / "a.csv").open("a") as stream:
+        stream.write("\n31,0;0,7;120,0")
+    changed = invoke("--mapping", first / "import.toml", "--out", second, "--overwrite")
+    assert "a.csv has changed" in changed.stdout
+    assert invoke("--mapping", first / "import.toml", "--out", second).exit_code == 2
+
+
+def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
+    for name, unit, factor in (("a", "kPa", 1e-3), ("b", "Pa", 1.0)):
+        rows = [f"Time [s],Shear rate [1/s],{'Stress' if name == 'a' else 'Shear stress'} [{unit}]"]
+        rows += [
+            f"{t!r},{RATE!r},{s * factor!r}"
+            for t, s in zip(TIMES.tolist(), STRESS.tolist(), strict=True)
+        ]
+        (tmp_path / f"{name}.csv").write_text("\n".join(rows))
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert invoke(tmp_path / "a.csv", tmp_path / "b.csv", "--out", one).exit_code == 0
+    assert invoke("--mapping", one / "import.toml", "--out", two).exit_code == 0
+    for folder in (one, two):
+        for run in load_dataset(folder):
+            assert_equals_original(run)
+
+
+@pytest.mark.parametrize("tool", ["cone_plate", "plate_plate"])
+def test_torque_and_speed_become_stress_and_rate_by_geometry(tmp_path, tool):
+    radius, angle, gap = 12.5e-3, math.radians(2.0), 0.8e-3
+    if tool == "cone_plate":
+        option, strain = "cone-plate:radius_mm=12.5,angle_deg=2", 1 / angle
+        stress = 3 / (2 * math.pi * radius**3)
+    else:
+        option, strain = "plate_plate:radius_mm=12.5,gap_mm=0.8", radius / gap
+        stress = 2 / (math.pi * radius**3)
+    rows = ["time (s),Torque (µN.m),Velocity (rpm),Normal force (N)"]
+    for t, s, n in zip(TIMES.tolist(), STRESS.tolist(), NORMAL.tolist(), strict=True):
+        speed = RATE / strain * 60 / (2 * math.pi)
+        force = n * math.pi * radius**2 / 2
+        rows.append(f"{t!r},{s / stress * 1e6!r},{speed!r},{force!r}")
+    (tmp_path / "a.csv").write_text("\n".join(rows), encoding="utf-8")
+    assert invoke(tmp_path / "a.csv", "--out", tmp_path / "x").exit_code == 2
+    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data", "--geometry", option)
+    assert result.exit_code == 0, result.output
+    run = load_dataset(tmp_path / "data")["a.csv"]
+    cone = tool == "cone_plate"
+    assert_equals_original(run, normal=cone)
+    assert (run.first_normal_stress_difference is not None) is cone
+
+
+def test_a_sweep_is_imported_beside_the_runs(tmp_path):
+    trios(tmp_path / "melt.txt")
+    rows = ["Angular frequency\tStorage modulus\tLoss modulus", "rad/s\tMPa\tkPa"]
+    storage, loss = OMEGA**2 / (1 + OMEGA**2), OMEGA / (1 + OMEGA**2)
+    rows += [
+        f"{w!r}\t{a * 1e-6!r}\t{b * 1e-3!r}"
+        for w, a, b in zip(OMEGA.tolist(), storage.tolist(), loss.tolist(), strict=True)
+    ]
+    (tmp_path / "sweep.txt").write_text("\n".join(rows))
+    out = tmp_path / "data"
+    arguments = (tmp_path / "melt.txt", "--lve", tmp_path / "sweep.txt", "--out", out)
+    assert invoke(*arguments).exit_code == 0
+    sweep = load_dataset(out).linear_sweep
+    assert sweep is not None
+    np.testing.assert_allclose(sweep.storage_modulus, storage, rtol=EXACT)
+    np.testing.assert_allclose(sweep.loss_modulus, loss, rtol=EXACT)
+
+
+def test_the_clock_may_have_started_before_the_flow(tmp_path):
+    trios(tmp_path / "melt.txt")
+    options = ("--column", "time=Time", "--start-time", 99, "--out", tmp_path / "data")
+    assert invoke(tmp_path / "melt.txt", *options).exit_code == 0
+    run = load_dataset(tmp_path / "data")["melt-2.csv"]
+    np.testing.assert_allclose(run.time, TIMES, atol=1e-13 * 99, rtol=0)
+
+
+BAD = {
+    "unknown quantity": (["--column", "viscosity=x"], "viscosity"),
+    "no equals sign": (["--column", "stress"], "name=value"),
+    "column that is not there": (["--column", "N2=Second"], "'Second'"),
+    "unit of something else": (["--unit", "stress=s"], "no unit of stress"),
+    "unknown unit": (["--unit", "stress=blorp"], "not known"),
+    "no code in units": (["--unit", "stress=__import__('os')"], "not known"),
+    "half a geometry": (["--geometry", "cone_plate:radius_mm=25"], "needs angle_deg"),
+    "no such tool": (["--geometry", "couette:radius_mm=25"], "geometry"),
+    "wrong delimiter": (["--delimiter", "pipe"], "layout.delimiter"),
+    "no such block": (["--block", "9"], "has 2 blocks"),
+    "no such encoding": (["--encoding", "klingon"], "klingon"),
+    "header far away": (["--header-row", "5000"], "--header-row"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_wrong_options_are_one_line_and_write_nothing(tmp_path, case):
+    options, words = BAD[case]
+    trios(tmp_path / "melt.txt")
+    result = invoke(tmp_path / "melt.txt", "--out", tmp_path / "data", *options)
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert result.stderr.strip().count("\n") == 0
+    assert not (tmp_path / "data" / "runs.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x00\x01\x02", b"PK\x03\x04", b"a;b\n", b"\xff\xfe", b'"', b"1,2\n3,4\n"]
+)
+def test_files_that_are_no_exports_are_refused(tmp_path, content):
+    (tmp_path / "a.txt").write_bytes(content)
+    result = invoke(tmp_path / "a.txt", "--out", tmp_path / "data")
+    assert result.exit_code == 2, result.output
+    assert "a.txt" in result.stderr
+
+
+def test_a_comma_that_may_be_decimal_or_thousands_is_asked_for(tmp_path):
+    (tmp_path / "a.txt").write_text("time\tstress\ts\n1,234\t5,678\n2,345\t6,789\n")
+    result = invoke(tmp_path / "a.txt", "--out", tmp_path / "data")
+    assert result.exit_code == 2
+    assert "--decimal" in result.stderr
+    (block,) = read_blocks(tmp_path / "a.txt", decimal=",")
+    assert block.cells[0][:2] == ("1.234", "5.678")
+
+
+@pytest.mark.parametrize("writer", [trios, rheocompass, german])
+def test_a_hundred_damaged_exports_are_imported_or_explained(tmp_path, writer):
+    from pathlib import Path
+
+    from discover.dataset.importing import Mapping, import_files
+    from discover.errors import InputError
+
+    file = tmp_path / "melt.txt"
+    writer(file)
+    whole = file.read_bytes()
+    source = np.random.default_rng(7)
+    tokens = (
+        b"\0",
+        b"nan",
+        b"1e999",
+        b"\xff",
+        b"\n",
+        b"\t\t\t",
+        b";",
+        b"[step]",
+        b'"',
+        b"[",
+        b"--",
+    )
+    outcomes = []
+    for _ in range(100):
+        content = bytearray(whole)
+        for _ in range(source.integers(1, 4)):
+            at = int(source.integers(len(content) + 1))
+            if source.random() < 0.5:
+                del content[at : at + int(source.integers(1, 200))]
+            else:
+                content[at:at] = tokens[source.integers(len(tokens))]
+        file.write_bytes(bytes(content))
+        message = None
+        try:
+            outcomes.append(len(import_files([Path(file)], Mapping()).files))
+        except InputError as error:
+            message = str(error)
+        if message is not None:
+            assert len(message) < 1000
+            assert "melt.txt" in message or "block" in message
+            outcomes.append(0)
+    # German names need --column, so only the other two can succeed at all
+    assert (max(outcomes) > 0) is (writer is not german)
+
+
+def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data, tmp_path):
+    original = load_dataset(measured_data / "pi95k-startup")
+    files = []
+    for run in original.runs[:4]:
+        rows = ["[step]", "Peak hold", "Step time\tShear rate\tStress\tN1", "min\t1/h\tkPa\tMPa"]
+        columns = (
+            run.time / 60,
+            run.shear_rate * 3600,
+            run.shear_stress / 1e3,
+            run.first_normal_stress_difference / 1e6,
+        )
+        rows += ["\t".join(map(repr, row)) for row in np.stack(columns, 1).tolist()]
+        files.append(tmp_path / run.name.replace(".csv", ".txt"))
+        files[-1].write_text("\n".join(rows).replace(".", ","), "utf-16")
+    assert original.linear_sweep is not None
+    sweep = original.linear_sweep
+    rows = ["Frequency\tStorage modulus\tLoss modulus", "Hz\tkPa\tkPa"]
+    columns = (sweep.angular_frequency / (2 * np.pi), sweep.storage_modulus / 1e3)
+    table = np.stack([*columns, sweep.loss_modulus / 1e3], 1)
+    rows += ["\t".join(map(repr, row)) for row in table.tolist()]
+    (tmp_path / "sweep.txt").write_text("\n".join(rows))
+    out = tmp_path / "data"
+    result = invoke(*files, "--lve", tmp_path / "sweep.txt", "--out", out)
+    assert result.exit_code == 0, result.output
+    again = load_dataset(out)
+    for run in original.runs[:4]:
+        for name in ("time", "shear_rate", "shear_stress", "first_normal_stress_difference"):
+            wanted = getattr(run, name)
+            np.testing.assert_allclose(getattr(again[run.name], name), wanted, rtol=EXACT)
+    assert again.linear_sweep is not None
+    for name in ("angular_frequency", "storage_modulus", "loss_modulus"):
+        np.testing.assert_allclose(
+            getattr(again.linear_sweep, name), getattr(sweep, name), rtol=EXACT
+        )
