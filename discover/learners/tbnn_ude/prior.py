@@ -96,7 +96,10 @@ def prior_residual(
 
 
 def reweighted(
-    law: TensorBasisNetwork, cloud: Cloud, strength: float, variation_share: float = 1.0
+    law: TensorBasisNetwork,
+    cloud: Cloud,
+    strength: float | Float[Array, ""],
+    variation_share: float = 1.0,
 ) -> PriorWeights:
     """Return the weights of the next round, from the root mean squares of this one.
 
