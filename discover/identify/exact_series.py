@@ -6,6 +6,10 @@ polynomials in those of γ̇(t) and of the law. Two laws with the same σ12(t) i
 therefore have the same coefficients for random histories, order by order, without any rounding;
 and two that differ show it at a low order   [Fliess 1981, Bull. SMF 109, 3: the same for the
 generating series of a control system].
+
+Coefficients are fractions where their values matter, and residues modulo a large prime where only
+agreement does: whole numbers of one machine word, many times faster, and a false agreement has a
+chance of about 1e-17.
 """
 
 import random
@@ -13,7 +17,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from discover.identify.exact_terms import exact_terms
+from typing import Any
+
+import numpy as np
+
+from discover.identify.exact_terms import PRIME, exact_terms, residue
 from tensor_library.terms import parse_term
 
 DEFAULT_ORDER = 9
@@ -22,22 +30,25 @@ _HISTORIES = 2
 
 @dataclass(frozen=True)
 class _Series:
-    """A power series in time up to an order that products keep."""
+    """A power series in time up to an order that products keep; over residues if `modular`."""
 
-    values: tuple[Fraction, ...]
+    values: tuple[Any, ...]
+    modular: bool = False
 
     def __add__(self, other: "_Series") -> "_Series":
-        return _Series(tuple(a + b for a, b in zip(self.values, other.values, strict=True)))
+        total = tuple(a + b for a, b in zip(self.values, other.values, strict=True))
+        return _Series(total, self.modular)
 
     def __mul__(self, other: "_Series") -> "_Series":
         n = len(self.values)
-        product = [Fraction(0)] * n
+        product: list[Any] = [0] * n
         for i, a in enumerate(self.values):
             if a:
                 for j in range(n - i):
-                    if other.values[j]:
-                        product[i + j] += a * other.values[j]
-        return _Series(tuple(product))
+                    product[i + j] += a * other.values[j]
+        if self.modular:
+            product = [value % PRIME for value in product]
+        return _Series(tuple(product), self.modular)
 
 
 def stress_series(
@@ -45,7 +56,8 @@ def stress_series(
     rate: Sequence[Fraction | int],
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
-) -> list[tuple[Fraction, Fraction, Fraction, Fraction]]:
+    modular: bool = False,
+) -> list[tuple[Any, Any, Any, Any]]:
     """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
 
     Parameters
@@ -59,22 +71,24 @@ def stress_series(
         Last order.
     linear_relaxation
         Whether −σ is part of the law.
+    modular
+        Whether to return residues modulo `PRIME` and not fractions.
     """
+    number = residue if modular else Fraction
     terms = [parse_term(name) for name in coefficients]
-    values = [Fraction(value) for value in coefficients.values()]
-    shear_rate = [Fraction(r) for r in rate][:order] + [Fraction(0)] * max(0, order - len(rate))
-    stress = [[Fraction(0)] * 4]
+    values = [number(value) for value in coefficients.values()]
+    shear_rate = [number(r) for r in rate][:order] + [number(0)] * max(0, order - len(rate))
+    stress: list[list[Any]] = [[number(0)] * 4]
     for k in range(order):
         length = k + 1
-        zero = _Series((Fraction(0),) * length)
-        one = _Series((Fraction(1), *zero.values[1:]))
-        s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress)) for i in range(4))
-        g = _Series(tuple(shear_rate[:length]))
-        convected = g * s12
+        zero = _Series((number(0),) * length, modular)
+        one = _Series((number(1), *zero.values[1:]), modular)
+        s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
+        g = _Series(tuple(shear_rate[:length]), modular)
         slope = [
-            2 * convected.values[k],
-            Fraction(0),
-            Fraction(0),
+            2 * (g * s12).values[k],
+            number(0),
+            number(0),
             shear_rate[k] + (g * s22).values[k],
         ]
         if linear_relaxation:
@@ -82,7 +96,9 @@ def stress_series(
         evaluated = exact_terms(terms, (s11, s22, s33, s12), g, one, zero)
         for c, components in zip(values, evaluated, strict=True):
             slope = [v - c * part.values[k] for v, part in zip(slope, components, strict=True)]
-        stress.append([value / (k + 1) for value in slope])
+        inverse = number(Fraction(1, k + 1))
+        after = [value * inverse for value in slope]
+        stress.append([value % PRIME for value in after] if modular else after)
     return [(s[0], s[1], s[2], s[3]) for s in stress]
 
 
@@ -123,13 +139,13 @@ def compare_series(
     parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
     for _ in range(_HISTORIES):
         rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
-        a = stress_series(first, rate, order, linear_relaxation)
-        b = stress_series(second, rate, order, linear_relaxation)
+        a = stress_series(first, rate, order, linear_relaxation, modular=True)
+        b = stress_series(second, rate, order, linear_relaxation, modular=True)
         for k, (s, t) in enumerate(zip(a, b, strict=True)):
             for name, same in (
                 ("sigma12", s[3] == t[3]),
-                ("N1", s[0] - s[1] == t[0] - t[1]),
-                ("N2", s[1] - s[2] == t[1] - t[2]),
+                ("N1", (s[0] - s[1] - t[0] + t[1]) % PRIME == 0),
+                ("N2", (s[1] - s[2] - t[1] + t[2]) % PRIME == 0),
             ):
                 known = parts[name]
                 if not same and (known is None or k < known):
@@ -140,30 +156,95 @@ def compare_series(
 def solve_for_coefficient(
     target: Mapping[str, Fraction | int],
     term: str,
+    kept: Mapping[str, Fraction | int] | None = None,
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
-) -> Fraction | None:
-    """Return the c for which UCM + c·term has the σ12 of a law in every history, or None.
+) -> list[tuple[float, bool]]:
+    """Return every c for which a law with c·term has the σ12 of another in every history.
 
-    The first order at which c enters the series of σ12 is linear in it and gives the candidate; all
-    later orders then have to agree.
+    At the first order at which c enters the series of σ12 it does so as a polynomial of low degree,
+    whose real roots are the candidates. A rational root is exact, and then all later orders have to
+    agree exactly; of the others only a simulation can tell.
+
+    Parameters
+    ----------
+    target
+        The law to reproduce.
+    term
+        The term sought.
+    kept
+        Other terms of the law sought, with their coefficients.
+    order, linear_relaxation
+        As in `stress_series`.
+
+    Returns
+    -------
+    Candidates with whether they are proved.
     """
     generator = random.Random(3)
     rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
+    rest = dict(kept or {})
 
     def shear(coefficients: Mapping[str, Fraction | int]) -> list[Fraction]:
         return [s[3] for s in stress_series(coefficients, rate, order, linear_relaxation)]
 
-    wanted, without, unit = shear(target), shear({}), shear({term: 1})
-    for want, zero, one in zip(wanted, without, unit, strict=True):
-        if one == zero:
-            if want != zero:
-                return None
+    wanted = shear(target)
+    # residues are enough to see at which order the term enters, and whether it enters too late
+    trial = [
+        [s[3] for s in stress_series(law, rate, order, linear_relaxation, modular=True)]
+        for law in (rest, {**rest, term: 1}, {**rest, term: 2})
+    ]
+    for k in range(order + 1):
+        if trial[0][k] == trial[1][k] == trial[2][k]:
+            if trial[0][k] != residue(wanted[k]):
+                return []
             continue
-        candidate = (want - zero) / (one - zero)
-        agreement = compare_series(target, {term: candidate}, order, linear_relaxation)
-        return candidate if agreement.sigma12 is None else None
-    return None
+        samples = [
+            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - wanted[k]
+            for value in range(_DEGREE + 1)
+        ]
+        candidates = []
+        for root in _real_roots(samples):
+            fraction = Fraction(root).limit_denominator(10**6)
+            law = {**rest, term: fraction}
+            near = abs(float(fraction) - root) <= 1e-9 * max(1.0, abs(root))
+            if near and compare_series(target, law, order, linear_relaxation).sigma12 is None:
+                candidates.append((float(fraction), True))
+            else:
+                candidates.append((root, False))
+        return candidates
+    return []
+
+
+_DEGREE = 3
+"""Degree in its coefficient with which a term first enters σ12, at most."""
+
+
+def shear_at(
+    order: int,
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool,
+) -> Fraction:
+    """Return one Taylor coefficient of σ12."""
+    return stress_series(coefficients, rate, order, linear_relaxation)[order][3]
+
+
+def _real_roots(samples: Sequence[Fraction]) -> list[float]:
+    """Return the real roots of the polynomial with these values at 0, 1, 2, ..."""
+    n = len(samples)
+    rows = [[Fraction(x) ** power for power in range(n)] for x in range(n)]
+    polynomial = _solve_exactly(rows, samples)
+    assert polynomial is not None  # a Vandermonde matrix is regular
+    while polynomial and polynomial[-1] == 0:
+        polynomial.pop()
+    if len(polynomial) < 2:
+        return []
+    if len(polynomial) == 2:
+        return [float(-polynomial[0] / polynomial[1])]
+    roots = np.roots([float(value) for value in reversed(polynomial)])
+    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
+    return sorted(real, key=abs)
 
 
 def hidden_change(

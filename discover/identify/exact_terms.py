@@ -7,11 +7,22 @@ points of a large set is zero, but for a probability of degree over size of the 
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.invariants import INVARIANT_NAMES
 from tensor_library.terms import CandidateTerm
+
+PRIME = 2**61 - 1
+"""Modulus of exact arithmetic in residues: a Mersenne prime of one machine word."""
+
+
+def residue(value: Fraction | int) -> int:
+    """Return a fraction modulo the prime."""
+    exact = Fraction(value)
+    return exact.numerator * pow(exact.denominator, -1, PRIME) % PRIME
+
 
 Components = tuple[Any, Any, Any, Any]
 """11, 22, 33, 12 of a symmetric tensor in simple shear, over any commutative ring."""

@@ -78,9 +78,8 @@ def hidden_stresses(
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids.times))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)
-    rows = rows if rows.size else np.zeros((3, 3))
-    _, values, right = np.linalg.svd(rows, full_matrices=True)
-    values = np.concatenate([values, np.zeros(3 - values.size)])
+    triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))
+    _, values, right = np.linalg.svd(triangular)
     unfelt = _readable(right[values <= _ZERO * max(values[0], 1e-300)])
     felt = {
         name: bool(np.all(np.abs(unfelt @ difference) < 1e-8))

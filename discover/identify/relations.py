@@ -8,12 +8,11 @@ from functools import lru_cache
 from math import gcd, lcm
 from typing import Any, Literal
 
-from discover.identify.exact_terms import exact_terms
+from discover.identify.exact_terms import PRIME, exact_terms
 from tensor_library.library import TermLibrary
 
 _LARGEST_INTEGER = 10**6
 _FRESH_STATES = 5
-_PRIME = 2**61 - 1
 _COMPONENTS_SEEN = {"nothing": (0, 1, 2, 3), "33": (0, 1, 3)}
 
 Reach = Literal["nothing", "33"]
@@ -123,20 +122,20 @@ def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], li
     echelon: list[list[int]] = []
     pivots: list[int] = []
     for given in rows:
-        row = [value % _PRIME for value in given]
+        row = [value % PRIME for value in given]
         for pivot, old in zip(pivots, echelon, strict=True):
             if row[pivot]:
                 factor = row[pivot]
-                row = [(a - factor * b) % _PRIME for a, b in zip(row, old, strict=True)]
+                row = [(a - factor * b) % PRIME for a, b in zip(row, old, strict=True)]
         lead = next((i for i, value in enumerate(row) if value), None)
         if lead is None:
             continue
-        inverse = pow(row[lead], -1, _PRIME)
-        row = [value * inverse % _PRIME for value in row]
+        inverse = pow(row[lead], -1, PRIME)
+        row = [value * inverse % PRIME for value in row]
         for k, old in enumerate(echelon):
             if old[lead]:
                 factor = old[lead]
-                echelon[k] = [(a - factor * b) % _PRIME for a, b in zip(old, row, strict=True)]
+                echelon[k] = [(a - factor * b) % PRIME for a, b in zip(old, row, strict=True)]
         echelon.append(row)
         pivots.append(lead)
         if len(pivots) == n:
@@ -153,7 +152,7 @@ def _null_space(rows: Sequence[Sequence[int]], n: int) -> list[list[int]]:
         residues = [0] * n
         residues[free] = 1
         for pivot, row in zip(pivots, echelon, strict=True):
-            residues[pivot] = -row[free] % _PRIME
+            residues[pivot] = -row[free] % PRIME
         fractions = [_rational(value) for value in reversed(residues)]
         if any(value is None for value in fractions):
             continue
@@ -171,7 +170,7 @@ def _null_space(rows: Sequence[Sequence[int]], n: int) -> list[list[int]]:
 def _rational(residue: int) -> Fraction | None:
     """Return the small fraction with this residue   [Wang 1981, SYMSAC, 212]."""
     limit = 2**29
-    old, new, old_t, new_t = _PRIME, residue, 0, 1
+    old, new, old_t, new_t = PRIME, residue, 0, 1
     while new > limit:
         quotient = old // new
         old, new = new, old - quotient * new

@@ -38,6 +38,7 @@ from tensor_library.terms import parse_term
 Proof = Literal["relation", "series", "histories"]
 
 _LARGEST_DENOMINATOR = 10**5
+_SHORT_DENOMINATOR = 100
 INVISIBLE_SIZE = 0.05
 """Amount of a combination on σ33 that is added to show what it does; any amount would do."""
 
@@ -60,7 +61,8 @@ class Twin:
     separated_by
         Experiments that would tell the two apart.
     order
-        Order to which the Taylor series agree exactly, where that was the proof.
+        Order to which the Taylor series agree exactly, where that was the proof. It is given at
+        coefficients rounded to short fractions: that the family of twins exists is exact.
     change
         The twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
     """
@@ -121,8 +123,8 @@ def find_twins(
 ) -> list[Twin]:
     """Return the twins of a law, simplest first, checked by simulation.
 
-    Searched are: the other single terms of the library (exact; for a polynomial law without known
-    extra terms), every exchange along a relation that vanishes in shear, every combination that
+    Searched are: every other term of the library in place of each term of the law (exact; for a
+    polynomial law on UCM), every exchange along a relation that vanishes in shear, every combination that
     lives on σ33 only (where nothing in the law feels σ33), and the candidates given.
 
     Parameters
@@ -174,25 +176,45 @@ def find_twins(
 
 
 def _key(law: LawTerms) -> tuple:
-    return tuple(sorted(name for name, value in law.coefficients.items() if value))
+    return tuple(sorted((n, round(v, 6)) for n, v in law.coefficients.items() if v))
 
 
 def _by_series(library: TermLibrary, law: LawTerms, linear_relaxation: bool, order: int):
-    coefficients = {
-        name: Fraction(value).limit_denominator(_LARGEST_DENOMINATOR)
-        for name, value in law.coefficients.items()
-        if value
-    }
-    if not coefficients or any(parse_term(name).closed_form for name in coefficients):
+    """Return twins with one term of the law exchanged for another.
+
+    The search runs at a neighbouring law with short fractions, where the arithmetic is fast and a
+    rational twin is recognised; what it finds is solved for again at the law itself.
+    """
+    present = {name: value for name, value in law.coefficients.items() if value}
+    if not present or any(parse_term(name).closed_form for name in present):
         return
-    for term in library.terms:
-        if term.closed_form or term.name in coefficients:
-            continue
-        value = solve_for_coefficient(coefficients, term.name, order, linear_relaxation)
-        if value:
-            twin = {term.name: value}
-            change = hidden_change(coefficients, twin, order, linear_relaxation)
-            yield LawTerms({term.name: float(value)}), "series", change
+    short = {n: _fraction(v, _SHORT_DENOMINATOR) for n, v in present.items()}
+    exact = {n: _fraction(v, _LARGEST_DENOMINATOR) for n, v in present.items()}
+    settings = {"order": order, "linear_relaxation": linear_relaxation}
+    for replaced in present:
+        rest = [name for name in present if name != replaced]
+        for term in library.terms:
+            if term.closed_form or term.name in present:
+                continue
+            near = {name: short[name] for name in rest}
+            at_short = solve_for_coefficient(short, term.name, near, **settings)
+            proved = [value for value, is_proved in at_short if is_proved and value]
+            if not any(value for value, _ in at_short):
+                continue
+            change = {}
+            if proved:
+                twin = {**near, term.name: Fraction(proved[0]).limit_denominator(10**6)}
+                change = hidden_change(short, twin, **settings)
+            here = {name: exact[name] for name in rest}
+            for value, _ in solve_for_coefficient(exact, term.name, here, **settings):
+                if value:
+                    found = LawTerms({**{n: present[n] for n in rest}, term.name: value})
+                    yield found, "series" if proved else "histories", change
+
+
+def _fraction(value: float, largest_denominator: int) -> Fraction:
+    """Return a short fraction near a value, but never zero for what is not."""
+    return Fraction(value).limit_denominator(largest_denominator) or Fraction(value)
 
 
 def _by_relations(library: TermLibrary, law: LawTerms):
