@@ -8,6 +8,7 @@ from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival, Statement
 from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
+from discover.identify.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,9 @@ class Comparison:
         What simpler laws learn from the true one, JSON-able rows.
     seed
         Seed of the learners.
+    structure
+        What the training flows can determine of the library, before any fit; None without the
+        sparse learner.
     """
 
     name: str
@@ -81,6 +85,12 @@ class Comparison:
     sweep: Sequence[SweepPoint] = ()
     distillations: Sequence[Mapping[str, Any]] = ()
     seed: int = 0
+    structure: Structure | None = None
+
+    @property
+    def physics(self) -> dict[str, Mapping[str, Any] | None]:
+        """Checks of physical soundness by learner."""
+        return {name: outcome.physics for name, outcome in self.outcomes.items()}
 
     def flows_of(self, kind: str) -> list[Flow]:
         """Return the flows of one kind."""
@@ -142,6 +152,8 @@ class Comparison:
                 {"quantity": s.quantity, "undetermined": s.undetermined, "text": s.text}
                 for s in self.statements
             ],
+            "structure": None if self.structure is None else self.structure.to_json(),
+            "physics": self.physics,
             "sweep": [
                 {"law": p.law, "parameter": p.parameter, "value": p.value, "errors": p.errors()}
                 for p in self.sweep

@@ -271,7 +271,9 @@ def hidden_change(
         solved = _solve_exactly([s[:3] for s in states], [image[row] for image in images])
         if solved is None:
             return {}
-        parts = [f"{value} {source}" for value, source in zip(solved, _NORMAL, strict=True) if value]
+        parts = [
+            f"{value} {source}" for value, source in zip(solved, _NORMAL, strict=True) if value
+        ]
         change[name] = " + ".join(parts) or "0"
     return change
 

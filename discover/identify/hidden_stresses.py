@@ -40,6 +40,13 @@ class HiddenStresses:
     unfelt: Float[np.ndarray, "k 3"]
     felt: dict[str, bool]
 
+    def leaves_no_trace(self, quantity: str) -> bool:
+        """Return whether one of the two stresses that make N1 or N2 never reaches σ12 at all."""
+        return any(
+            np.count_nonzero(np.abs(row) > 1e-8) == 1 and abs(row @ _DIFFERENCES[quantity]) > 1e-8
+            for row in self.unfelt
+        )
+
     @property
     def text(self) -> str:
         """One sentence for a reader."""

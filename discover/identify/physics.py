@@ -235,7 +235,9 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
     text = f"The steady shear stress rises with the rate throughout {where}."
     if last < rates.size:
         text += " Beyond, no steady state follows on."
-    return PhysicsCheck(name, True if last == rates.size else None, float(rates[last - 1]), where, text)
+    return PhysicsCheck(
+        name, True if last == rates.size else None, float(rates[last - 1]), where, text
+    )
 
 
 def _extension(fluid: Fluid) -> PhysicsCheck:
@@ -254,7 +256,9 @@ def _extension(fluid: Fluid) -> PhysicsCheck:
     low = EXTENSION_RATES[max(reached - 1, 0)]
     high = EXTENSION_RATES[reached]
     # from rest again, but finely across the last step
-    fine = np.concatenate([EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)])
+    fine = np.concatenate(
+        [EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)]
+    )
     fine = np.concatenate([fine, np.full(EXTENSION_RATES.size + _REFINED - fine.size, high)])
     limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
     return PhysicsCheck(

@@ -55,9 +55,7 @@ def trajectories(fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid)
     protocols, grids
         Batched flows.
     """
-    states, smallest, dissipation = (
-        np.asarray(part) for part in _along(fluid, protocols, grids)
-    )
+    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, protocols, grids))
     sampled = np.asarray(grids.sample_mask)[..., None]
     whole = np.all(np.isfinite(states), axis=(1, 2, 3))
     smallest = np.where(sampled, smallest, np.inf).min(axis=(1, 2))

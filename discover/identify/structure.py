@@ -61,9 +61,9 @@ class QuantityVerdict:
         ``"N1"`` or ``"N2"``.
     verdict
         ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
-        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but σ12
-        does not feel the quantity, which so follows from the form of the law; ``"determined"``
-        otherwise, within the library.
+        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
+        of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
+        form of the law; ``"determined"`` otherwise, within the library.
     text
         The verdict for a reader.
     """
@@ -71,6 +71,11 @@ class QuantityVerdict:
     quantity: str
     verdict: Verdict
     text: str
+
+    @property
+    def open(self) -> bool:
+        """Whether the observed stresses leave the quantity open."""
+        return self.verdict in ("undetermined", "assumed")
 
 
 @dataclass(frozen=True)
@@ -312,7 +317,7 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
     what = " and ".join("σ12" if q == "sigma12" else q for q in observed)
     examples = _changing(exact, quantity)
     unfelt = ""
-    if observed == ["sigma12"] and not hidden.felt[quantity]:
+    if observed == ["sigma12"] and hidden.leaves_no_trace(quantity):
         unfelt = (
             f" {hidden.text} So {quantity} follows from the convected derivative and the form of "
             "the law that were assumed, not from the data."
@@ -320,9 +325,9 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
     if examples:
         size = "" if examples[0].at_any_size else ", to first order"
         text = (
-            f"{quantity} is not determined by {what}: adding a little of h = "
-            f"{spell(examples[0].coefficients)} changes {quantity} and leaves {what} as it "
-            f"is{size}.{unfelt}"
+            f"{quantity} is not determined by {what}: {len(examples[0].coefficients)} terms more, "
+            f"h = {spell(examples[0].coefficients)} in any amount, change {quantity} and leave "
+            f"{what} as it is{size}.{unfelt}"
         )
         return QuantityVerdict(quantity, "undetermined", text)
     if unfelt:

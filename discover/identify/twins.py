@@ -262,7 +262,10 @@ def same_in_every_shear(
         Of the Taylor series.
     """
     exact = [
-        {n: Fraction(v).limit_denominator(_LARGEST_DENOMINATOR) for n, v in law.coefficients.items()}
+        {
+            n: Fraction(v).limit_denominator(_LARGEST_DENOMINATOR)
+            for n, v in law.coefficients.items()
+        }
         for law in (first, second)
     ]
     agreement = compare_series(exact[0], exact[1], order)
