@@ -10,7 +10,7 @@ from scipy.stats import chi2, norm
 Test = Literal["tie", "likelihood_ratio", "vuong"]
 
 LEVEL = 0.05
-"""Level of the tests: a law that is as good as the chosen one is ruled out in one case of twenty."""
+"""Level of the tests: a law as good as the chosen one is ruled out in one case of twenty."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Evidence:
     told_apart
         Whether the test rejects, at `LEVEL`, that the other law is as good.
     test
-        ``"tie"``: the predictions agree to integration error. ``"likelihood_ratio"``: one law is the
-        other with a coefficient zero. ``"vuong"``: neither holds the other.
+        ``"tie"``: the predictions agree to integration error. ``"likelihood_ratio"``: one law is
+        the other with a coefficient zero. ``"vuong"``: neither holds the other.
     p_value
         Probability of so large a disadvantage by chance; one for a tie.
     effective_samples
@@ -46,12 +46,12 @@ def compare_residuals(
     """Return whether the data tell another law from the chosen one.
 
     Vuong's test   [Vuong 1989, Econometrica 57, 307] asks whether the mean difference of squared
-    residuals d = r_other² − r_chosen² exceeds zero by more than chance. Its standard error counts the
-    correlation in time of d within each run (Newey & West 1987, Econometrica 55, 703, with the
+    residuals d = r_other² − r_chosen² exceeds zero by more than chance. Its standard error counts
+    the correlation in time of d within each run (Newey & West 1987, Econometrica 55, 703, with the
     bandwidth n^(1/3)), and runs as independent. Where the other law is the chosen one with some
-    coefficients zero, d has no normal limit; there n_eff ln(Σ r_other²/Σ r_chosen²) is compared with
-    χ² of as many degrees of freedom, n_eff being the number of samples over the correlation time of
-    the chosen law's residuals.
+    coefficients zero, d has no normal limit; there n_eff ln(Σ r_other²/Σ r_chosen²) is compared
+    with χ² of as many degrees of freedom, n_eff being the number of samples over the correlation
+    time of the chosen law's residuals.
 
     Parameters
     ----------
@@ -60,8 +60,8 @@ def compare_residuals(
     run_of_row
         Run of each residual.
     nested
-        Number of coefficients of the chosen law that the other lacks, if it is otherwise the same; 0
-        where neither holds the other.
+        Number of coefficients of the chosen law that the other lacks, if it is otherwise the same;
+        0 where neither holds the other.
     floor
         Norm of the difference of the two predictions that integration error may cause.
     """

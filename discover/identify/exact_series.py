@@ -16,7 +16,6 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-
 from typing import Any
 
 import numpy as np
@@ -203,15 +202,16 @@ def solve_for_coefficient(
             shear_at(k, {**rest, term: value}, rate, linear_relaxation) - wanted[k]
             for value in range(_DEGREE + 1)
         ]
+        polynomial = _interpolate(samples)
         candidates = []
-        for root in _real_roots(samples):
+        for root in _real_roots(polynomial):
             fraction = Fraction(root).limit_denominator(10**6)
-            law = {**rest, term: fraction}
-            near = abs(float(fraction) - root) <= 1e-9 * max(1.0, abs(root))
-            if near and compare_series(target, law, order, linear_relaxation).sigma12 is None:
-                candidates.append((float(fraction), True))
-            else:
+            if sum(a * fraction**power for power, a in enumerate(polynomial)) != 0:
                 candidates.append((root, False))
+                continue
+            law = {**rest, term: fraction}
+            if compare_series(target, law, order, linear_relaxation).sigma12 is None:
+                candidates.append((float(fraction), True))
         return candidates
     return []
 
@@ -230,14 +230,19 @@ def shear_at(
     return stress_series(coefficients, rate, order, linear_relaxation)[order][3]
 
 
-def _real_roots(samples: Sequence[Fraction]) -> list[float]:
-    """Return the real roots of the polynomial with these values at 0, 1, 2, ..."""
+def _interpolate(samples: Sequence[Fraction]) -> list[Fraction]:
+    """Return the polynomial with these values at 0, 1, 2, ..., constant first."""
     n = len(samples)
     rows = [[Fraction(x) ** power for power in range(n)] for x in range(n)]
     polynomial = _solve_exactly(rows, samples)
     assert polynomial is not None  # a Vandermonde matrix is regular
     while polynomial and polynomial[-1] == 0:
         polynomial.pop()
+    return polynomial
+
+
+def _real_roots(polynomial: Sequence[Fraction]) -> list[float]:
+    """Return the real roots of a polynomial, smallest first."""
     if len(polynomial) < 2:
         return []
     if len(polynomial) == 2:

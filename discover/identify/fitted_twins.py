@@ -27,10 +27,11 @@ def fit_twins(
 ) -> list[Twin]:
     """Return the twins of a law among laws with given terms and free coefficients.
 
-    Each support is fitted to the law's σ12 in random shear histories by Levenberg–Marquardt, several
-    side by side in one compiled program; what reproduces σ12 to integration error is a twin. Unlike
-    the exact search this holds for closed forms and for any number of exchanged terms, but a fit may
-    miss a distant solution: what it finds is sure, what it does not find is not ruled out.
+    Each support is fitted to the law's σ12 in random shear histories by Levenberg–Marquardt,
+    several side by side in one compiled program; what reproduces σ12 to integration error is a
+    twin. Unlike the exact search this holds for closed forms and for any number of exchanged terms,
+    but a fit may miss a distant solution: what it finds is sure, what it does not find is not ruled
+    out.
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ def _readable(rows: np.ndarray) -> np.ndarray:
 
 @eqx.filter_jit
 def _arrivals(law, protocols, times):
-    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0), shape (runs, steps, 3), by classical Runge–Kutta steps."""
+    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0), (runs, steps, 3), by classical Runge–Kutta steps."""
 
     def one(protocol, grid):
         def slope(t, state):

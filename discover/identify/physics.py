@@ -11,7 +11,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from discover.identify.physics_flows import Trajectories, cycles, trajectories
 from discover.identify.steady_states import (
@@ -194,7 +193,7 @@ def _work(fluid: Fluid, weissenberg: float, deborah: float) -> PhysicsCheck:
     where = grid.names[run]
     return PhysicsCheck(
         name,
-        value >= -_ROUNDING,
+        bool(value >= -_ROUNDING),
         float(value),
         where,
         f"The work σ:d over the last cycle is at least {value:.3g} of the product of the largest "

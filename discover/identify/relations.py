@@ -13,6 +13,7 @@ from tensor_library.library import TermLibrary
 
 _LARGEST_INTEGER = 10**6
 _FRESH_STATES = 5
+_IDLE_ROWS = 24
 _COMPONENTS_SEEN = {"nothing": (0, 1, 2, 3), "33": (0, 1, 3)}
 
 Reach = Literal["nothing", "33"]
@@ -121,6 +122,7 @@ def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], li
     """Return the reduced row echelon form modulo the prime, and its pivot columns."""
     echelon: list[list[int]] = []
     pivots: list[int] = []
+    idle = 0
     for given in rows:
         row = [value % PRIME for value in given]
         for pivot, old in zip(pivots, echelon, strict=True):
@@ -129,7 +131,11 @@ def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], li
                 row = [(a - factor * b) % PRIME for a, b in zip(row, old, strict=True)]
         lead = next((i for i, value in enumerate(row) if value), None)
         if lead is None:
+            idle += 1
+            if idle > _IDLE_ROWS:
+                break  # rows come from random states: the rank is reached
             continue
+        idle = 0
         inverse = pow(row[lead], -1, PRIME)
         row = [value * inverse % PRIME for value in row]
         for k, old in enumerate(echelon):

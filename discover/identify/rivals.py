@@ -3,12 +3,12 @@
 The rule
 --------
 Of all laws that a search refitted, a law is a *rival* if it has no more terms than the chosen one
-and the data cannot tell the two apart at 5 % (`compare_residuals`), or if it has one term more, does
-not contain the chosen law and predicts every observation to integration error. The noise is not
-assumed: it is what the chosen law leaves. Rivals are refitted to the same tolerance as the chosen
-law before they are judged. Among laws that the data cannot tell apart the chosen one should be the
-simplest: fewest terms, then lowest complexity, then fewest invariants, then the order of the
-library; `simplest` says whether it is.
+and the data cannot tell the two apart at 5 % (`compare_residuals`), or if it has one term more,
+does not contain the chosen law and predicts every observation to integration error. The noise is
+not assumed: it is what the chosen law leaves. Rivals are refitted to the same tolerance as the
+chosen law before they are judged. Among laws that the data cannot tell apart the chosen one should
+be the simplest: fewest terms, then lowest complexity, then fewest invariants, then the order of the
+library; `RivalTable.simplest` says whether it is.
 """
 
 from collections.abc import Mapping
@@ -61,10 +61,10 @@ class FittedRival:
         law = spell(self.law.coefficients)
         if self.evidence.test == "tie":
             return f"h = {law} predicts every observation as the chosen law does."
-        name = {"vuong": "Vuong's test", "likelihood_ratio": "the likelihood-ratio test"}
+        test = "Vuong's test" if self.evidence.test == "vuong" else "the likelihood-ratio test"
         return (
-            f"h = {law} leaves a misfit of {self.misfit:.3g}, and {name[self.evidence.test]} cannot "
-            f"tell it from the chosen law (p = {self.evidence.p_value:.2g}, "
+            f"h = {law} leaves a misfit of {self.misfit:.3g}, and {test} cannot tell it from the "
+            f"chosen law (p = {self.evidence.p_value:.2g}, "
             f"{self.evidence.effective_samples:.0f} independent residuals)."
         )
 

@@ -267,7 +267,11 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
     left, _ = _directions(library, blocks, with_n1, int(total))
     hidden = hidden_stresses(
         LibraryExpansion(
-            jnp.asarray(coefficients), jnp.asarray(inner), library, base.linear_relaxation, base
+            coefficients=jnp.asarray(coefficients),
+            inner=jnp.asarray(inner),
+            library=library,
+            linear_relaxation=base.linear_relaxation,
+            base=base,
         )
     )
     verdicts = tuple(
@@ -287,7 +291,7 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
 def _directions(library, blocks, observed, total):
     stacked = np.concatenate([blocks[q] for q in observed])
     # rows beyond the number of unknowns say nothing more to a null space
-    reduced = np.linalg.qr(stacked, mode="r")
+    reduced = np.asarray(np.linalg.qr(stacked, mode="r"))
     return weak_directions(library.names, reduced, blocks, total * len(observed))
 
 

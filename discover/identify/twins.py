@@ -15,7 +15,7 @@ histories
 Every twin is also simulated in random histories before it is reported.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
@@ -36,6 +36,7 @@ from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
 Proof = Literal["relation", "series", "histories"]
+_Candidate = tuple[LawTerms, Proof, dict[str, str]]
 
 _LARGEST_DENOMINATOR = 10**5
 _SHORT_DENOMINATOR = 100
@@ -124,8 +125,8 @@ def find_twins(
     """Return the twins of a law, simplest first, checked by simulation.
 
     Searched are: every other term of the library in place of each term of the law (exact; for a
-    polynomial law on UCM), every exchange along a relation that vanishes in shear, every combination that
-    lives on σ33 only (where nothing in the law feels σ33), and the candidates given.
+    polynomial law on UCM), every exchange along a relation that vanishes in shear, every
+    combination that lives on σ33 only (where nothing in the law feels σ33), and the candidates.
 
     Parameters
     ----------
@@ -142,11 +143,12 @@ def find_twins(
     """
     base = UpperConvectedMaxwell() if base is None else base
     library = joint_library(library, [law, *candidates])
-    found: list[tuple[LawTerms, Proof, dict[str, str]]] = []
+    found: list[_Candidate] = []
     if isinstance(base, UpperConvectedMaxwell):
         found += _by_series(library, law, base.linear_relaxation, order)
         found += _by_relations(library, law)
-    found += [(candidate, "histories", {}) for candidate in candidates]
+    for candidate in candidates:
+        found.append((candidate, "histories", {}))
     distinct = {_key(law): None}
     unique = []
     for one in found:
@@ -179,7 +181,9 @@ def _key(law: LawTerms) -> tuple:
     return tuple(sorted((n, round(v, 6)) for n, v in law.coefficients.items() if v))
 
 
-def _by_series(library: TermLibrary, law: LawTerms, linear_relaxation: bool, order: int):
+def _by_series(
+    library: TermLibrary, law: LawTerms, linear_relaxation: bool, order: int
+) -> Iterator[_Candidate]:
     """Return twins with one term of the law exchanged for another.
 
     The search runs at a neighbouring law with short fractions, where the arithmetic is fast and a
@@ -217,7 +221,7 @@ def _fraction(value: float, largest_denominator: int) -> Fraction:
     return Fraction(value).limit_denominator(largest_denominator) or Fraction(value)
 
 
-def _by_relations(library: TermLibrary, law: LawTerms):
+def _by_relations(library: TermLibrary, law: LawTerms) -> Iterator[_Candidate]:
     present = {name: value for name, value in law.coefficients.items() if value}
     hidden_33 = None
     for relation in term_relations(library):
