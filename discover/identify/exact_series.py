@@ -184,22 +184,20 @@ def solve_for_coefficient(
     rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
     rest = dict(kept or {})
 
-    def shear(coefficients: Mapping[str, Fraction | int]) -> list[Fraction]:
-        return [s[3] for s in stress_series(coefficients, rate, order, linear_relaxation)]
-
-    wanted = shear(target)
-    # residues are enough to see at which order the term enters, and whether it enters too late
-    trial = [
+    # residues are enough to see at which order the term enters, and whether it enters too late;
+    # fractions are needed at that order only
+    wanted, *trial = (
         [s[3] for s in stress_series(law, rate, order, linear_relaxation, modular=True)]
-        for law in (rest, {**rest, term: 1}, {**rest, term: 2})
-    ]
+        for law in (target, rest, {**rest, term: 1}, {**rest, term: 2})
+    )
     for k in range(order + 1):
         if trial[0][k] == trial[1][k] == trial[2][k]:
-            if trial[0][k] != residue(wanted[k]):
+            if trial[0][k] != wanted[k]:
                 return []
             continue
+        aim = shear_at(k, target, rate, linear_relaxation)
         samples = [
-            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - wanted[k]
+            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - aim
             for value in range(_DEGREE + 1)
         ]
         polynomial = _interpolate(samples)

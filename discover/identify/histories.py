@@ -10,7 +10,12 @@ from jaxtyping import Float
 
 from discover.identify.lanes import LawTerms, shear_stresses
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.protocols.shear import (
+    ShearProtocol,
+    oscillatory_shear,
+    stack_protocols,
+    start_up,
+)
 from discover.simulate.grid import IntegrationGrid, make_grids
 from tensor_library.library import TermLibrary
 
@@ -22,6 +27,8 @@ _DURATION = 8.0
 _SAMPLES = 65
 _AMPLITUDES = (0.3, 1.0, 2.0, 3.0)
 _STRAIN_STEP = 0.1
+_OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
+_START_UPS = (1.0, 3.0)
 
 
 @dataclass(frozen=True)
@@ -33,12 +40,21 @@ class Histories:
     protocols, grids
         Batched, ready to simulate.
     amplitude
-        Root-mean-square shear rate of each, shape (runs,).
+        Root-mean-square shear rate of each random history, shape (r,); these come first.
+    names
+        Of the ordinary flows that follow, for telling laws apart; the same batch serves both, so
+        that one compiled program does.
     """
 
     protocols: ShearProtocol
     grids: IntegrationGrid
-    amplitude: Float[np.ndarray, " runs"]
+    amplitude: Float[np.ndarray, " r"]
+    names: tuple[str, ...] = ()
+
+    @property
+    def n_random(self) -> int:
+        """Number of random histories."""
+        return self.amplitude.size
 
 
 @lru_cache(maxsize=4)
@@ -72,9 +88,15 @@ def random_histories(each: int = 3, seed: int = 0) -> Histories:
                 )
             )
             amplitudes.append(amplitude)
+    ordinary = {
+        f"oscillatory shear at Wi = {wi:g}, De = {de:g}": oscillatory_shear(wi, de)
+        for wi, de in _OSCILLATIONS
+    }
+    ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
+    protocols += ordinary.values()
     times = np.linspace(0.0, _DURATION, _SAMPLES)
     grids = make_grids(protocols, [times] * len(protocols), strain_step=_STRAIN_STEP)
-    return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes))
+    return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes), tuple(ordinary))
 
 
 @dataclass(frozen=True)
@@ -121,7 +143,7 @@ def differences(
     """
     flows = random_histories() if histories is None else histories
     stresses = shear_stresses(library, [reference, *others], flows.protocols, flows.grids, base)
-    observed = observe_differences(stresses)
+    observed = observe_differences(stresses[:, : flows.n_random])
     return [difference(observed[0], other) for other in observed[1:]]
 
 

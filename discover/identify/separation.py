@@ -2,20 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from discover.identify.histories import observe_differences
+from discover.identify.histories import observe_differences, random_histories
 from discover.identify.lanes import LawTerms, extensional_stresses, shear_stresses
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.protocols.shear import oscillatory_shear, stack_protocols, start_up
-from discover.simulate.grid import make_grids
 from tensor_library.library import TermLibrary
 
-_OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
-_START_UPS = (1.0, 3.0)
 _EXTENSION_RATES = (0.1, 0.3, 1.0)
 _DURATION = 8.0
 _QUANTITIES = ("sigma12", "N1", "N2")
@@ -59,19 +54,6 @@ class Separation:
         return {"flow": self.flow, "quantity": self.quantity, "difference": self.difference}
 
 
-@lru_cache(maxsize=1)
-def _shear_flows():
-    named = {
-        f"oscillatory shear at Wi = {wi:g}, De = {de:g}": oscillatory_shear(wi, de)
-        for wi, de in _OSCILLATIONS
-    }
-    named |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
-    flows = list(named.values())
-    times = np.linspace(0.0, _DURATION, 65)
-    grids = make_grids(flows, [times] * len(flows), strain_step=0.1)
-    return tuple(named), stack_protocols(flows), grids
-
-
 def separations(
     library: TermLibrary,
     reference: LawTerms,
@@ -89,8 +71,9 @@ def separations(
         As in `differences`.
     """
     laws = [reference, *others]
-    names, protocols, grids = _shear_flows()
-    shear = observe_differences(shear_stresses(library, laws, protocols, grids, base))
+    flows = random_histories()
+    stresses = shear_stresses(library, laws, flows.protocols, flows.grids, base)
+    names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
     times = np.linspace(0.0, _DURATION, 161)
     rates = np.asarray(_EXTENSION_RATES)
     extension = extensional_stresses(library, laws, rates, times, base)

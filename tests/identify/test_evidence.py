@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from discover.identify.evidence import compare_residuals
+from discover.learners.tensor_sindy.search import SupportSearch
 
 N = 400
 TIMES = np.arange(N)
@@ -95,7 +96,7 @@ class FakeProblem:
 
 
 @dataclass
-class FakeSearch:
+class FakeSearch(SupportSearch):
     """A finished search of four supports whose predictions are known."""
 
     problem: Any
@@ -140,7 +141,7 @@ def test_the_rule_keeps_ties_and_drops_what_the_data_rule_out(monkeypatch):
         fit((1, 4), 0.001 * wave),
     )
     search = FakeSearch(problem, {f.support: f for f in (chosen, tie, wrong, near, larger)})
-    table = rivals.find_rivals(search, chosen)  # pyright: ignore[reportArgumentType]
+    table = rivals.find_rivals(search, chosen)
     names = [next(iter(r.law.coefficients)) for r in table.rivals]
     # a tie, and one that differs by far less than the noise; not the wrong one, not the larger one
     assert names == ["gammadot.gammadot", "gammadot"]
