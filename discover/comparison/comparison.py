@@ -9,6 +9,7 @@ from discover.comparison.identifiability import Rival, Statement
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
+from discover.identify.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ class Comparison:
         Bands on the test flows, and what would separate the rivals.
     seed
         Seed of the learners.
+    structure
+        What the training flows can determine of the library, before any fit; None without the
+        sparse learner.
     """
 
     name: str
@@ -85,6 +89,12 @@ class Comparison:
     distillations: Sequence[Mapping[str, Any]] = ()
     next_measurement: NextMeasurement = field(default_factory=NextMeasurement)
     seed: int = 0
+    structure: Structure | None = None
+
+    @property
+    def physics(self) -> dict[str, Mapping[str, Any] | None]:
+        """Checks of physical soundness by learner."""
+        return {name: outcome.physics for name, outcome in self.outcomes.items()}
 
     def flows_of(self, kind: str) -> list[Flow]:
         """Return the flows of one kind."""
@@ -147,6 +157,8 @@ class Comparison:
                 {"quantity": s.quantity, "undetermined": s.undetermined, "text": s.text}
                 for s in self.statements
             ],
+            "structure": None if self.structure is None else self.structure.to_json(),
+            "physics": self.physics,
             "sweep": [
                 {"law": p.law, "parameter": p.parameter, "value": p.value, "errors": p.errors()}
                 for p in self.sweep

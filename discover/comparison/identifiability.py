@@ -1,7 +1,8 @@
-"""What these data cannot decide: rivals of the chosen law, and quantities no datum touches.
+"""What these data cannot decide, in the words and flows of a comparison.
 
-The statements are of two kinds, and say which: exact facts on simple shear, each checked by
-simulation before it is reported, and rivals that the sparse search met on its way.
+The findings are those of `discover.identify`: exact twins of the law found, rivals that a test on
+the data could not rule out, and the structure of the library at the law found. Here they are put
+beside the flows of the comparison.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,9 +13,23 @@ import numpy as np
 
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
 from discover.comparison.outcome import law_of_terms
+from discover.dataset.run import ShearRun
+from discover.identify import (
+    LawStructure,
+    LawTerms,
+    Structure,
+    Twin,
+    analyse_structure,
+    check_physics,
+    find_twins,
+)
+from discover.identify.physics import mean_relaxation_time
 from discover.laws.multimode import Fluid
 from discover.learners.result import RecoveredTerm
+from discover.protocols.shear import stack_protocols
+from discover.simulate.grid import make_grids
 from discover.study.build import DeclaredModel
+from tensor_library.library import TermLibrary, build_library
 
 EXACT = 1e-5
 """Relative difference of σ12 below which two laws count as one: integration error, generously."""
@@ -24,10 +39,11 @@ SEPARATED = 1e-2
 
 MOST_RIVALS = 8
 
-_SLIP = "sigma.gammadot+gammadot.sigma"
-_SLIP_TWIN = "tr(sigma)*gammadot"
-_PARASITE = {"tr(gammadot.gammadot)*I": 1.0, "gammadot.gammadot": -2.0}
-_PARASITE_SIZE = 0.05
+FOUND = "the law found"
+"""Name of the chosen law among those at which the structure is analysed."""
+
+_PHYSICS_SAMPLES = 201
+_PHYSICS_FLOWS = ("training", "held_out", "test")
 
 
 @dataclass(frozen=True)
@@ -92,74 +108,66 @@ def find_rivals(
     met: Iterable[Mapping[str, Any]],
     model: DeclaredModel,
     flows: Sequence[Flow],
+    library: TermLibrary | None = None,
 ) -> list[Rival]:
-    """Return rivals of a law, closest first.
+    """Return rivals of a law: exact twins first, then what the data do not rule out, closest first.
 
     Parameters
     ----------
     terms
         The chosen law.
     met
-        Rivals that the sparse search met: ``support``, ``coefficients``, ``inner``.
+        Rivals that the sparse search met: ``support``, ``coefficients``, ``inner``, ``text``.
     model
         The known part.
     flows
         Training flows, which the rivals have to fit, and tests, which may separate them.
+    library
+        Terms among which twins are sought; by default the basis with up to one invariant.
     """
-    inner = {name: value for term in terms for name, value in term.inner.items()}
-    chosen = {term.term: term.coefficient for term in terms}
+    chosen = law_terms(terms)
+    library = build_library(degree=1) if library is None else library
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    reference = _simulate(chosen, inner, model, [*seen, *unseen])
+    reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
     candidates: dict[frozenset[str], Rival] = {}
-    for other, reason in _twins(chosen):
-        rival = _judge(Rival(other, inner, reason), reference, model, seen, unseen)
+    for twin in find_twins(library, chosen, model.law):
+        if not _concerns_shear(twin, len(chosen.coefficients)):
+            continue
+        rival = _judge(_rival_of(twin), reference, model, seen, unseen)
         if rival is not None and (rival.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
-            candidates.setdefault(frozenset(other), rival)
+            candidates.setdefault(frozenset(twin.law.coefficients), rival)
     for row in met:
         other = dict(zip(row["support"], row["coefficients"], strict=True))
-        reason = "The sparse search met it, and the data fit it as well within their noise."
-        if row.get("exact"):
-            reason = "The sparse search met it, and it fits the data identically."
         if frozenset(other) in candidates or len(candidates) >= MOST_RIVALS:
             continue
+        reason = row.get("text") or "The data fit it as well within their noise."
         rival = _judge(Rival(other, row["inner"], reason), reference, model, seen, unseen)
         if rival is not None:
             candidates[frozenset(other)] = rival
     return list(candidates.values())
 
 
-def _twins(chosen: Mapping[str, float]) -> list[tuple[dict[str, float], str]]:
-    """Return laws that simple shear cannot tell apart on paper; each is checked afterwards."""
-    twins = []
-    if set(chosen) == {_SLIP}:
-        slip = 2.0 * chosen[_SLIP]
-        twins.append(
-            (
-                {_SLIP_TWIN: slip * (1.0 - slip / 2.0)},
-                "Gives the same σ12 and the same N1 in every simple-shear history, without N2.",
-            )
-        )
-    if set(chosen) == {_SLIP_TWIN} and chosen[_SLIP_TWIN] <= 0.5:
-        slip = 1.0 - np.sqrt(1.0 - 2.0 * chosen[_SLIP_TWIN])
-        twins.append(
-            (
-                {_SLIP: float(slip / 2.0)},
-                "Johnson–Segalman: the same σ12 and the same N1 in every simple-shear history, "
-                f"with N2 = −{slip / 2.0:.3g} N1.",
-            )
-        )
-    parasite = dict(chosen)
-    for name, value in _PARASITE.items():
-        parasite[name] = parasite.get(name, 0.0) + _PARASITE_SIZE * value
-    twins.append(
-        (
-            parasite,
-            "The added pair acts on σ33 only, so N2 changes while σ12 and N1 do not; any size "
-            "of it fits the data as well.",
-        )
+def law_terms(terms: Sequence[RecoveredTerm]) -> LawTerms:
+    """Return recovered terms as a law."""
+    return LawTerms(
+        {term.term: term.coefficient for term in terms},
+        {name: value for term in terms for name, value in term.inner.items()},
     )
-    return twins
+
+
+def _concerns_shear(twin: Twin, size: int) -> bool:
+    """Return whether a twin is no larger than the law, or predicts other normal stresses."""
+    no_larger = len(twin.law.coefficients) <= size
+    return no_larger or max(twin.difference.N1, twin.difference.N2) > EXACT
+
+
+def _rival_of(twin: Twin) -> Rival:
+    place = None
+    if twin.separated_by:
+        best = max(twin.separated_by, key=lambda s: s.difference)
+        place = {"protocol": best.flow, "quantity": best.quantity}
+    return Rival(twin.law.coefficients, twin.law.inner, twin.text, separated_by=place)
 
 
 def _simulate(terms, inner, model: DeclaredModel, flows) -> dict[str, Stresses | None]:
@@ -192,12 +200,16 @@ def _judge(rival: Rival, reference, model, seen, unseen) -> Rival | None:
         rival.inner,
         rival.reason,
         worst,
-        place if separation > SEPARATED else None,
+        # among the flows of the comparison if one of them will do
+        place if separation > SEPARATED else rival.separated_by,
     )
 
 
 def undetermined_quantities(
-    flows: Sequence[Flow], normal_stresses_used: bool, rivals: Sequence[Rival]
+    flows: Sequence[Flow],
+    normal_stresses_used: bool,
+    rivals: Sequence[Rival],
+    structure: Structure | None = None,
 ) -> list[Statement]:
     """Return what the training data leave open, with the reason.
 
@@ -209,7 +221,14 @@ def undetermined_quantities(
         Whether measured normal stresses were part of the fit.
     rivals
         From `find_rivals`.
+    structure
+        From `structure_of`, where the sparse learner ran; it decides where there is one.
     """
+    at = law_structure(structure)
+    if at is not None:
+        return [
+            Statement(q.quantity, q.open, q.text) for q in at.quantities if q.verdict != "measured"
+        ]
     measured = [flow.reference for flow in flows if flow.kind == "training" and not flow.is_truth]
     seen = {q for q in ("N1", "N2") if normal_stresses_used and any(q in m for m in measured)}
     statements = []
@@ -246,3 +265,85 @@ def undetermined_quantities(
             )
         )
     return statements
+
+
+def law_structure(structure: Structure | None) -> LawStructure | None:
+    """Return the structure at the law found, or at the known part where that law runs away."""
+    if structure is None or not structure.laws:
+        return None
+    return next((law for law in structure.laws if law.name == FOUND), structure.laws[0])
+
+
+def structure_of(
+    terms: Sequence[RecoveredTerm],
+    runs: Sequence[ShearRun],
+    library: TermLibrary,
+    model: DeclaredModel,
+    use_normal_stresses: bool,
+) -> Structure:
+    """Return what the flows of these runs determine, at the known part and at the law found.
+
+    Parameters
+    ----------
+    terms
+        The law found.
+    runs
+        Training runs.
+    library
+        Candidate terms.
+    model
+        The known part.
+    use_normal_stresses
+        Whether measured normal stresses take part in the fit.
+    """
+    found = law_terms(terms)
+    return analyse_structure(
+        runs,
+        library,
+        base=model.law,
+        nominal={FOUND: found} if found.coefficients else {},
+        modulus=model.modulus,
+        relaxation_time=model.relaxation_time,
+        solvent_viscosity=model.solvent_viscosity,
+        use_normal_stresses=use_normal_stresses,
+    )
+
+
+def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
+    """Return checks of a fluid's physical soundness along the flows, as JSON-able values.
+
+    Parameters
+    ----------
+    fluid
+        A learned fluid.
+    flows
+        The flows of the comparison; training ones set the box beyond which the law extrapolates.
+    """
+    along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
+    training = [flow for flow in along if flow.kind == "training"] or along
+    time = mean_relaxation_time(fluid)
+    weissenberg = time * max(float(np.max(np.abs(flow.shear_rate))) for flow in training)
+    deborah = time * max(_frequency(flow) for flow in training)
+    protocols = [flow.protocol for flow in along]
+    times = [_thinned(flow.times) for flow in along]
+    return check_physics(
+        fluid,
+        stack_protocols(protocols),
+        make_grids(protocols, times, strain_step=0.2),
+        [flow.name for flow in along],
+        weissenberg,
+        # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
+        max(deborah, weissenberg / 5.0),
+    ).to_json()
+
+
+def _frequency(flow: Flow) -> float:
+    """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
+    amplitudes = np.asarray(flow.protocol.amplitudes)
+    frequencies = np.asarray(flow.protocol.frequencies)[amplitudes != 0.0]
+    whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
+    return float(max(whole, *np.abs(frequencies))) if frequencies.size else whole
+
+
+def _thinned(times: np.ndarray) -> np.ndarray:
+    return times[:: max(1, -(-times.size // _PHYSICS_SAMPLES))]

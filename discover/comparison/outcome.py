@@ -37,6 +37,8 @@ class LearnerOutcome:
         One sentence on how the fit ended.
     predictions
         By the key of the flow; None where the law runs away.
+    physics
+        Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
     """
 
     learner: str
@@ -46,6 +48,7 @@ class LearnerOutcome:
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
+    physics: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
@@ -73,6 +76,7 @@ class LearnerOutcome:
                 name: None if p is None else {q: v.tolist() for q, v in p.items()}
                 for name, p in self.predictions.items()
             },
+            "physics": plain(self.physics),
         }
 
     @classmethod
@@ -101,6 +105,7 @@ class LearnerOutcome:
             state["details"],
             state["message"],
             predictions,
+            state.get("physics"),
         )
 
 

@@ -1,13 +1,25 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.flows import Flow, comparison_flows, predict
-from discover.comparison.identifiability import find_rivals, undetermined_quantities
+from discover.comparison.identifiability import (
+    find_rivals,
+    physics_of,
+    structure_of,
+    undetermined_quantities,
+)
 from discover.comparison.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.training import Progress, require_numbers, silent, train
+from discover.comparison.training import (
+    Progress,
+    require_numbers,
+    silent,
+    study_library,
+    train,
+)
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.dataset.run import ShearDataset
 from discover.errors import InputError
@@ -79,11 +91,14 @@ def compare(
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen = outcomes.get("tensor_sindy")
-    rivals = []
+    rivals, structure, following = [], None, NextMeasurement()
     if chosen is not None:
-        rivals = find_rivals(chosen.terms, chosen.details.get("rivals", ()), model, flows)
-    following = NextMeasurement()
-    if chosen is not None:
+        library = study_library(study)
+        met = chosen.details.get("rivals", ())
+        rivals = find_rivals(chosen.terms, met, model, flows, library)
+        structure = structure_of(
+            chosen.terms, data.fit.runs, library, model, options.use_normal_stresses
+        )
         judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
         following = next_measurement(
             chosen, rivals, model.fluid, judged, options.next, learner_seed
@@ -100,7 +115,8 @@ def compare(
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         rivals=rivals,
-        statements=undetermined_quantities(flows, options.use_normal_stresses, rivals),
+        statements=undetermined_quantities(flows, options.use_normal_stresses, rivals, structure),
+        structure=structure,
         sweep=points,
         distillations=distillations,
         next_measurement=following,
@@ -125,6 +141,9 @@ def _outcome(
     progress("starting", 0.0)
     result, fluid = train(learner, study, model, data.fit.runs, seed, progress)
     outcome = LearnerOutcome.of(result, fluid, flows)
+    if part == learner:
+        # a sweep's outcomes are looked at in one flow only
+        outcome = replace(outcome, physics=physics_of(fluid, flows))
     if store is not None:
         store.save(part, outcome.to_state())
         # the same route as after an interruption, so that both give the same files

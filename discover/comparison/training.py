@@ -1,6 +1,7 @@
 """From a study to trained learners."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from discover.dataset.run import ShearRun
 from discover.errors import InputError
@@ -9,7 +10,7 @@ from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
 from discover.study.build import DeclaredModel
 from discover.study.schema import Study
-from tensor_library.library import build_library
+from tensor_library.library import TermLibrary, build_library
 
 Progress = Callable[[str, float], None]
 """Called with what is going on and the fraction done, 0 to 1."""
@@ -70,13 +71,12 @@ def train(
         "base_law": None if plain_maxwell else model.law,
         "random_state": seed,
     }
-    library = build_library(
-        degree=options.library.degree, closed_forms=options.library.closed_forms
-    )
+    library = study_library(study)
     if learner == "tensor_sindy":
+        from discover.identify.rivals import find_rivals
         from discover.learners.tensor_sindy import TensorSINDy
 
-        estimator = TensorSINDy(
+        sparse = TensorSINDy(
             library=library,
             optimizer=options.optimizer,
             selection=options.selection,
@@ -85,8 +85,13 @@ def train(
             solvent_viscosity=model.solvent_viscosity,
             progress=lambda text: progress(text, 0.5),
             **shared,
-        )
-    elif learner == "tbnn_ude":
+        ).fit(list(runs))
+        result = sparse.result_
+        # while the search with all its fits is at hand; only its result is kept in files
+        table = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]]).to_json()
+        table["rivals_text"] = table.pop("text")
+        return replace(result, details={**result.details, **table}), sparse.fluid_
+    if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
         if model.solvent_viscosity:
@@ -104,7 +109,12 @@ def train(
             ),
             **shared,
         )
-    else:
-        raise InputError(f"Unknown learner {learner!r}; write tensor_sindy or tbnn_ude.")
-    estimator.fit(list(runs))
-    return estimator.result_, estimator.fluid_
+        estimator.fit(list(runs))
+        return estimator.result_, estimator.fluid_
+    raise InputError(f"Unknown learner {learner!r}; write tensor_sindy or tbnn_ude.")
+
+
+def study_library(study: Study) -> TermLibrary:
+    """Return the candidate terms of a study."""
+    asked = study.compare.library
+    return build_library(degree=asked.degree, closed_forms=asked.closed_forms)

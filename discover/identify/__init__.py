@@ -1,1 +1,46 @@
-"""What data determine and what they leave open."""
+"""Which parts of a law shear data determine, what else would fit, and whether a law is sound."""
+
+from discover.identify.evidence import Evidence, compare_residuals
+from discover.identify.exact_series import Agreement, compare_series, stress_series
+from discover.identify.fitted_twins import fit_twins
+from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
+from discover.identify.histories import Difference, differences, random_histories
+from discover.identify.lanes import LawTerms
+from discover.identify.physics import PhysicsCheck, PhysicsReport, check_physics
+from discover.identify.relations import TermRelation, term_relations
+from discover.identify.rivals import FittedRival, RivalTable, find_rivals
+from discover.identify.separation import Separation, separations
+from discover.identify.structure import LawStructure, QuantityVerdict, Structure, analyse_structure
+from discover.identify.twins import Twin, find_twins, same_in_every_shear
+
+__all__ = [
+    "Agreement",
+    "Difference",
+    "Evidence",
+    "FittedRival",
+    "HiddenStresses",
+    "LawStructure",
+    "LawTerms",
+    "PhysicsCheck",
+    "PhysicsReport",
+    "QuantityVerdict",
+    "RivalTable",
+    "Separation",
+    "Structure",
+    "TermRelation",
+    "Twin",
+    "analyse_structure",
+    "check_physics",
+    "compare_residuals",
+    "compare_series",
+    "differences",
+    "find_rivals",
+    "find_twins",
+    "fit_twins",
+    "hidden_stresses",
+    "random_histories",
+    "same_in_every_shear",
+    "separations",
+    "stress_series",
+    "term_relations",
+]

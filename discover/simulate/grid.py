@@ -95,7 +95,7 @@ def make_grid(
 
 def make_grids(
     protocols: Sequence[ShearProtocol],
-    times: Sequence[Float[np.ndarray, " n"]],
+    times: Sequence[Float[np.ndarray, " _"]],
     **limits: float,
 ) -> IntegrationGrid:
     """Return the grids of several runs, padded to one shape with a leading batch axis.

@@ -1,0 +1,312 @@
+"""Taylor series of the stress after rest, in exact arithmetic: when two laws are the same in shear.
+
+Histories γ̇(t) that are polynomials in time come as close as one likes to every history, and for
+each of them the stress of a polynomial law is a power series in time whose coefficients are
+polynomials in those of γ̇(t) and of the law. Two laws with the same σ12(t) in every shear history
+therefore have the same coefficients for random histories, order by order, without any rounding;
+and two that differ show it at a low order   [Fliess 1981, Bull. SMF 109, 3: the same for the
+generating series of a control system].
+
+Coefficients are fractions where their values matter, and residues modulo a large prime where only
+agreement does: whole numbers of one machine word, many times faster, and a false agreement has a
+chance of about 1e-17.
+"""
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from discover.identify.exact_terms import PRIME, exact_terms, residue
+from tensor_library.terms import parse_term
+
+DEFAULT_ORDER = 9
+_HISTORIES = 2
+
+
+@dataclass(frozen=True)
+class _Series:
+    """A power series in time up to an order that products keep; over residues if `modular`."""
+
+    values: tuple[Any, ...]
+    modular: bool = False
+
+    def __add__(self, other: "_Series") -> "_Series":
+        total = tuple(a + b for a, b in zip(self.values, other.values, strict=True))
+        return _Series(total, self.modular)
+
+    def __mul__(self, other: "_Series") -> "_Series":
+        n = len(self.values)
+        product: list[Any] = [0] * n
+        for i, a in enumerate(self.values):
+            if a:
+                for j in range(n - i):
+                    product[i + j] += a * other.values[j]
+        if self.modular:
+            product = [value % PRIME for value in product]
+        return _Series(tuple(product), self.modular)
+
+
+def stress_series(
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+    modular: bool = False,
+) -> list[tuple[Any, Any, Any, Any]]:
+    """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
+
+    Parameters
+    ----------
+    coefficients
+        The law dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, dimensionless: term → c. Closed forms are
+        not polynomials and raise `ValueError`.
+    rate
+        Coefficients of γ̇(t) = Σ rate[k] tᵏ.
+    order
+        Last order.
+    linear_relaxation
+        Whether −σ is part of the law.
+    modular
+        Whether to return residues modulo `PRIME` and not fractions.
+    """
+    number = residue if modular else Fraction
+    terms = [parse_term(name) for name in coefficients]
+    values = [number(value) for value in coefficients.values()]
+    shear_rate = [number(r) for r in rate][:order] + [number(0)] * max(0, order - len(rate))
+    stress: list[list[Any]] = [[number(0)] * 4]
+    for k in range(order):
+        length = k + 1
+        zero = _Series((number(0),) * length, modular)
+        one = _Series((number(1), *zero.values[1:]), modular)
+        s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
+        g = _Series(tuple(shear_rate[:length]), modular)
+        slope = [
+            2 * (g * s12).values[k],
+            number(0),
+            number(0),
+            shear_rate[k] + (g * s22).values[k],
+        ]
+        if linear_relaxation:
+            slope = [value - old for value, old in zip(slope, stress[k], strict=True)]
+        evaluated = exact_terms(terms, (s11, s22, s33, s12), g, one, zero)
+        for c, components in zip(values, evaluated, strict=True):
+            slope = [v - c * part.values[k] for v, part in zip(slope, components, strict=True)]
+        inverse = number(Fraction(1, k + 1))
+        after = [value * inverse for value in slope]
+        stress.append([value % PRIME for value in after] if modular else after)
+    return [(s[0], s[1], s[2], s[3]) for s in stress]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """To which order two laws agree in every shear history.
+
+    Attributes
+    ----------
+    order
+        Order to which the series were computed.
+    sigma12, N1, N2
+        First order at which the quantity differs, or None where it agrees to `order`.
+    """
+
+    order: int
+    sigma12: int | None
+    N1: int | None
+    N2: int | None
+
+
+def compare_series(
+    first: Mapping[str, Fraction | int],
+    second: Mapping[str, Fraction | int],
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> Agreement:
+    """Return where the Taylor series of two laws part, over random histories.
+
+    Parameters
+    ----------
+    first, second
+        The laws, as in `stress_series`.
+    order, linear_relaxation
+        As in `stress_series`.
+    """
+    generator = random.Random(2)
+    parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
+    for _ in range(_HISTORIES):
+        rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
+        a = stress_series(first, rate, order, linear_relaxation, modular=True)
+        b = stress_series(second, rate, order, linear_relaxation, modular=True)
+        for k, (s, t) in enumerate(zip(a, b, strict=True)):
+            for name, same in (
+                ("sigma12", s[3] == t[3]),
+                ("N1", (s[0] - s[1] - t[0] + t[1]) % PRIME == 0),
+                ("N2", (s[1] - s[2] - t[1] + t[2]) % PRIME == 0),
+            ):
+                known = parts[name]
+                if not same and (known is None or k < known):
+                    parts[name] = k
+    return Agreement(order, parts["sigma12"], parts["N1"], parts["N2"])
+
+
+def solve_for_coefficient(
+    target: Mapping[str, Fraction | int],
+    term: str,
+    kept: Mapping[str, Fraction | int] | None = None,
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> list[tuple[float, bool]]:
+    """Return every c for which a law with c·term has the σ12 of another in every history.
+
+    At the first order at which c enters the series of σ12 it does so as a polynomial of low degree,
+    whose real roots are the candidates. A rational root is exact, and then all later orders have to
+    agree exactly; of the others only a simulation can tell.
+
+    Parameters
+    ----------
+    target
+        The law to reproduce.
+    term
+        The term sought.
+    kept
+        Other terms of the law sought, with their coefficients.
+    order, linear_relaxation
+        As in `stress_series`.
+
+    Returns
+    -------
+    Candidates with whether they are proved.
+    """
+    generator = random.Random(3)
+    rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
+    rest = dict(kept or {})
+
+    # residues are enough to see at which order the term enters, and whether it enters too late;
+    # fractions are needed at that order only
+    wanted, *trial = (
+        [s[3] for s in stress_series(law, rate, order, linear_relaxation, modular=True)]
+        for law in (target, rest, {**rest, term: 1}, {**rest, term: 2})
+    )
+    for k in range(order + 1):
+        if trial[0][k] == trial[1][k] == trial[2][k]:
+            if trial[0][k] != wanted[k]:
+                return []
+            continue
+        aim = shear_at(k, target, rate, linear_relaxation)
+        samples = [
+            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - aim
+            for value in range(_DEGREE + 1)
+        ]
+        polynomial = _interpolate(samples)
+        candidates = []
+        for root in _real_roots(polynomial):
+            fraction = Fraction(root).limit_denominator(10**6)
+            if sum(a * fraction**power for power, a in enumerate(polynomial)) != 0:
+                candidates.append((root, False))
+                continue
+            law = {**rest, term: fraction}
+            if compare_series(target, law, order, linear_relaxation).sigma12 is None:
+                candidates.append((float(fraction), True))
+        return candidates
+    return []
+
+
+_DEGREE = 3
+"""Degree in its coefficient with which a term first enters σ12, at most."""
+
+
+def shear_at(
+    order: int,
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool,
+) -> Fraction:
+    """Return one Taylor coefficient of σ12."""
+    return stress_series(coefficients, rate, order, linear_relaxation)[order][3]
+
+
+def _interpolate(samples: Sequence[Fraction]) -> list[Fraction]:
+    """Return the polynomial with these values at 0, 1, 2, ..., constant first."""
+    n = len(samples)
+    rows = [[Fraction(x) ** power for power in range(n)] for x in range(n)]
+    polynomial = _solve_exactly(rows, samples)
+    assert polynomial is not None  # a Vandermonde matrix is regular
+    while polynomial and polynomial[-1] == 0:
+        polynomial.pop()
+    return polynomial
+
+
+def _real_roots(polynomial: Sequence[Fraction]) -> list[float]:
+    """Return the real roots of a polynomial, smallest first."""
+    if len(polynomial) < 2:
+        return []
+    if len(polynomial) == 2:
+        return [float(-polynomial[0] / polynomial[1])]
+    roots = np.roots([float(value) for value in reversed(polynomial)])
+    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
+    return sorted(real, key=abs)
+
+
+def hidden_change(
+    first: Mapping[str, Fraction | int],
+    second: Mapping[str, Fraction | int],
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> dict[str, str]:
+    """Return the second law's normal stresses as linear functions of the first law's, in words.
+
+    Solved exactly from the Taylor series over two random histories; empty where no linear change
+    relates the two. Where the first law confines its stresses (in Johnson–Segalman σ33 = 0 and σ22
+    is a multiple of σ11), the change with the fewest terms is one of several.
+    """
+    generator = random.Random(4)
+    states: list[tuple[Fraction, ...]] = []
+    images: list[tuple[Fraction, ...]] = []
+    for _ in range(_HISTORIES):
+        rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
+        states += stress_series(first, rate, order, linear_relaxation)
+        images += stress_series(second, rate, order, linear_relaxation)
+    change = {}
+    for row, name in enumerate(_NORMAL):
+        solved = _solve_exactly([s[:3] for s in states], [image[row] for image in images])
+        if solved is None:
+            return {}
+        parts = [
+            f"{value} {source}" for value, source in zip(solved, _NORMAL, strict=True) if value
+        ]
+        change[name] = " + ".join(parts) or "0"
+    return change
+
+
+_NORMAL = ("sigma11", "sigma22", "sigma33")
+
+
+def _solve_exactly(
+    matrix: Sequence[Sequence[Fraction]], right: Sequence[Fraction]
+) -> list[Fraction] | None:
+    """Return x with matrix x = right, free unknowns zero, or None."""
+    n = len(matrix[0])
+    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
+    solution, used = [Fraction(0)] * n, 0
+    pivots = []
+    for column in range(n):
+        pivot = next((i for i in range(used, len(rows)) if rows[i][column]), None)
+        if pivot is None:
+            continue
+        rows[used], rows[pivot] = rows[pivot], rows[used]
+        lead = rows[used][column]
+        rows[used] = [value / lead for value in rows[used]]
+        for i, row in enumerate(rows):
+            if i != used and row[column]:
+                factor = row[column]
+                rows[i] = [a - factor * b for a, b in zip(row, rows[used], strict=True)]
+        pivots.append(column)
+        used += 1
+    if any(row[n] for row in rows[used:]):
+        return None
+    for i, column in enumerate(pivots):
+        solution[column] = rows[i][n]
+    return solution

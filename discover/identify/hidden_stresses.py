@@ -1,0 +1,151 @@
+"""Which of the normal stresses the shear stress feels.
+
+σ12 is measured, σ11, σ22 and σ33 are not. Along a trajectory, a small change of the hidden stresses
+at the start travels as dδ/dt = J(t) δ with J the Jacobian of the law; what never reaches σ12 in any
+history is unobservable   [Hermann & Krener 1977, IEEE TAC 22, 728]. A law may say anything it likes
+about such a combination: σ12 cannot object.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.identify.histories import Histories, random_histories
+from discover.laws.base import AbstractConstitutiveLaw
+
+_ZERO = 1e-10
+"""Relative singular value that counts as zero; exact ones come out at rounding error."""
+
+_NORMALS = ("σ11", "σ22", "σ33")
+_DIFFERENCES = {"N1": np.array([1.0, -1.0, 0.0]), "N2": np.array([0.0, 1.0, -1.0])}
+
+
+@dataclass(frozen=True)
+class HiddenStresses:
+    """What σ12 feels of the normal stresses in one law.
+
+    Attributes
+    ----------
+    unfelt
+        Orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
+    felt
+        For N1 and N2, whether the difference is free of every unfelt combination.
+    """
+
+    unfelt: Float[np.ndarray, "k 3"]
+    felt: dict[str, bool]
+
+    def leaves_no_trace(self, quantity: str) -> bool:
+        """Return whether one of the two stresses that make N1 or N2 never reaches σ12 at all."""
+        return any(
+            np.count_nonzero(np.abs(row) > 1e-8) == 1 and abs(row @ _DIFFERENCES[quantity]) > 1e-8
+            for row in self.unfelt
+        )
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        if not len(self.unfelt):
+            return "σ12 feels all three normal stresses."
+        listed = []
+        for row in self.unfelt:
+            parts = [
+                f"{value:+.2g} {name}"
+                for value, name in zip(row, _NORMALS, strict=True)
+                if abs(value) > 1e-6
+            ]
+            listed.append(
+                parts[0].split(" ")[1] if len(parts) == 1 else "(" + " ".join(parts) + ")"
+            )
+        return f"A change of {' or of '.join(listed)} never reaches σ12."
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the combinations as JSON-able values."""
+        return {"unfelt": self.unfelt.tolist(), "felt": dict(self.felt), "text": self.text}
+
+
+def hidden_stresses(
+    law: AbstractConstitutiveLaw, histories: Histories | None = None
+) -> HiddenStresses:
+    """Return which normal stresses σ12 feels in a law, over random shear histories.
+
+    Parameters
+    ----------
+    law
+        Any dimensionless law.
+    histories
+        By default `random_histories()`. Histories in which the law runs away are left out.
+    """
+    flows = random_histories() if histories is None else histories
+    arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids.times))
+    usable = np.all(np.isfinite(arrived), axis=(1, 2))
+    rows = arrived[usable].reshape(-1, 3)
+    triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))
+    _, values, right = np.linalg.svd(triangular)
+    unfelt = _readable(right[values <= _ZERO * max(values[0], 1e-300)])
+    felt = {
+        name: bool(np.all(np.abs(unfelt @ difference) < 1e-8))
+        for name, difference in _DIFFERENCES.items()
+    }
+    return HiddenStresses(unfelt, felt)
+
+
+def _readable(rows: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the same space, along the axes where it holds them."""
+    basis: list[np.ndarray] = []
+    projector = rows.T @ rows
+    for axis in np.eye(3):
+        if np.linalg.norm(projector @ axis - axis) < 1e-8:
+            basis.append(axis)
+    for row in rows:
+        for known in basis:
+            row = row - (row @ known) * known
+        if np.linalg.norm(row) > 1e-6 and len(basis) < len(rows):
+            row = row / np.linalg.norm(row)
+            basis.append(row * np.sign(row[np.argmax(np.abs(row))]))
+    return np.array(basis).reshape(-1, 3)
+
+
+@eqx.filter_jit
+def _arrivals(law, protocols, times):
+    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0), (runs, steps, 3), by classical Runge–Kutta steps."""
+
+    def one(protocol, grid):
+        def slope(t, state):
+            stress, change = state
+            rate = protocol.shear_rate(t)
+            value, jacobian = (
+                law.stress_rate(stress, rate),
+                jax.jacfwd(law.stress_rate)(stress, rate),
+            )
+            return value, jacobian @ change
+
+        def advance(state, interval):
+            t, step = interval
+
+            def moved(k, factor):
+                return jax.tree.map(lambda s, v: s + factor * step * v, state, k)
+
+            k1 = slope(t, state)
+            k2 = slope(t + 0.5 * step, moved(k1, 0.5))
+            k3 = slope(t + 0.5 * step, moved(k2, 0.5))
+            k4 = slope(t + step, moved(k3, 1.0))
+            after = jax.tree.map(
+                lambda s, a, b, c, d: s + step / 6.0 * (a + 2.0 * b + 2.0 * c + d),
+                state,
+                k1,
+                k2,
+                k3,
+                k4,
+            )
+            return after, after[1][3]
+
+        start = (jnp.zeros(4), jnp.eye(4)[:, :3])
+        return jax.lax.scan(advance, start, (grid[:-1], jnp.diff(grid)))[1]
+
+    return jax.vmap(one)(protocols, times)

@@ -1,0 +1,170 @@
+"""Random shear histories, and how far laws agree in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.identify.lanes import LawTerms, shear_stresses
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.protocols.shear import (
+    ShearProtocol,
+    oscillatory_shear,
+    stack_protocols,
+    start_up,
+)
+from discover.simulate.grid import IntegrationGrid, make_grids
+from tensor_library.library import TermLibrary
+
+SAME = 1e-5
+"""Relative difference below which two laws count as one: integration error, generously."""
+
+_WAVES = 6
+_DURATION = 8.0
+_SAMPLES = 65
+_AMPLITUDES = (0.3, 1.0, 2.0, 3.0)
+_STRAIN_STEP = 0.1
+_OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
+_START_UPS = (1.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Histories:
+    """Shear flows with the times at which they are looked at.
+
+    Attributes
+    ----------
+    protocols, grids
+        Batched, ready to simulate.
+    amplitude
+        Root-mean-square shear rate of each random history, shape (r,); these come first.
+    names
+        Of the ordinary flows that follow, for telling laws apart; the same batch serves both, so
+        that one compiled program does.
+    """
+
+    protocols: ShearProtocol
+    grids: IntegrationGrid
+    amplitude: Float[np.ndarray, " r"]
+    names: tuple[str, ...] = ()
+
+    @property
+    def n_random(self) -> int:
+        """Number of random histories."""
+        return self.amplitude.size
+
+
+@lru_cache(maxsize=4)
+def random_histories(each: int = 3, seed: int = 0) -> Histories:
+    """Return band-limited random shear rates at several amplitudes.
+
+    γ̇(t) is a sum of six cosines with frequencies from 0.1 to 3 and random phases, for eight
+    relaxation times, at root-mean-square rates of 0.3, 1, 2 and 3: nearly linear to strongly
+    nonlinear. Rates that start with a jump are among them, as cosines do not vanish at zero.
+
+    Parameters
+    ----------
+    each
+        Histories at each amplitude.
+    seed
+        Of the generator.
+    """
+    generator = np.random.default_rng(seed)
+    protocols, amplitudes = [], []
+    for amplitude in _AMPLITUDES:
+        for _ in range(each):
+            weights = generator.normal(size=_WAVES)
+            weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
+            protocols.append(
+                ShearProtocol(
+                    jnp.zeros(1),
+                    jnp.zeros(1),
+                    jnp.asarray(weights),
+                    jnp.asarray(generator.uniform(0.1, 3.0, _WAVES)),
+                    jnp.asarray(generator.uniform(0.0, 2.0 * np.pi, _WAVES)),
+                )
+            )
+            amplitudes.append(amplitude)
+    ordinary = {
+        f"oscillatory shear at Wi = {wi:g}, De = {de:g}": oscillatory_shear(wi, de)
+        for wi, de in _OSCILLATIONS
+    }
+    ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
+    protocols += ordinary.values()
+    times = np.linspace(0.0, _DURATION, _SAMPLES)
+    grids = make_grids(protocols, [times] * len(protocols), strain_step=_STRAIN_STEP)
+    return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes), tuple(ordinary))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far a law is from another over a set of histories.
+
+    Attributes
+    ----------
+    sigma12, N1, N2
+        Largest over the histories of the root-mean-square difference over the root-mean-square of
+        the reference; N2's is relative to the reference's N1. Infinite where the law runs away.
+    """
+
+    sigma12: float
+    N1: float
+    N2: float
+
+    def to_json(self) -> dict[str, float]:
+        """Return the differences by quantity."""
+        return {"sigma12": self.sigma12, "N1": self.N1, "N2": self.N2}
+
+
+def differences(
+    library: TermLibrary,
+    reference: LawTerms,
+    others: Sequence[LawTerms],
+    base: AbstractConstitutiveLaw | None = None,
+    histories: Histories | None = None,
+) -> list[Difference]:
+    """Return how far each of several laws is from a reference in random shear histories.
+
+    Histories in which the reference itself runs away are left out.
+
+    Parameters
+    ----------
+    library
+        Holds every term of the laws.
+    reference, others
+        The laws.
+    base
+        The known part; by default UCM.
+    histories
+        By default `random_histories()`.
+    """
+    flows = random_histories() if histories is None else histories
+    stresses = shear_stresses(library, [reference, *others], flows.protocols, flows.grids, base)
+    observed = observe_differences(stresses[:, : flows.n_random])
+    return [difference(observed[0], other) for other in observed[1:]]
+
+
+def observe_differences(
+    stresses: Float[np.ndarray, "*batch 4"],
+) -> Float[np.ndarray, "*batch 3"]:
+    """Return σ12, N1 and N2 from the components 11, 22, 33, 12."""
+    s11, s22, s33, s12 = np.moveaxis(stresses, -1, 0)
+    return np.stack([s12, s11 - s22, s22 - s33], axis=-1)
+
+
+def difference(
+    reference: Float[np.ndarray, "runs n 3"], other: Float[np.ndarray, "runs n 3"]
+) -> Difference:
+    """Return the largest relative difference of each quantity over the runs."""
+    usable = np.all(np.isfinite(reference), axis=(1, 2))
+    a, b = reference[usable], other[usable]
+    if not usable.any() or not np.all(np.isfinite(b)):
+        return Difference(np.inf, np.inf, np.inf)
+    scale = np.sqrt(np.mean(a**2, axis=1))
+    scale[:, 2] = scale[:, 1]
+    size = np.sqrt(np.mean((a - b) ** 2, axis=1))
+    ratio = np.max(size / np.where(scale > 0, scale, 1.0), axis=0)
+    return Difference(*(float(r) for r in ratio))

@@ -1,0 +1,325 @@
+"""Is a law physically sound? Checks that hold for any law, with where it fails.
+
+None of them uses data. A law that fails one may still fit; it should not be carried into a
+simulation of other flows without a second thought.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from discover.identify.physics_flows import Trajectories, cycles, trajectories
+from discover.identify.steady_states import (
+    is_stable,
+    is_steady,
+    steady_shear,
+    steady_uniaxial_extension,
+)
+from discover.laws.multimode import Fluid
+from discover.protocols.shear import ShearProtocol
+from discover.simulate.grid import IntegrationGrid
+
+_ROUNDING = 1e-6
+"""Size below zero that integration error alone may give."""
+
+_LINEAR_TOLERANCE = 1e-3
+"""Relative difference of moduli from Maxwell's that counts as the same."""
+
+SHEAR_RATES = np.geomspace(1e-2, 1e2, 241)
+"""Weissenberg numbers of the flow curve."""
+
+EXTENSION_RATES = np.geomspace(0.02, 20.0, 241)
+"""Extension rates times relaxation time."""
+
+_REFINED = 61
+_BOX_FACTORS = (1.0, 1.5, 2.0, 3.0, 5.0)
+
+
+@dataclass(frozen=True)
+class PhysicsCheck:
+    """One check of a law.
+
+    Attributes
+    ----------
+    name
+        Of the check.
+    passed
+        Whether the law passes; None where the check could not be made.
+    value
+        The number that decides.
+    where
+        Where it is taken, or where the law fails, in words.
+    text
+        One sentence for a reader.
+    """
+
+    name: str
+    passed: bool | None
+    value: float | None
+    where: str
+    text: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the check as JSON-able values."""
+        return {
+            "name": self.name,
+            "passed": None if self.passed is None else bool(self.passed),
+            "value": None if self.value is None else float(self.value),
+            "where": self.where,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class PhysicsReport:
+    """All checks of a law.
+
+    Attributes
+    ----------
+    checks
+        In a fixed order.
+    """
+
+    checks: tuple[PhysicsCheck, ...]
+
+    def __getitem__(self, name: str) -> PhysicsCheck:
+        return next(check for check in self.checks if check.name == name)
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        failed = [check.name for check in self.checks if check.passed is False]
+        if not failed:
+            return "The law passes every check of physical soundness that could be made."
+        return "The law fails: " + ", ".join(failed) + "."
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as ``comparison.json`` holds it."""
+        return {"text": self.text, "checks": [check.to_json() for check in self.checks]}
+
+
+def check_physics(
+    fluid: Fluid,
+    protocols: ShearProtocol,
+    grids: IntegrationGrid,
+    names: Sequence[str],
+    weissenberg: float,
+    deborah: float,
+) -> PhysicsReport:
+    """Return the checks of a fluid.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    protocols, grids
+        Flows along which stresses are looked at, batched, as from `stack_protocols` and
+        `make_grids`.
+    names
+        Of the flows.
+    weissenberg, deborah
+        Largest shear rate and frequency of training, times the mean relaxation time: the corner of
+        the box beyond which the law extrapolates.
+    """
+    along = trajectories(fluid, protocols, grids)
+    return PhysicsReport(
+        (
+            _conformation(along, names),
+            _free_energy(along, names),
+            _work(fluid, weissenberg, deborah),
+            _flow_curve(fluid, weissenberg),
+            _extension(fluid),
+            _small_strain(fluid),
+            _reach(fluid, weissenberg, deborah),
+        )
+    )
+
+
+def mean_relaxation_time(fluid: Fluid) -> float:
+    """Return Σ G λ² / Σ G λ, in s: the time scale of the fluid's slow flows."""
+    modulus, time = np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time)
+    return float(np.sum(modulus * time**2) / np.sum(modulus * time))
+
+
+def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+    name = "conformation tensor positive definite"
+    run, value = along.lowest(along.smallest_conformation)
+    if run is None:
+        return PhysicsCheck(name, None, None, "", "The law runs away in every flow looked at.")
+    passed = value > -_ROUNDING
+    where = names[run]
+    verb = "stays positive definite" if passed else "loses positive definiteness"
+    return PhysicsCheck(
+        name,
+        passed,
+        value,
+        where,
+        f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {value:.3g}, in "
+        f"{where}.",
+    )
+
+
+def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+    name = "dissipation non-negative"
+    run, value = along.lowest(along.dissipation)
+    if run is None:
+        return PhysicsCheck(
+            name, None, None, "", "No flow in which the stored energy is defined throughout."
+        )
+    passed = value > -_ROUNDING
+    where = names[run]
+    verb = "is nowhere negative" if passed else "becomes negative"
+    return PhysicsCheck(
+        name,
+        passed,
+        value,
+        where,
+        f"With the stored energy of Hookean dumbbells, (G/2)(tr A − ln det A − 3) with A = I + "
+        f"σ/G, the dissipation {verb}: at least {value:.3g} G/λ, in {where}.",
+    )
+
+
+def _work(fluid: Fluid, weissenberg: float, deborah: float) -> PhysicsCheck:
+    name = "work over a cycle non-negative"
+    grid = cycles(fluid, [weissenberg], [0.5 * deborah, deborah, 2.0 * deborah])
+    usable = [(i, w) for i, w in enumerate(grid.work) if np.isfinite(w)]
+    if not usable:
+        return PhysicsCheck(name, None, None, "", "The law runs away in the oscillations tried.")
+    run, value = min(usable, key=lambda pair: pair[1])
+    where = grid.names[run]
+    return PhysicsCheck(
+        name,
+        bool(value >= -_ROUNDING),
+        float(value),
+        where,
+        f"The work σ:d over the last cycle is at least {value:.3g} of the product of the largest "
+        f"stress and strain rate, in {where}.",
+    )
+
+
+def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
+    name = "flow curve monotonic"
+    slowest = mean_relaxation_time(fluid)
+    rates = SHEAR_RATES / slowest
+    stress = np.asarray(fluid.solvent_viscosity) * rates
+    steady = np.ones(rates.size, dtype=bool)
+    for modulus, time in zip(
+        np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True
+    ):
+        found, _, residual = steady_shear(fluid.law, jnp.asarray(time * rates))
+        stress = stress + modulus * np.asarray(found)[:, 3]
+        steady &= is_steady(np.asarray(residual))
+    last = rates.size if steady.all() else int(np.argmin(steady))
+    falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
+    if falling.size:
+        low, high = float(rates[falling[0]]), float(rates[falling[-1] + 1])
+        beyond = low * slowest > weissenberg
+        where = f"shear rates from {low:.3g} to {high:.3g} 1/s"
+        note = "beyond the rates of training" if beyond else "within the rates of training"
+        return PhysicsCheck(
+            name,
+            False,
+            low,
+            where,
+            f"The steady shear stress falls with the rate at {where}: homogeneous flow is unstable "
+            f"there and would band (it starts {note}).",
+        )
+    if last < 2:
+        return PhysicsCheck(name, None, None, "", "No steady shear flow was found.")
+    where = f"shear rates from {rates[0]:.3g} to {rates[last - 1]:.3g} 1/s"
+    text = f"The steady shear stress rises with the rate throughout {where}."
+    if last < rates.size:
+        text += " Beyond, no steady state follows on."
+    return PhysicsCheck(
+        name, True if last == rates.size else None, float(rates[last - 1]), where, text
+    )
+
+
+def _extension(fluid: Fluid) -> PhysicsCheck:
+    name = "steady extension bounded"
+    longest = float(np.max(np.asarray(fluid.relaxation_time)))
+    reached = _last_stable(fluid, EXTENSION_RATES)
+    if reached == EXTENSION_RATES.size:
+        where = f"extension rates up to {EXTENSION_RATES[-1] / longest:.3g} 1/s"
+        return PhysicsCheck(
+            name,
+            True,
+            float(EXTENSION_RATES[-1] / longest),
+            where,
+            f"The stress in uniaxial extension settles at all {where}.",
+        )
+    low = EXTENSION_RATES[max(reached - 1, 0)]
+    high = EXTENSION_RATES[reached]
+    # from rest again, but finely across the last step
+    fine = np.concatenate(
+        [EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)]
+    )
+    fine = np.concatenate([fine, np.full(EXTENSION_RATES.size + _REFINED - fine.size, high)])
+    limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
+    return PhysicsCheck(
+        name,
+        False,
+        limit,
+        f"extension rates beyond {limit:.4g} 1/s",
+        f"In uniaxial extension at rates beyond {limit:.4g} 1/s ({limit * longest:.3g} over the "
+        "longest relaxation time) no steady state is stable: the stress grows without bound.",
+    )
+
+
+def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
+    _, jacobian, residual = steady_uniaxial_extension(fluid.law, jnp.asarray(rates))
+    good = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+    return rates.size if good.all() else int(np.argmin(good))
+
+
+def _small_strain(fluid: Fluid) -> PhysicsCheck:
+    name = "small-strain limit"
+    rest, still = jnp.zeros(4), jnp.asarray(0.0)
+    relaxation = np.asarray(jax.jacfwd(fluid.law.stress_rate)(rest, still))
+    source = np.asarray(jax.jacfwd(fluid.law.stress_rate, argnums=1)(rest, still))
+    offset = float(np.max(np.abs(np.asarray(fluid.law.stress_rate(rest, still)))))
+    frequency = np.geomspace(0.01, 100.0, 41)
+    response = np.array(
+        [
+            1j * w * np.linalg.solve(1j * w * np.eye(4) - relaxation, source.astype(complex))[3]
+            for w in frequency
+        ]
+    )
+    maxwell = 1j * frequency / (1.0 + 1j * frequency)
+    value = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
+    passed = value <= _LINEAR_TOLERANCE and offset <= _LINEAR_TOLERANCE
+    text = (
+        f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
+        f"{100.0 * value:.2g} % (the law linearised at rest, frequencies times relaxation time "
+        "from 0.01 to 100)"
+    )
+    if offset > _LINEAR_TOLERANCE:
+        text += f", and the law does not rest: dσ/dt = {offset:.2g} G/λ without flow or stress"
+    return PhysicsCheck(name, passed, value, "at rest", text + ".")
+
+
+def _reach(fluid: Fluid, weissenberg: float, deborah: float) -> PhysicsCheck:
+    name = "integrates beyond training"
+    grid = cycles(
+        fluid, [weissenberg * f for f in _BOX_FACTORS], [deborah * f for f in (0.5, 1.0, 2.0)]
+    )
+    finite = np.isfinite(grid.work).reshape(len(_BOX_FACTORS), 3)
+    whole = np.all(finite, axis=1)
+    reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
+    box = f"De from {0.5 * deborah:.3g} to {2.0 * deborah:.3g}"
+    if reached == len(_BOX_FACTORS):
+        limit = weissenberg * _BOX_FACTORS[-1]
+        where = f"Wi up to {limit:.3g}, {box}"
+        text = f"Oscillations stay finite in the whole grid tried, {where}."
+        return PhysicsCheck(name, True, limit, where, text)
+    failed = [grid.names[3 * i + j] for i, j in np.argwhere(~finite)]
+    limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
+    text = (
+        f"Oscillations stay finite up to Wi = {limit:.3g} for {box}; the stress runs away first in "
+        f"{failed[0]} (training reached Wi = {weissenberg:.3g}, De = {deborah:.3g})."
+    )
+    return PhysicsCheck(name, False, limit, failed[0], text)

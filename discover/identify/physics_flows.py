@@ -1,0 +1,148 @@
+"""The flows in which laws are checked, many at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.laws.multimode import Fluid
+from discover.protocols.shear import ShearProtocol, oscillatory_shear, stack_protocols
+from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.solve import solve_batch, solve_states_on_grid
+
+_CYCLES = 3
+_SAMPLES_A_CYCLE = 48
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """What happens to each mode along a set of flows.
+
+    Attributes
+    ----------
+    smallest_conformation
+        Smallest eigenvalue of I + σ/G over modes and samples, shape (runs,); nan where the law runs
+        away.
+    dissipation
+        Least σ:d − dF/dt over modes and samples, in units of G/λ of the mode, with F the energy
+        that Hookean dumbbells store; nan where undefined.
+    """
+
+    smallest_conformation: Float[np.ndarray, " runs"]
+    dissipation: Float[np.ndarray, " runs"]
+
+    @staticmethod
+    def lowest(values: Float[np.ndarray, " runs"]) -> tuple[int | None, float]:
+        """Return the run with the smallest value, and the value; None where there is none."""
+        if not np.any(np.isfinite(values)):
+            return None, float("nan")
+        run = int(np.nanargmin(values))
+        return run, float(values[run])
+
+
+def trajectories(fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid) -> Trajectories:
+    """Return conformation and dissipation of a fluid along flows.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    protocols, grids
+        Batched flows.
+    """
+    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, protocols, grids))
+    sampled = np.asarray(grids.sample_mask)[..., None]
+    whole = np.all(np.isfinite(states), axis=(1, 2, 3))
+    smallest = np.where(sampled, smallest, np.inf).min(axis=(1, 2))
+    # without a positive definite conformation the stored energy is not defined
+    defined = np.where(sampled, dissipation, np.inf).min(axis=(1, 2))
+    return Trajectories(
+        np.where(whole, smallest, np.nan), np.where(whole & (smallest > 0.0), defined, np.nan)
+    )
+
+
+@eqx.filter_jit
+def _along(fluid, protocols, grids):
+    def one(protocol, grid):
+        states = solve_states_on_grid(fluid, protocol, grid)
+        rates = jax.vmap(protocol.shear_rate)(grid.times[grid.sample_index])
+        at_mode = jax.vmap(partial(_energy, fluid.law), in_axes=(0, 0))
+        scaled = rates[:, None] * fluid.relaxation_time
+        smallest, dissipation = jax.vmap(at_mode)(states, scaled)
+        return states, smallest, dissipation
+
+    return jax.vmap(one)(protocols, grids)
+
+
+def _energy(law, stress, rate):
+    """Return the smallest eigenvalue of A = I + σ and the dissipation σ:d − dF/dt, dimensionless.
+
+    F = (tr A − ln det A − 3)/2, so that dF/dt = tr((I − A⁻¹)·dA/dt)/2   [Beris & Edwards 1994,
+    Thermodynamics of Flowing Systems; Wapperom & Hulsen 1998, J. Rheol. 42, 999].
+    """
+    change = law.stress_rate(stress, rate)
+    a11, a22, a33, a12 = 1.0 + stress[0], 1.0 + stress[1], 1.0 + stress[2], stress[3]
+    determinant = a11 * a22 - a12**2
+    middle, radius = 0.5 * (a11 + a22), jnp.hypot(0.5 * (a11 - a22), a12)
+    smallest = jnp.minimum(middle - radius, a33)
+    trace = change[0] + change[1] + change[2]
+    inverse = (a22 * change[0] + a11 * change[1] - 2.0 * a12 * change[3]) / determinant
+    stored = 0.5 * (trace - inverse - change[2] / a33)
+    return smallest, stress[3] * rate - stored
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Oscillations over a grid of Weissenberg and Deborah numbers.
+
+    Attributes
+    ----------
+    names
+        Of the flows, Weissenberg number first.
+    work
+        ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan where
+        the law runs away.
+    """
+
+    names: tuple[str, ...]
+    work: Float[np.ndarray, " flows"]
+
+
+def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
+    """Return three cycles of every pair of numbers, simulated together.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    weissenberg, deborah
+        Amplitudes of the shear rate and frequencies, times the mean relaxation time.
+    """
+    modulus, time = np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time)
+    scale = float(np.sum(modulus * time**2) / np.sum(modulus * time))
+    pairs = [(wi, de) for wi in weissenberg for de in deborah]
+    flows = [oscillatory_shear(wi / scale, de / scale) for wi, de in pairs]
+    times = [
+        np.linspace(0.0, _CYCLES * 2.0 * np.pi * scale / de, _CYCLES * _SAMPLES_A_CYCLE + 1)
+        for _, de in pairs
+    ]
+    grids = make_grids(flows, times, strain_step=0.2)
+    protocols = stack_protocols(flows)
+    stress = np.asarray(solve_batch(fluid, protocols, grids))[..., 3]
+    work = np.full(len(pairs), np.nan)
+    for i, ((wi, de), t) in enumerate(zip(pairs, times, strict=True)):
+        values = stress[i, : t.size]
+        if not np.all(np.isfinite(values)):
+            continue
+        last = slice(t.size - 1 - _SAMPLES_A_CYCLE, None)
+        rate = wi / scale * np.cos(de / scale * t[last])
+        largest = np.max(np.abs(values[last])) * wi / scale
+        # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
+        power = np.mean((values[last] * rate)[:-1])
+        work[i] = power / largest if largest > 0 else 0.0
+    return Cycles(tuple(f"oscillation at Wi = {wi:.3g}, De = {de:.3g}" for wi, de in pairs), work)

@@ -1,0 +1,210 @@
+"""Combinations of library terms that a shear experiment cannot see, found in exact arithmetic."""
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import gcd, lcm
+from typing import Any, Literal
+
+from discover.identify.exact_terms import PRIME, exact_terms
+from tensor_library.library import TermLibrary
+
+_LARGEST_INTEGER = 10**6
+_FRESH_STATES = 5
+_IDLE_ROWS = 24
+_COMPONENTS_SEEN = {"nothing": (0, 1, 2, 3), "33": (0, 1, 3)}
+
+Reach = Literal["nothing", "33"]
+
+
+@dataclass(frozen=True)
+class TermRelation:
+    """A combination of terms that vanishes in simple shear, or lives on σ33 only.
+
+    Attributes
+    ----------
+    coefficients
+        Term → whole number.
+    touches
+        ``"nothing"``: the combination is zero in every simple shear, so terms can be exchanged
+        freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets σ33 act
+        back, N2 does.
+    """
+
+    coefficients: Mapping[str, int]
+    touches: Reach
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        sum_of_terms = spell(self.coefficients)
+        if self.touches == "nothing":
+            return f"In simple shear {sum_of_terms} = 0 at every state, whatever the law."
+        return (
+            f"In simple shear {sum_of_terms} has a single entry, the 33: N2 sees it, σ12 and N1 do "
+            "not unless the law lets σ33 act back on them."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the relation as JSON-able values."""
+        return {
+            "coefficients": dict(self.coefficients),
+            "touches": self.touches,
+            "text": self.text,
+        }
+
+
+def spell(coefficients: Mapping[str, float]) -> str:
+    """Return a sum of terms as text, such as ``tr(sigma)*sigma − 2 gammadot``."""
+    text = ""
+    for name, value in coefficients.items():
+        size = f"{abs(value):.4g}"
+        sign = "−" if value < 0 else "+"
+        tensor = f"({name})" if "+" in name and "*" not in name else name
+        text += f" {sign} " if text else ("−" if value < 0 else "")
+        text += tensor if size == "1" else f"{size} {tensor}"
+    return text or "0"
+
+
+@lru_cache(maxsize=8)
+def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
+    """Return every linear relation among the terms of a library in simple shear.
+
+    The terms are evaluated at random integer states; the null space is found modulo a large
+    prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
+    count as independent of every polynomial.
+
+    Parameters
+    ----------
+    library
+        The terms.
+
+    Returns
+    -------
+    Relations that touch nothing first, then those that touch σ33 only and are not of the first
+    kind. Each is a basis vector of its null space, with as few terms as elimination gives.
+    """
+    generator = random.Random(0)
+    n = len(library)
+    states = [_random_state(generator, library) for _ in range(n + _FRESH_STATES)]
+    values = [exact_terms(library.terms, s, g, form_values=forms) for s, g, forms in states]
+    found: list[TermRelation] = []
+    known: list[list[int]] = []
+    for touches, components in _COMPONENTS_SEEN.items():
+        rows = [[value[i] for value in at_state] for at_state in values for i in components]
+        for vector in _null_space(rows, n):
+            if not _is_new(vector, known):
+                continue
+            known.append(vector)
+            found.append(
+                TermRelation(
+                    {library.names[i]: c for i, c in enumerate(vector) if c},
+                    touches,  # pyright: ignore[reportArgumentType]
+                )
+            )
+    return tuple(found)
+
+
+def _random_state(generator: random.Random, library: TermLibrary):
+    def number() -> int:
+        return generator.randint(-_LARGEST_INTEGER, _LARGEST_INTEGER)
+
+    return (
+        (number(), number(), number(), number()),
+        number(),
+        {form.name: number() for form in library.forms},
+    )
+
+
+def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], list[int]]:
+    """Return the reduced row echelon form modulo the prime, and its pivot columns."""
+    echelon: list[list[int]] = []
+    pivots: list[int] = []
+    idle = 0
+    for given in rows:
+        row = [value % PRIME for value in given]
+        for pivot, old in zip(pivots, echelon, strict=True):
+            if row[pivot]:
+                factor = row[pivot]
+                row = [(a - factor * b) % PRIME for a, b in zip(row, old, strict=True)]
+        lead = next((i for i, value in enumerate(row) if value), None)
+        if lead is None:
+            idle += 1
+            if idle > _IDLE_ROWS:
+                break  # rows come from random states: the rank is reached
+            continue
+        idle = 0
+        inverse = pow(row[lead], -1, PRIME)
+        row = [value * inverse % PRIME for value in row]
+        for k, old in enumerate(echelon):
+            if old[lead]:
+                factor = old[lead]
+                echelon[k] = [(a - factor * b) % PRIME for a, b in zip(old, row, strict=True)]
+        echelon.append(row)
+        pivots.append(lead)
+        if len(pivots) == n:
+            break
+    return echelon, pivots
+
+
+def _null_space(rows: Sequence[Sequence[int]], n: int) -> list[list[int]]:
+    # columns in reverse, so that a relation is solved for the later, more complex, terms
+    flipped = [list(reversed(row)) for row in rows]
+    echelon, pivots = _reduced(flipped, n)
+    vectors = []
+    for free in sorted(set(range(n)) - set(pivots)):
+        residues = [0] * n
+        residues[free] = 1
+        for pivot, row in zip(pivots, echelon, strict=True):
+            residues[pivot] = -row[free] % PRIME
+        fractions = [_rational(value) for value in reversed(residues)]
+        if any(value is None for value in fractions):
+            continue
+        exact = [value for value in fractions if value is not None]
+        scale = lcm(*(value.denominator for value in exact))
+        whole = [int(value * scale) for value in exact]
+        shared = gcd(*whole)
+        last = next(value for value in reversed(whole) if value)
+        whole = [value // shared * (1 if last > 0 else -1) for value in whole]
+        if all(sum(c * v for c, v in zip(whole, row, strict=True) if c) == 0 for row in rows):
+            vectors.append(whole)
+    return vectors
+
+
+def _rational(residue: int) -> Fraction | None:
+    """Return the small fraction with this residue   [Wang 1981, SYMSAC, 212]."""
+    limit = 2**29
+    old, new, old_t, new_t = PRIME, residue, 0, 1
+    while new > limit:
+        quotient = old // new
+        old, new = new, old - quotient * new
+        old_t, new_t = new_t, old_t - quotient * new_t
+    if new_t == 0 or abs(new_t) > limit:
+        return None
+    return Fraction(new, new_t)
+
+
+def _is_new(vector: Sequence[int], known: Sequence[Sequence[int]]) -> bool:
+    n = len(vector)
+    return len(_reduced([*known, vector], n)[1]) > len(known)
+
+
+def feels_33(library: TermLibrary) -> bool:
+    """Return whether σ33 acts on σ11, σ22 or σ12 through some term of a library.
+
+    If none does, what happens to σ33 is invisible to σ12 and to N1 in every simple shear. Exact,
+    as in `term_relations`; of several terms whose actions cancel, each still counts.
+    """
+    generator = random.Random(1)
+    for _ in range(_FRESH_STATES):
+        (s11, s22, s33, s12), rate, forms = _random_state(generator, library)
+        # a closed form is a function of tr σ, so it changes with σ33
+        other = {name: value + 1 for name, value in forms.items()}
+        here = exact_terms(library.terms, (s11, s22, s33, s12), rate, form_values=forms)
+        there = exact_terms(library.terms, (s11, s22, s33 + 1, s12), rate, form_values=other)
+        for a, b in zip(here, there, strict=True):
+            if (a[0], a[1], a[3]) != (b[0], b[1], b[3]):
+                return True
+    return False

@@ -1,0 +1,237 @@
+"""After a discovery: which of the laws that were tried the data cannot tell from the chosen one.
+
+The rule
+--------
+Of all laws that a search refitted, a law is a *rival* if it has no more terms than the chosen one
+and the data cannot tell the two apart at 5 % (`compare_residuals`), or if it has one term more,
+does not contain the chosen law and predicts every observation to integration error. The noise is
+not assumed: it is what the chosen law leaves. Rivals are refitted to the same tolerance as the
+chosen law before they are judged. Among laws that the data cannot tell apart the chosen one should
+be the simplest: fewest terms, then lowest complexity, then fewest invariants, then the order of the
+library; `RivalTable.simplest` says whether it is.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from discover.identify.evidence import LEVEL, Evidence, compare_residuals
+from discover.identify.lanes import LawTerms
+from discover.identify.relations import spell
+from discover.learners.tensor_sindy.refit import LANES, POLISHING, Fit, refit
+from discover.learners.tensor_sindy.report import covariance_table
+from discover.learners.tensor_sindy.search import SupportSearch
+
+MOST_RIVALS = 8
+
+_PROMISING = 1.25
+"""A screened misfit over the chosen one's beyond which a polished refit is not tried."""
+
+_MOST_POLISHED = 2 * LANES
+
+
+@dataclass(frozen=True)
+class FittedRival:
+    """A fitted law that the data cannot tell from the chosen one.
+
+    Attributes
+    ----------
+    law
+        Its terms, refitted.
+    misfit
+        Relative root-mean-square misfit.
+    difference
+        Relative root-mean-square difference of its predictions from the chosen law's.
+    evidence
+        The test that could not tell them apart.
+    simpler
+        Whether it comes before the chosen law in the order of simplicity.
+    covariance
+        Of its coefficients, then of its inner parameters; None where it was not computed.
+    """
+
+    law: LawTerms
+    misfit: float
+    difference: float
+    evidence: Evidence
+    simpler: bool = False
+    covariance: list[list[float]] | None = None
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        law = spell(self.law.coefficients)
+        if self.evidence.test == "tie":
+            return f"h = {law} predicts every observation as the chosen law does."
+        test = "Vuong's test" if self.evidence.test == "vuong" else "the likelihood-ratio test"
+        return (
+            f"h = {law} leaves a misfit of {self.misfit:.3g}, and {test} cannot tell it from the "
+            f"chosen law (p = {self.evidence.p_value:.2g}, "
+            f"{self.evidence.effective_samples:.0f} independent residuals)."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the rival as JSON-able values that `from_json` undoes."""
+        return {
+            "support": list(self.law.coefficients),
+            "coefficients": list(self.law.coefficients.values()),
+            "inner": dict(self.law.inner),
+            "misfit": self.misfit,
+            "difference": self.difference,
+            "exact": self.evidence.test == "tie",
+            "test": self.evidence.test,
+            "p_value": self.evidence.p_value,
+            "effective_samples": self.evidence.effective_samples,
+            "simpler": self.simpler,
+            "covariance": self.covariance,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class RivalTable:
+    """Every law met that the data cannot tell from the chosen one.
+
+    Attributes
+    ----------
+    rivals
+        Closest predictions first.
+    tested
+        How many laws were tested.
+    simplest
+        Whether the chosen law is the simplest of them all.
+    """
+
+    rivals: tuple[FittedRival, ...] = field(default_factory=tuple)
+    tested: int = 0
+    simplest: bool = True
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        if not self.rivals:
+            return (
+                f"Of {self.tested} other laws tried, none much larger, the data rule out every one "
+                f"at {100 * LEVEL:.0f} %."
+            )
+        ties = sum(r.evidence.test == "tie" for r in self.rivals)
+        text = (
+            f"Of {self.tested} other laws tried, the data do not rule out {len(self.rivals)} at "
+            f"{100 * LEVEL:.0f} %"
+        )
+        text += f", of which {ties} predict the same to integration error" if ties else ""
+        return text + (
+            "; the chosen law is the simplest of them." if self.simplest else "; one is simpler."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the table as JSON-able values."""
+        return {
+            "text": self.text,
+            "tested": self.tested,
+            "simplest": self.simplest,
+            "rivals": [rival.to_json() for rival in self.rivals],
+        }
+
+
+def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
+    """Return the rivals of a fit among all that a search refitted, by the rule of this module.
+
+    Parameters
+    ----------
+    search
+        The finished search.
+    chosen
+        The fit that was chosen.
+    """
+    problem = search.problem
+    seen = np.asarray(problem.weight).reshape(-1) > 0
+    rows, target = _in_time_order(problem, seen)
+    size = len(chosen.support)
+    fits = [
+        fit
+        for fit in search.fits.values()
+        if fit.support != chosen.support
+        and (
+            len(fit.support) <= size
+            or (
+                len(fit.support) == size + 1
+                and not set(chosen.support) <= set(fit.support)
+                and fit.misfit <= _PROMISING * chosen.misfit + 10.0 * search.floor
+            )
+        )
+    ]
+    limit = _PROMISING * max(chosen.misfit, search.floor)
+    near = sorted((f for f in fits if f.misfit <= limit), key=lambda f: f.misfit)[:_MOST_POLISHED]
+    polished = {f.support: f for f in _polish(search, near)}
+    residual = chosen.predicted[rows] - target
+    order = search.complexity(chosen.support)
+    found: list[FittedRival] = []
+    fitted: dict[int, Fit] = {}
+    for screened in fits:
+        fit = polished.get(screened.support, screened)
+        nested = size - len(fit.support) if set(fit.support) < set(chosen.support) else 0
+        evidence = compare_residuals(
+            residual,
+            fit.predicted[rows] - target,
+            problem.run_of_row[rows],
+            nested,
+            search.floor,
+        )
+        if evidence.told_apart or (len(fit.support) > size and evidence.test != "tie"):
+            continue
+        found.append(
+            FittedRival(
+                _terms(search, fit),
+                fit.misfit,
+                float(np.linalg.norm(fit.predicted - chosen.predicted)),
+                evidence,
+                search.complexity(fit.support) < order,
+            )
+        )
+        fitted[id(found[-1])] = fit
+    found.sort(key=lambda rival: rival.difference)
+    # the rest is never shown
+    found[:MOST_RIVALS] = [
+        replace(rival, covariance=covariance_table(search, fitted[id(rival)]))
+        for rival in found[:MOST_RIVALS]
+    ]
+    return RivalTable(tuple(found), len(fits), not any(rival.simpler for rival in found))
+
+
+def _in_time_order(problem, seen):
+    """Return the observed rows, kind after kind so that neighbours are neighbours in time."""
+    shape = problem.target.shape
+    index = np.arange(int(np.prod(shape))).reshape(shape).transpose(0, 2, 1).reshape(-1)
+    rows = index[seen[index]]
+    return rows, np.asarray(problem.weight * problem.target).reshape(-1)[rows]
+
+
+def _polish(search: SupportSearch, fits: list[Fit]) -> list[Fit]:
+    if not fits:
+        return []
+    again = refit(
+        search.problem,
+        [fit.support for fit in fits],
+        [(fit.dense(search.n_terms), fit.inner) for fit in fits],
+        search.scale,
+        max(search.slots, max(len(fit.support) for fit in fits)),
+        tolerance=POLISHING,
+    )
+    return [new if new.misfit <= old.misfit else old for new, old in zip(again, fits, strict=True)]
+
+
+def _terms(search: SupportSearch, fit: Fit) -> LawTerms:
+    library = search.problem.library
+    used = {library.terms[i].closed_form for i in fit.support}
+    inner: Mapping[str, float] = {
+        form.inner_name: float(fit.inner[i])
+        for i, form in enumerate(library.forms)
+        if form.name in used
+    }
+    coefficients = {
+        library.names[i]: float(c) for i, c in zip(fit.support, fit.coefficients, strict=True)
+    }
+    return LawTerms(coefficients, inner)

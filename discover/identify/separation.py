@@ -1,0 +1,133 @@
+"""Which experiment would tell two laws apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from discover.identify.histories import observe_differences, random_histories
+from discover.identify.lanes import LawTerms, extensional_stresses, shear_stresses
+from discover.laws.base import AbstractConstitutiveLaw
+from tensor_library.library import TermLibrary
+
+_EXTENSION_RATES = (0.1, 0.3, 1.0)
+_DURATION = 8.0
+_QUANTITIES = ("sigma12", "N1", "N2")
+_VISIBLE = 1e-4
+
+_EXTENSION_QUANTITY = {"uniaxial": "σ11 − σ22", "planar": "σ22 − σ33"}
+
+
+@dataclass(frozen=True)
+class Separation:
+    """An experiment in which two laws part.
+
+    Attributes
+    ----------
+    flow
+        The flow in words, rates scaled by the relaxation time.
+    quantity
+        What to measure in it.
+    difference
+        Root-mean-square difference, relative to the reference's N1 for N2 in shear, to its σ11 −
+        σ22 in extension, and to the quantity itself otherwise; infinite where the stress of one
+        law grows without bound and that of the other does not.
+    """
+
+    flow: str
+    quantity: str
+    difference: float
+
+    @property
+    def text(self) -> str:
+        """The experiment in a few words."""
+        size = (
+            "one grows without bound"
+            if not np.isfinite(self.difference)
+            else f"{100.0 * self.difference:.2g} %"
+        )
+        return f"{self.quantity} in {self.flow} ({size})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the experiment as JSON-able values."""
+        return {"flow": self.flow, "quantity": self.quantity, "difference": self.difference}
+
+
+def separations(
+    library: TermLibrary,
+    reference: LawTerms,
+    others: Sequence[LawTerms],
+    base: AbstractConstitutiveLaw | None = None,
+) -> list[tuple[Separation, ...]]:
+    """Return for each law the flows that tell it from the reference, best in each quantity.
+
+    Oscillations and start-ups of shear, and the start of uniaxial and planar extension. A shear
+    quantity comes first where one differs, as it needs the fewest new instruments.
+
+    Parameters
+    ----------
+    library, reference, others, base
+        As in `differences`.
+    """
+    laws = [reference, *others]
+    flows = random_histories()
+    stresses = shear_stresses(library, laws, flows.protocols, flows.grids, base)
+    names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
+    times = np.linspace(0.0, _DURATION, 161)
+    rates = np.asarray(_EXTENSION_RATES)
+    extension = extensional_stresses(library, laws, rates, times, base)
+    return [
+        _best(
+            [
+                *_in_shear(names, shear[0], shear[i]),
+                *_in_extension(rates, extension[0], extension[i]),
+            ]
+        )
+        for i in range(1, len(laws))
+    ]
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float | None:
+    if not np.all(np.isfinite(a)):
+        return None
+    if not np.all(np.isfinite(b)):
+        return np.inf
+    return _rms(a - b) / scale if scale > 0 else None
+
+
+def _in_shear(names, reference, other):
+    for run, name in enumerate(names):
+        for kind, quantity in enumerate(_QUANTITIES):
+            scale = _rms(reference[run, :, 1 if kind == 2 else kind])
+            value = _relative(reference[run, :, kind], other[run, :, kind], scale)
+            if value is not None:
+                yield Separation(name, quantity, value)
+
+
+def _in_extension(rates, reference, other):
+    for kind, name in enumerate(("uniaxial", "planar")):
+        for i, rate in enumerate(rates):
+            a, b = reference[kind, i], other[kind, i]
+            scale = _rms(a[:, 0] - a[:, 1])
+            first, second = (0, 1) if name == "uniaxial" else (1, 2)
+            value = _relative(a[:, first] - a[:, second], b[:, first] - b[:, second], scale)
+            if value is not None:
+                flow = f"{name} extension at a rate of {rate:g}"
+                yield Separation(flow, _EXTENSION_QUANTITY[name], value)
+
+
+def _best(found: list[Separation]) -> tuple[Separation, ...]:
+    """Return the largest difference in shear of each quantity and in each kind of extension."""
+    best: dict[str, Separation] = {}
+    for one in found:
+        if one.difference < _VISIBLE:
+            continue
+        known = best.get(one.quantity)
+        if known is None or one.difference > known.difference:
+            best[one.quantity] = one
+    return tuple(best.values())

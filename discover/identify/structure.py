@@ -1,0 +1,353 @@
+"""What an experiment can determine of a library, before any fit: no data are used, only protocols.
+
+At a nominal law the sensitivities of σ12 to every coefficient of the library are computed by the
+same variational equations that fits use. Their null space holds the changes of the law that the
+experiment cannot see; its image in N1 and N2 says whether those follow from σ12. Everything is to
+first order around the law; whether a direction stays invisible at finite size is decided in exact
+arithmetic where the law is a polynomial.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.run import ShearRun
+from discover.identify.directions import Direction, weak_directions
+from discover.identify.exact_series import compare_series
+from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
+from discover.identify.lanes import LawTerms, dense, joint_library
+from discover.identify.relations import TermRelation, spell, term_relations
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.learners.tensor_sindy.problem import TrajectoryProblem, make_problem
+from discover.learners.tensor_sindy.sensitivities import linearise
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+Verdict = Literal["measured", "determined", "assumed", "undetermined"]
+
+_CHANGED = 1e-6
+"""Relative change of a quantity per unit of a direction that counts as a change."""
+
+_ROWS = 400
+"""Samples of each quantity that enter a null space; more say nothing new of it."""
+
+_FINITE_STEP = Fraction(1, 10)
+_FINITE_ORDER = 8
+_NORMAL_STRESSES = ("N1", "N2")
+
+NOMINAL: Mapping[str, LawTerms] = {
+    "with slip": LawTerms({"sigma.gammadot+gammadot.sigma": 0.2}),
+    "with quadratic relaxation": LawTerms({"sigma.sigma": 0.2}),
+    "with relaxation that grows with the trace": LawTerms({"tr(sigma)*sigma": 0.3}),
+}
+"""Nominal laws of ordinary strength: Johnson–Segalman, Giesekus and linear PTT, beyond UCM."""
+
+
+@dataclass(frozen=True)
+class QuantityVerdict:
+    """Whether the observed stresses determine a normal stress difference.
+
+    Attributes
+    ----------
+    quantity
+        ``"N1"`` or ``"N2"``.
+    verdict
+        ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
+        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
+        of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
+        form of the law; ``"determined"`` otherwise, within the library.
+    text
+        The verdict for a reader.
+    """
+
+    quantity: str
+    verdict: Verdict
+    text: str
+
+    @property
+    def open(self) -> bool:
+        """Whether the observed stresses leave the quantity open."""
+        return self.verdict in ("undetermined", "assumed")
+
+
+@dataclass(frozen=True)
+class LawStructure:
+    """What the experiment can determine around one nominal law.
+
+    Attributes
+    ----------
+    name
+        Of the law.
+    law
+        Its terms beyond the known part.
+    hidden
+        What σ12 feels of the normal stresses.
+    exact, weak
+        Directions of which the experiment sees nothing, and the weakest of the others.
+    quantities
+        Verdicts on N1 and N2 from what is observed.
+    n_exact_with_N1
+        Number of exact directions that would be left if N1 were measured as well.
+    N2_with_N1
+        Verdict on N2 if N1 were measured as well.
+    """
+
+    name: str
+    law: LawTerms
+    hidden: HiddenStresses
+    exact: tuple[Direction, ...]
+    weak: tuple[Direction, ...]
+    quantities: tuple[QuantityVerdict, ...]
+    n_exact_with_N1: int
+    N2_with_N1: Verdict
+
+    @property
+    def text(self) -> str:
+        """The verdicts, one sentence each."""
+        return " ".join(q.text for q in self.quantities)
+
+    def verdict(self, quantity: str) -> Verdict:
+        """Return the verdict on N1 or N2."""
+        return next(q.verdict for q in self.quantities if q.quantity == quantity)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the structure as JSON-able values."""
+        return {
+            "law": self.name,
+            "terms": dict(self.law.coefficients),
+            "hidden_stresses": self.hidden.to_json(),
+            "unseen_directions": [d.to_json() for d in self.exact],
+            "weak_directions": [d.to_json() for d in self.weak],
+            "quantities": [
+                {"quantity": q.quantity, "verdict": q.verdict, "text": q.text}
+                for q in self.quantities
+            ],
+            "unseen_directions_with_N1": self.n_exact_with_N1,
+            "N2_with_N1": self.N2_with_N1,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What an experiment can determine of a library.
+
+    Attributes
+    ----------
+    laws
+        By nominal law; the first is the known part alone.
+    relations
+        Exact relations among terms in shear, at any law.
+    n_terms
+        Size of the library.
+    """
+
+    laws: tuple[LawStructure, ...]
+    relations: tuple[TermRelation, ...]
+    n_terms: int
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        counts = ", ".join(f"{len(law.exact)} at {law.name}" for law in self.laws)
+        return (
+            f"Of the {self.n_terms} coefficients of the library these flows leave unseen, however "
+            f"small the noise, this many combinations: {counts}."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the structure as ``comparison.json`` holds it."""
+        return {
+            "text": self.text,
+            "n_terms": self.n_terms,
+            "relations": [relation.to_json() for relation in self.relations],
+            "laws": [law.to_json() for law in self.laws],
+        }
+
+
+def analyse_structure(
+    runs: Sequence[ShearRun],
+    library: TermLibrary,
+    base: AbstractConstitutiveLaw | None = None,
+    nominal: Mapping[str, LawTerms] | None = None,
+    modulus: Any = 1.0,
+    relaxation_time: Any = 1.0,
+    solvent_viscosity: float = 0.0,
+    use_normal_stresses: bool = False,
+    strain_step: float = 0.2,
+) -> Structure:
+    """Return what shear flows can determine of a library's coefficients.
+
+    Parameters
+    ----------
+    runs
+        Their protocols and sampling times; the stresses are not looked at, except that with
+        `use_normal_stresses` a run must hold N1 or N2 for it to count as measured.
+    library
+        Candidate terms.
+    base
+        Known part; by default UCM.
+    nominal
+        Laws around which to look besides the known part; by default those of `NOMINAL` whose
+        terms the library holds.
+    modulus, relaxation_time, solvent_viscosity
+        As in `make_problem`.
+    use_normal_stresses
+        Whether N1 and N2, where runs hold them, are observed too.
+    strain_step
+        Of the integration; that of the fit, so that both share a compiled program.
+    """
+    base = UpperConvectedMaxwell() if base is None else base
+    if nominal is None:
+        nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
+    library = joint_library(library, list(nominal.values()))
+    problem = make_problem(
+        runs,
+        library,
+        modulus,
+        relaxation_time,
+        solvent_viscosity,
+        base,
+        use_normal_stresses=use_normal_stresses,
+        strain_step=strain_step,
+    )
+    seen = np.any(np.asarray(problem.weight) > 0, axis=(0, 1))
+    known = "the known part alone"
+    laws = {known: LawTerms({}), **nominal}
+    everywhere = _unit_weights(problem)
+    found = []
+    for name, law in laws.items():
+        one = _at(everywhere, library, base, name, law, seen)
+        if one is not None:
+            found.append(one)
+    return Structure(tuple(found), term_relations(library), len(library))
+
+
+def _unit_weights(problem: TrajectoryProblem) -> TrajectoryProblem:
+    """Return the problem with every sample of σ12, N1 and N2 observed with weight one."""
+    sampled = jnp.isfinite(problem.order_of_time)[..., None]
+    weight = jnp.broadcast_to(jnp.where(sampled, 1.0, 0.0), problem.weight.shape)
+    return eqx.tree_at(
+        lambda p: (p.target, p.weight), problem, (jnp.zeros_like(problem.target), weight)
+    )
+
+
+def _at(problem, library, base, name, law, seen) -> LawStructure | None:
+    """Return the structure at one law, or None where it runs away in these flows."""
+    coefficients, inner = dense(library, law)
+    residual, columns = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
+    shape = problem.target.shape
+    stresses = -np.asarray(residual).reshape(shape)
+    sensitivity = np.asarray(columns).reshape(*shape, -1)[..., : len(library)]
+    if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
+        return None
+    samples = np.asarray(problem.weight)[..., 0] > 0
+    # relative to the root-mean-square of each run; N2 to that of N1
+    scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
+    scale[:, 2] = scale[:, 1]
+    total = samples.sum()
+    blocks: dict[str, Float[np.ndarray, "rows n"]] = {}
+    for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
+        sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
+        block = sensitivity[:, :, kind] / sizes
+        rows = block[samples][:: max(1, total // _ROWS)]
+        blocks[quantity] = rows / np.sqrt(len(rows))
+    observed = [q for q, is_seen in zip(blocks, seen, strict=True) if is_seen]
+    exact, weak = _directions(library, blocks, observed, int(total))
+    exact = [_finite(d, law, base) for d in exact]
+    with_n1 = list(dict.fromkeys([*observed, "N1"]))
+    left, _ = _directions(library, blocks, with_n1, int(total))
+    hidden = hidden_stresses(
+        LibraryExpansion(
+            coefficients=jnp.asarray(coefficients),
+            inner=jnp.asarray(inner),
+            library=library,
+            linear_relaxation=base.linear_relaxation,
+            base=base,
+        )
+    )
+    verdicts = tuple(
+        _verdict(q, observed, exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
+    )
+    n2_with_n1: Verdict = "undetermined" if _changing(left, "N2") else "determined"
+    if "N2" in observed:
+        n2_with_n1 = "measured"
+    elif n2_with_n1 == "undetermined" and verdicts[1].verdict == "undetermined":
+        text = verdicts[1].text + " Measuring N1 as well would not change this."
+        verdicts = (verdicts[0], replace(verdicts[1], text=text))
+    return LawStructure(
+        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1
+    )
+
+
+def _directions(library, blocks, observed, total):
+    stacked = np.concatenate([blocks[q] for q in observed])
+    # rows beyond the number of unknowns say nothing more to a null space
+    reduced = np.asarray(np.linalg.qr(stacked, mode="r"))
+    return weak_directions(library.names, reduced, blocks, total * len(observed))
+
+
+def _changing(directions: Sequence[Direction], quantity: str) -> list[Direction]:
+    changing = [d for d in directions if d.changes[quantity] > _CHANGED]
+    return sorted(changing, key=lambda d: (not d.at_any_size, len(d.coefficients)))
+
+
+def _finite(direction: Direction, law: LawTerms, base) -> Direction:
+    """Say whether a finite step along a direction is invisible too, where that can be decided."""
+    names = [*law.coefficients, *direction.coefficients]
+    polynomial = all(parse_term(name).closed_form is None for name in names)
+    if not polynomial or not isinstance(base, UpperConvectedMaxwell):
+        return direction
+    here = {n: Fraction(v).limit_denominator(10**5) for n, v in law.coefficients.items()}
+    there = dict(here)
+    for name, value in direction.coefficients.items():
+        step = _FINITE_STEP * Fraction(value).limit_denominator(1000)
+        there[name] = there.get(name, Fraction(0)) + step
+    agreement = compare_series(here, there, _FINITE_ORDER, base.linear_relaxation)
+    return replace(direction, at_any_size=agreement.sigma12 is None)
+
+
+def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdict:
+    if quantity in observed:
+        return QuantityVerdict(quantity, "measured", f"{quantity} is measured.")
+    what = " and ".join("σ12" if q == "sigma12" else q for q in observed)
+    examples = _changing(exact, quantity)
+    unfelt = ""
+    if observed == ["sigma12"] and hidden.leaves_no_trace(quantity):
+        unfelt = (
+            f" {hidden.text} So {quantity} follows from the convected derivative and the form of "
+            "the law that were assumed, not from the data."
+        )
+    if examples:
+        size = "" if examples[0].at_any_size else ", to first order"
+        text = (
+            f"{quantity} is not determined by {what}: {len(examples[0].coefficients)} terms more, "
+            f"h = {spell(examples[0].coefficients)} in any amount, change {quantity} and leave "
+            f"{what} as it is{size}.{unfelt}"
+        )
+        return QuantityVerdict(quantity, "undetermined", text)
+    if unfelt:
+        text = (
+            f"No combination of the {n_terms} terms changes {quantity} and leaves {what} as it "
+            f"is, but:{unfelt}"
+        )
+        return QuantityVerdict(quantity, "assumed", text)
+    text = (
+        f"{quantity} is determined by {what} within this library of {n_terms} terms and the "
+        "convected derivative that was assumed"
+    )
+    feeble = [d for d in weak if d.changes[quantity] > 0.1]
+    if feeble:
+        limit = min(d.noise_for_tenth for d in feeble)
+        text += (
+            f"; a library of which every term were free would need noise below {100 * limit:.2g} %"
+        )
+    return QuantityVerdict(quantity, "determined", text + ".")

@@ -1,0 +1,136 @@
+"""Checks of physical soundness against what is known analytically."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.identify.physics import check_physics
+from discover.identify.steady_states import (
+    is_stable,
+    is_steady,
+    steady_shear,
+    steady_uniaxial_extension,
+)
+from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
+from discover.protocols import oscillatory_shear, stack_protocols
+from discover.simulate import make_grids
+from tensor_library import TermLibrary, parse_term
+
+FLOWS = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
+FLOW_CURVE = "flow curve monotonic"
+EXTENSION = "steady extension bounded"
+TERMS = ("sigma", "gammadot", "sigma.sigma", "tr(sigma)*sigma")
+
+
+def expansion(**coefficients):
+    """One structure for every library law here, so that they share programs."""
+    library = TermLibrary(tuple(parse_term(name) for name in TERMS))
+    values = [coefficients.get(key, 0.0) for key in ("linear", "viscous", "quadratic", "trace")]
+    return LibraryExpansion(jnp.array(values), jnp.zeros(0), library)
+
+
+def report(law, solvent=0.0):
+    flows = list(FLOWS.values())
+    grids = make_grids(flows, [np.linspace(0, 10, 81)] * 2)
+    fluid = Fluid(law, 1.0, 1.0, solvent)
+    return check_physics(fluid, stack_protocols(flows), grids, list(FLOWS), 2.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def maxwell():
+    return report(UpperConvectedMaxwell())
+
+
+@pytest.fixture(scope="module")
+def slip():
+    return report(JohnsonSegalman(0.4))
+
+
+def test_maxwell_is_sound_except_in_extension_beyond_half(maxwell):
+    failed = {c.name for c in maxwell.checks if not c.passed}
+    assert failed == {EXTENSION}
+    # σ11 = 2ε̇/(1 − 2ε̇); the last step is resolved to 1/60 of a grid step of 3 %
+    assert maxwell[EXTENSION].value == pytest.approx(0.5, rel=1e-3)
+
+
+def test_slip_without_solvent_bands_from_the_rate_of_its_maximum(slip):
+    # σ12 = γ̇/(1 + ξ(2 − ξ)γ̇²), largest at 1/√0.64 = 1.25; the grid is 4 % fine
+    assert slip[FLOW_CURVE].passed is False
+    assert slip[FLOW_CURVE].value == pytest.approx(1.25, rel=0.04)
+    assert "within the rates of training" in slip[FLOW_CURVE].text
+
+
+def test_slip_stretches_without_bound_beyond_its_own_rate(slip):
+    # 2(1 − ξ)ε̇ = 1
+    assert slip[EXTENSION].value == pytest.approx(1 / 1.2, rel=1e-3)
+
+
+def test_enough_solvent_makes_slip_monotonic():
+    # dσ/dγ̇ is least at −1/8 of the polymer's viscosity
+    assert report(JohnsonSegalman(0.4), solvent=0.126)[FLOW_CURVE].passed
+    assert report(JohnsonSegalman(0.4), solvent=0.120)[FLOW_CURVE].passed is False
+
+
+@pytest.mark.parametrize(("mobility", "monotonic"), [(0.2, True), (0.45, True), (0.6, False)])
+def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic):
+    checks = report(Giesekus(mobility))
+    assert checks[FLOW_CURVE].passed is monotonic
+    assert checks[EXTENSION].passed
+
+
+def test_steady_slip_is_the_analytic_one():
+    rates = np.geomspace(0.01, 10, 121)
+    stress, jacobian, residual = (
+        np.asarray(part) for part in steady_shear(JohnsonSegalman(0.4), jnp.asarray(rates))
+    )
+    assert is_steady(residual).all()
+    np.testing.assert_allclose(stress[:, 3], rates / (1 + 0.64 * rates**2), rtol=1e-9)
+    # homogeneous shear itself is stable even where the curve falls
+    assert is_stable(jacobian).all()
+
+
+def test_steady_maxwell_extension_is_analytic_until_it_is_unstable():
+    rates = np.array([0.1, 0.3, 0.45, 0.55])
+    stress, jacobian, _ = steady_uniaxial_extension(UpperConvectedMaxwell(), jnp.asarray(rates))
+    np.testing.assert_allclose(np.asarray(stress)[:, 0], 2 * rates / (1 - 2 * rates), rtol=1e-9)
+    assert is_stable(np.asarray(jacobian)).tolist() == [True, True, True, False]
+
+
+def test_a_linear_term_is_seen_in_the_small_strain_limit():
+    assert report(expansion(quadratic=0.2))["small-strain limit"].passed
+    changed = report(expansion(linear=0.1))["small-strain limit"]
+    # 1/(iω + 1.1) against 1/(iω + 1): 0.1/1.1 at vanishing frequency
+    assert changed.passed is False
+    assert changed.value == pytest.approx(0.1 / 1.1, rel=1e-3)
+
+
+def test_a_law_that_feeds_itself_is_caught():
+    # h = −1.5 σ: stress grows by itself
+    checks = report(expansion(linear=-1.5))
+    # where the conformation tensor loses definiteness the stored energy is not defined
+    names = ("dissipation non-negative", "conformation tensor positive definite")
+    assert False in [checks[name].passed for name in names]
+    assert checks[EXTENSION].passed is False
+
+
+def test_negative_viscosity_does_negative_work():
+    # h = 2 γ̇: the elastic response has the wrong sign
+    checks = report(expansion(viscous=2.0))
+    assert checks["work over a cycle non-negative"].passed is False
+
+
+def test_a_law_that_runs_away_beyond_training_has_an_end_of_its_box():
+    # −0.1 tr(σ)σ thins the relaxation until it turns into growth
+    checks = report(expansion(trace=-0.1))
+    reach = checks["integrates beyond training"]
+    assert reach.passed is False
+    assert 0.0 <= reach.value < 10.0
+    assert "runs away" in reach.text
+
+
+def test_the_report_is_plain_json(maxwell):
+    content = json.loads(json.dumps(maxwell.to_json(), allow_nan=False))
+    assert {c["name"] for c in content["checks"]} >= {FLOW_CURVE, EXTENSION}
+    assert EXTENSION in content["text"]

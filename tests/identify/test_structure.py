@@ -1,0 +1,133 @@
+"""What an experiment can determine, before any fit."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discover.identify.directions import weak_directions
+from discover.identify.lanes import LawTerms
+from discover.identify.structure import analyse_structure
+from discover.protocols import oscillatory_shear
+from discover.simulate import synthetic_dataset
+from tensor_library import TermLibrary, build_library, parse_term
+
+SLIP = "sigma.gammadot+gammadot.sigma"
+FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
+LIBRARY = TermLibrary(
+    (
+        *build_library().terms,
+        *(
+            parse_term(name)
+            for name in (
+                "tr(sigma)*sigma",
+                "tr(sigma)*gammadot",
+                "tr(sigma.gammadot)*I",
+                "tr(gammadot.gammadot)*I",
+                "tr(sigma.gammadot)*gammadot",
+            )
+        ),
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return list(synthetic_dataset("ucm", {}, protocol=FLOWS, n_samples=33, duration=6.0))
+
+
+@pytest.fixture(scope="module")
+def structure(runs):
+    return analyse_structure(runs, LIBRARY)
+
+
+def at(structure, fragment):
+    return next(law for law in structure.laws if fragment in law.name)
+
+
+def test_in_maxwell_n1_follows_from_the_assumed_derivative_and_not_from_data(structure):
+    law = at(structure, "known part")
+    assert law.verdict("N1") == "undetermined"
+    assert "convected derivative" in law.text
+    assert "not from the data" in law.text
+    # σ11 alone: it enters no equation that σ12 feels
+    supports = [set(d.coefficients) for d in law.exact if d.changes["N1"] > 1e-6]
+    assert supports
+
+
+def test_with_slip_n2_follows_from_neither_shear_stress_nor_n1(structure):
+    law = at(structure, "slip")
+    assert law.verdict("N2") == "undetermined"
+    assert law.N2_with_N1 == "undetermined"
+    assert "Measuring N1 as well would not change this" in law.text
+    tangents = [set(d.coefficients) for d in law.exact]
+    # d/dξ of the twins: (σγ̇ + γ̇σ)/2 against (1 − ξ) tr(σ) γ̇ ... both unseen to first order
+    assert {SLIP, "tr(sigma)*gammadot"} in tangents
+    curved = next(d for d in law.exact if set(d.coefficients) == {SLIP, "tr(sigma)*gammadot"})
+    assert curved.at_any_size is False  # c = ξ(1 − ξ/2) is a curve
+
+
+def test_the_tangent_of_the_twins_has_the_slope_of_their_formula(runs):
+    structure = analyse_structure(
+        runs, LIBRARY, nominal={"twin": LawTerms({"tr(sigma)*gammadot": 0.32})}
+    )
+    law = at(structure, "twin")
+    # both single-term twins have the coefficient 0.32: their difference is unseen at any size
+    pair = next(
+        d
+        for d in law.exact
+        if set(d.coefficients) == {"tr(sigma)*gammadot", "tr(sigma.gammadot)*I"}
+        or "tr(sigma.gammadot)*I" in d.coefficients
+    )
+    assert pair.changes["sigma12"] < 1e-10
+
+
+def test_quadratic_relaxation_determines_n1_but_not_n2(structure):
+    # negative control for N1
+    law = at(structure, "quadratic")
+    assert law.verdict("N1") == "determined"
+    assert law.verdict("N2") == "undetermined"
+    assert all(d.changes["N1"] < 1e-8 for d in law.exact)
+
+
+def test_unseen_directions_are_unseen_and_the_pair_on_33_is_among_them(structure):
+    for law in structure.laws[:3]:
+        assert all(d.changes["sigma12"] < 1e-10 for d in law.exact)  # rounding
+        assert all(d.changes["sigma12"] > 1e-10 for d in law.weak)
+        pairs = [set(d.coefficients) for d in law.exact if d.at_any_size]
+        assert {"gammadot.gammadot", "tr(gammadot.gammadot)*I"} in pairs
+
+
+def test_measured_normal_stresses_are_not_called_undetermined(runs):
+    with_both = [
+        replace(
+            run,
+            first_normal_stress_difference=np.ones_like(run.time),
+            second_normal_stress_difference=np.ones_like(run.time),
+        )
+        for run in runs
+    ]
+    structure = analyse_structure(with_both, LIBRARY, nominal={}, use_normal_stresses=True)
+    assert [q.verdict for q in structure.laws[0].quantities] == ["measured", "measured"]
+
+
+def test_the_structure_is_plain_json_and_counts(structure):
+    content = json.loads(json.dumps(structure.to_json(), allow_nan=False))
+    assert content["n_terms"] == len(LIBRARY)
+    assert str(len(structure.laws[0].exact)) in content["text"]
+
+
+def test_directions_of_a_small_known_matrix():
+    # a + b is seen, a − b is not; c is seen weakly
+    observed = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1e-3]])
+    blocks = {"sigma12": observed, "N1": np.array([[1.0, 0.0, 0.0]]), "N2": np.zeros((1, 3))}
+    exact, weak = weak_directions(("a", "b", "c"), observed, blocks, n_observations=100)
+    assert len(exact) == 1
+    assert exact[0].coefficients == pytest.approx({"a": -1.0, "b": 1.0}) or exact[
+        0
+    ].coefficients == pytest.approx({"a": 1.0, "b": -1.0})
+    assert exact[0].changes["N1"] == pytest.approx(1.0)
+    lone = next(d for d in weak if "c" in d.coefficients)
+    # standard error noise/(√100 · 1e-3) is 0.1 at noise 1e-3
+    assert lone.noise_for_tenth == pytest.approx(1e-3)

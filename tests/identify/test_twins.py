@@ -1,0 +1,162 @@
+"""Twins checked in random histories, and what would separate them."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.identify.fitted_twins import fit_twins
+from discover.identify.hidden_stresses import hidden_stresses
+from discover.identify.histories import SAME, differences, random_histories
+from discover.identify.lanes import LawTerms, extensional_stresses
+from discover.identify.separation import separations
+from discover.identify.twins import find_twins, same_in_every_shear
+from discover.laws import (
+    ExponentialPhanThienTanner,
+    Giesekus,
+    JohnsonSegalman,
+    LinearPhanThienTanner,
+    UpperConvectedMaxwell,
+)
+from discover.simulate import simulate_homogeneous_flow
+from tensor_library import TermLibrary, build_library, parse_term, uniaxial_extension
+
+SLIP = "sigma.gammadot+gammadot.sigma"
+PTT = "(exp(epsilon*tr(sigma))-1)*sigma"
+# one library for the whole file: one compilation of each program
+LIBRARY = TermLibrary(
+    tuple(
+        dict.fromkeys(
+            (
+                *build_library().terms,
+                *(
+                    parse_term(name)
+                    for name in (
+                        "tr(sigma)*sigma",
+                        "tr(sigma)*gammadot",
+                        "tr(sigma.gammadot)*I",
+                        "tr(gammadot.gammadot)*I",
+                        PTT,
+                    )
+                ),
+            )
+        )
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def slip_twins():
+    return find_twins(LIBRARY, LawTerms({SLIP: 0.2}))
+
+
+def test_both_twins_of_johnson_segalman_are_found_and_proved(slip_twins):
+    single = {next(iter(t.law.coefficients)): t for t in slip_twins if t.proof == "series"}
+    assert set(single) == {"tr(sigma)*gammadot", "tr(sigma.gammadot)*I"}
+    for name, twin in single.items():
+        assert twin.law.coefficients[name] == pytest.approx(0.32, abs=1e-12)
+        assert twin.keeps_N1
+        assert twin.difference.sigma12 < 1e-12  # a linear change commutes with Runge–Kutta steps
+        assert pytest.approx(0.2, rel=1e-6) == twin.difference.N2  # N2 = −(ξ/2) N1 against none
+        assert any(s.quantity == "N2" for s in twin.separated_by)
+        assert any("extension" in s.flow for s in twin.separated_by)
+
+
+def test_a_pair_on_33_is_a_twin_of_a_law_that_does_not_feel_33(slip_twins):
+    pair = next(t for t in slip_twins if "tr(gammadot.gammadot)*I" in t.law.coefficients)
+    assert pair.proof == "relation"
+    assert pair.keeps_N1
+    assert pair.difference.N2 > 0.01
+    json.dumps([t.to_json() for t in slip_twins], allow_nan=False)
+
+
+def test_a_fitted_coefficient_has_its_twin_too():
+    found = find_twins(LIBRARY, LawTerms({SLIP: 0.199512}))
+    twin = next(t for t in found if set(t.law.coefficients) == {"tr(sigma)*gammadot"})
+    slip = 2 * 0.199512
+    assert twin.law.coefficients["tr(sigma)*gammadot"] == pytest.approx(
+        slip * (1 - slip / 2), abs=1e-5
+    )  # the fraction nearest to the coefficient with a denominator up to 1e5
+    assert twin.difference.sigma12 < SAME
+
+
+def test_one_term_of_two_can_be_exchanged():
+    law = LawTerms({SLIP: 0.2, "gammadot.gammadot": 0.05})
+    found = find_twins(LIBRARY, law)
+    supports = [set(t.law.coefficients) for t in found]
+    # the trace of the rate squared shifts σ33 only where σ33 is not felt
+    assert {SLIP, "tr(gammadot.gammadot)*I"} in supports
+
+
+@pytest.mark.parametrize("law", [{"tr(sigma)*sigma": 0.4}, {PTT: 1.0}])
+def test_laws_that_feel_the_trace_have_no_small_twin(law):
+    # negative control: σ33 acts back through tr σ, and no other term makes up for it
+    assert find_twins(LIBRARY, LawTerms(law, {"epsilon": 0.25})) == []
+
+
+def test_giesekus_is_no_twin_of_maxwell_at_any_mobility_worth_the_name():
+    others = [LawTerms({"sigma.sigma": a}) for a in (0.001, 0.2)]
+    apart = differences(LIBRARY, LawTerms({}), others)
+    assert all(d.sigma12 > SAME for d in apart)
+    assert apart[0].sigma12 < 0.1 * apart[1].sigma12
+    assert same_in_every_shear(LawTerms({}), others[1]) == (False, False, False)
+
+
+def test_a_law_that_runs_away_is_infinitely_far():
+    (apart,) = differences(LIBRARY, LawTerms({}), [LawTerms({"tr(sigma)*sigma": -5.0})])
+    assert apart.sigma12 == np.inf
+
+
+def test_random_histories_span_weak_to_strong_flows_and_repeat():
+    flows = random_histories()
+    assert flows.amplitude.min() < 0.5
+    assert flows.amplitude.max() > 2.0
+    again = random_histories(3, 0)
+    assert np.array_equal(flows.protocols.phases, again.protocols.phases)
+
+
+def test_laws_side_by_side_extend_as_one_alone():
+    times = np.linspace(0, 4, 81)
+    laws = [LawTerms({"sigma.sigma": 0.2}), LawTerms({})]
+    stress = extensional_stresses(LIBRARY, laws, np.array([0.3]), times)
+    gradient = uniaxial_extension(jnp.asarray(0.3))
+    alone = simulate_homogeneous_flow(Giesekus(0.2), lambda t: gradient, times)
+    # fourth-order steps of 0.05 on rates of order one
+    np.testing.assert_allclose(stress[0, 0, 0, :, 0], alone[:, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(stress[0, 0, 0, :, 2], alone[:, 2, 2], atol=1e-6)
+
+
+def test_what_separates_a_law_from_itself_is_nothing():
+    law = LawTerms({"sigma.sigma": 0.2})
+    assert separations(LIBRARY, law, [law]) == [()]
+
+
+@pytest.mark.parametrize(
+    ("law", "unfelt", "silent"),
+    [
+        (UpperConvectedMaxwell(), [[1, 0, 0], [0, 0, 1]], {"N1", "N2"}),
+        # σ12' holds −(ξ/2) σ11 + (1 − ξ/2) σ22 at ξ = 0.4, and both relax alike
+        (JohnsonSegalman(0.4), [[0, 0, 1], [0.8, 0.2, 0]], {"N2"}),
+        (Giesekus(0.2), [[0, 0, 1]], {"N2"}),
+        # tr σ is felt, and σ22: what is left is a change of σ11 against σ33
+        (LinearPhanThienTanner(0.4), [[1, 0, -1]], set()),
+        (ExponentialPhanThienTanner(0.4), [[1, 0, -1]], set()),
+    ],
+    ids=["ucm", "slip", "giesekus", "ptt", "exponential ptt"],
+)
+def test_which_normal_stresses_never_reach_the_shear_stress(law, unfelt, silent):
+    found = hidden_stresses(law)
+    expected = np.array(unfelt, float)
+    assert found.unfelt.shape == expected.shape
+    # the same space: projecting the expected directions changes nothing
+    np.testing.assert_allclose(
+        expected @ found.unfelt.T @ found.unfelt, expected, atol=1e-7
+    )  # an SVD's null space of rounding size
+    assert {q for q in ("N1", "N2") if found.leaves_no_trace(q)} == silent
+
+
+def test_fits_in_random_histories_find_twins_and_only_those():
+    supports = [["tr(sigma)*gammadot"], ["sigma.sigma"], ["tr(sigma)*sigma"], [PTT]]
+    found = fit_twins(LIBRARY, LawTerms({SLIP: 0.2}), supports)
+    assert [set(t.law.coefficients) for t in found] == [{"tr(sigma)*gammadot"}]
