@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
 from discover.closed_loop.residual import summarise
+from discover.closed_loop.run_batch import RunBatch
 from discover.effects import ConstitutiveEffect
 from discover.laws import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric

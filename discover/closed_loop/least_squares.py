@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.run_batch import RunBatch
 
 LANES = 16
 """Parameter vectors in one call of the compiled model."""

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.closed_loop.augment import AugmentedLaw, intervals
-from discover.closed_loop.augmented_model import AugmentedModel, data_scales, make_batch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.before_after import (
     cut_to_strain,
     errors_of,
@@ -18,11 +18,14 @@ from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.residual import summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
+from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
+    ModeEffect,
+    StateEffect,
     library_effects,
     make_effect,
     named_effects,
@@ -250,13 +253,16 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
     return out
 
 
-def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
+def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:
+    """Return the augmented fluid; None where it has a state that a law cannot carry."""
     declared = model.declared
     added = [
         (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))
         for effect in model.effects
         if effect.name in active and isinstance(effect, ConstitutiveEffect)
     ]
+    if any(isinstance(effect, StateEffect) for effect, _ in added):
+        return None
     base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     law = AugmentedLaw(
         base=base,
@@ -268,10 +274,13 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
     viscosity = declared.solvent_viscosity + sum(
         float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
     )
+    modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
+    modulus = declared.modulus * np.exp(fit.theta[0])
+    relaxation_time = declared.relaxation_time * np.exp(fit.theta[1])
     return Fluid(
         law,
-        declared.modulus * np.exp(fit.theta[0]),
-        declared.relaxation_time * np.exp(fit.theta[1]),
+        np.append(modulus, [float(pair[0]) for pair in modes]),
+        np.append(relaxation_time, [float(pair[1]) for pair in modes]),
         viscosity,
     )
 

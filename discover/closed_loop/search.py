@@ -6,8 +6,9 @@ import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore, attribute
 from discover.closed_loop.augment import choose, prune, refit
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 
