@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augment import AugmentedLaw, intervals
+from discover.closed_loop.augment import intervals
+from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.before_after import (
     cut_to_strain,
@@ -16,7 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import summarise
+from discover.closed_loop.residual import is_noise, noise_floor, summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
@@ -109,12 +110,7 @@ def run_loop(
     say(f"declared model on {len(fitted_runs)} runs")
     search.start()
     _settle(search, fitted_runs, max_effects, say)
-    while len(search.active) < max_effects:
-        choice = search.advance()
-        if choice is None:
-            say("no further candidate earns its place")
-            break
-        say(f"{choice}: error {search.error:.4f}, runs left out {search.left_out:.4f}")
+    search.run(max_effects, say)
     current, active, thetas = search.fit, search.active, search.path
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False)
     if held_batch is not None:
@@ -126,9 +122,12 @@ def run_loop(
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
-    floor = summary.noise_floor if noise is None else noise
+    floor = noise_floor(current.residual, np.asarray(batch.weight)) if noise is None else noise
     expected = float(np.hypot(floor, declared.linear_error))
     structured = after.fit > STRUCTURE * expected
+    if noise is None and declared.linear_error == 0.0:
+        # without an error of the linear data to allow for, what is left must be noise
+        structured = structured or not is_noise(current.residual, np.asarray(batch.weight))
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if stages and not structured:
         verdict = "effects_added"
@@ -210,11 +209,7 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
         return
     linear = search.restricted(make_batch(small), lambda effect: effect.kind != "constitutive")
     linear.start()
-    while len(linear.active) < max_effects:
-        name = linear.advance()
-        if name is None:
-            break
-        say(f"at small strain, {name}: error {linear.error:.4f}")
+    linear.run(max_effects, lambda line: say(f"at small strain, {line}"))
     if linear.active:
         search.adopt(linear)
 

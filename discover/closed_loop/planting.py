@@ -162,9 +162,7 @@ class Planter:
             raise InputError(
                 f"Unknown base law {base_law!r}; choose one of {', '.join(BASE_LAWS)}."
             )
-        self.declared = DeclaredModel.named(
-            base_law, BASE_LAWS[base_law], MODULUS, RELAXATION_TIME
-        )
+        self.declared = DeclaredModel.named(base_law, BASE_LAWS[base_law], MODULUS, RELAXATION_TIME)
         flows = {**FIT_FLOWS, **HELD_OUT_FLOWS}
         self._runs = [_empty_run(name, flow) for name, flow in flows.items()]
         self._batch = make_batch(self._runs, strain_step=_STRAIN_STEP)
@@ -274,9 +272,7 @@ class Planter:
         theta = self._model.zero()
         for position in at[1:]:
             drawn = theta[position] * 2.0 ** generator.uniform(-1.0, 1.0)
-            theta[position] = np.clip(
-                drawn, self._model.low[position], self._model.high[position]
-            )
+            theta[position] = np.clip(drawn, self._model.low[position], self._model.high[position])
         first, high = at[0], min(self._model.high[at[0]], 1e4 * self._model.first_trial[at[0]])
         sign = 1.0
         # an amplitude that may have either sign gets one by lot

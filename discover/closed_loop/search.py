@@ -5,12 +5,30 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore, attribute
-from discover.closed_loop.augment import choose, prune, refit
+from discover.closed_loop.augment import (
+    INDISTINGUISHABLE,
+    choose,
+    intervals,
+    prune,
+    refit,
+    simplest,
+)
 from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.least_squares import (
+    NO_PRIOR,
+    Fit,
+    Prior,
+    evaluate,
+    fit_batch,
+    jacobians,
+    leave_one_run_out,
+)
+from discover.closed_loop.residual import is_noise, summarise
 from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
+
+_ROUNDS = 3
 
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
@@ -46,6 +64,10 @@ class Search:
         Aliases and evidence of each effect when it was added.
     left_out
         Mean error of runs left out.
+    settled
+        Effects established at small strain.
+    known
+        Mean and standard deviation of parameters determined there, by position.
     """
 
     def __init__(
@@ -66,6 +88,24 @@ class Search:
         self.fit: Fit
         self.path: list[np.ndarray] = []
         self.left_out = float("inf")
+        self.known: dict[int, tuple[float, float]] = {}
+
+    @property
+    def prior(self) -> Prior:
+        """What small strains said of parameters, weighed against the current misfit.
+
+        The misfit counts as noise on as many samples as its correlation leaves independent: while
+        a law is still missing it cannot move an instrument's parameter that is known.
+        """
+        if not self.known:
+            return NO_PRIOR
+        effective = summarise(self.fit.residual, np.asarray(self.batch.weight)).effective_samples
+        size = float(np.sqrt(self.fit.cost / effective))
+        return Prior(
+            tuple(self.known),
+            tuple(mean for mean, _ in self.known.values()),
+            tuple(size / deviation for _, deviation in self.known.values()),
+        )
 
     @property
     def error(self) -> float:
@@ -94,14 +134,100 @@ class Search:
         self.path = [self.fit.theta]
         self._leave_out()
 
+    def run(self, max_effects: int, say: Callable[[str], None]) -> None:
+        """Add effects until none earns its place, and see that each still deserves its own."""
+        for _ in range(_ROUNDS):
+            while len(self.active) < max_effects:
+                name = self.advance()
+                if name is None:
+                    say("no further candidate earns its place")
+                    break
+                say(f"{name}: error {self.error:.4f}, runs left out {self.left_out:.4f}")
+            if not self.reexamine():
+                break
+            say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
+
+    def reexamine(self) -> bool:
+        """Ask of each effect but the last whether another serves better now; say if one does.
+
+        An effect was chosen when those after it were still missing, and may have stood for a part
+        of them. What was settled at small strain is asked again only if the whole is explained:
+        the misfit of a law still missing cannot judge the instrument.
+        """
+        explained = is_noise(self.fit.residual, np.asarray(self.batch.weight))
+        asked = [n for n in self.active if n not in self.settled or explained]
+        if self.active and not self.settled:
+            asked = [name for name in asked if name != self.active[-1]]
+        exchanged = False
+        for name in asked:
+            exchanged |= self._exchange(name)
+        return exchanged
+
+    def _exchange(self, name: str) -> bool:
+        own = self.model.positions(name)
+        without = self._without(own)
+        others = [other for other in self.active if other != name]
+
+        def rival(effect: AbstractEffect) -> bool:
+            return effect.name != name and self.admitted(effect)
+
+        leading = attribute(self.model, self.batch, without, others, LEADERS, rival).leading
+        current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
+        prior = self.prior
+        choices = refit(
+            self.model, self.batch, without, [current, *leading], self.n_candidates, prior
+        )
+        choices = [c for c in choices if self._predictable(c.fit.theta)]
+        if not any(c.candidate is current for c in choices):
+            return False
+        best = simplest(choices, self.model)
+        gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
+        self.aliases[name] = tuple(
+            c.candidate.effect
+            for c in choices
+            if c.candidate is not best.candidate
+            and abs((best.candidate.evidence or 0.0) - (c.candidate.evidence or 0.0))
+            < INDISTINGUISHABLE
+        )
+        if best.candidate is current or gain < 0.0:
+            return False
+        new = best.candidate.effect
+        self.aliases[new] = self.aliases.pop(name)
+        self.support[new] = self.support.pop(name)
+        self.active[self.active.index(name)] = new
+        self.settled = tuple(n for n in self.settled if n != name)
+        self.known = {at: value for at, value in self.known.items() if at not in own}
+        self.fit = best.fit
+        self._fit_path()
+        self._leave_out()
+        return True
+
+    def _without(self, positions: Sequence[int]) -> Fit:
+        """Return the current fit with some effect taken out and nothing refitted."""
+        theta = self.fit.theta.copy()
+        theta[positions] = self.model.zero()[positions]
+        free = tuple(p for p in self.fit.free if p not in positions)
+        fit = fit_batch(self.model, self.batch, [theta], [free], prior=self.prior)[0]
+        if fit.usable:
+            return fit
+        residual = evaluate(self.model, self.batch, [theta])
+        return Fit(
+            theta,
+            free,
+            residual[0],
+            jacobians(self.model, self.batch, [theta], residual, [free])[0],
+        )
+
     def advance(self) -> str | None:
         """Add the effect that earns its place, and return its name, or None."""
         attribution = attribute(
             self.model, self.batch, self.fit, self.active, LEADERS, self.admitted
         )
-        choices = refit(self.model, self.batch, self.fit, attribution.leading, self.n_candidates)
+        choices = refit(
+            self.model, self.batch, self.fit, attribution.leading, self.n_candidates, self.prior
+        )
         choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
-        chosen = choose(choices, self.left_out)
+        chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         if chosen is None:
             return None
@@ -109,8 +235,14 @@ class Search:
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
         kept = [*self.active, name]
+        self.fit = chosen.fit
+        # a better fit weighs what is known otherwise
+        again = fit_batch(
+            self.model, self.batch, [self.fit.theta], [self.fit.free], prior=self.prior
+        )[0]
+        self.fit = again if again.usable else self.fit
         self.fit, self.active = prune(
-            self.model, self.batch, chosen.fit, kept, self.n_candidates, self.settled
+            self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
         )
         if len(self.active) < len(kept):
             # the stages must tell how the final model is reached, so they are fitted again
@@ -127,6 +259,12 @@ class Search:
         self.aliases |= other.aliases
         self.support |= other.support
         self.rankings += other.rankings[: len(other.active)]
+        bounds = intervals(other.model, other.batch, other.fit)
+        for name in other.active:
+            for at in self.model.positions(name):
+                deviation = (bounds[at][1] - bounds[at][0]) / (2.0 * 1.96)
+                if deviation > 0.0:
+                    self.known[at] = (float(other.fit.theta[at]), deviation)
         self.fit = self._fit(self.active, other.fit.theta)
         self._fit_path()
         self._leave_out()
@@ -138,14 +276,16 @@ class Search:
         ]
         start = self.model.zero()
         start[positions] = values[positions]
-        return fit_batch(self.model, self.batch, [start], [positions])[0]
+        return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]
 
     def _fit_path(self) -> None:
         earlier = [self._fit(self.active[:n], self.fit.theta) for n in range(len(self.active))]
         self.path = [*(fit.theta for fit in earlier), self.fit.theta]
 
     def _leave_out(self) -> None:
-        self.left_out = float(np.mean(leave_one_run_out(self.model, self.batch, self.fit)))
+        self.left_out = float(
+            np.mean(leave_one_run_out(self.model, self.batch, self.fit, self.prior))
+        )
 
     def _predictable(self, theta: np.ndarray) -> bool:
         # flows are commanded before they are measured: a law that cannot be integrated through a
