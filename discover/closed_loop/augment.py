@@ -48,7 +48,9 @@ class Choice:
     left_out: Float[np.ndarray, " runs"]
 
 
-def evidence(before: Fit, after: Fit, effective_samples: float, n_candidates: int) -> float:
+def evidence(
+    before: Fit, after: Fit, effective_samples: float, n_candidates: int, n_effects: int = 1
+) -> float:
     """Return by how much adding parameters lowers the information criterion.
 
     The Bayesian criterion on the number of independent samples that the remaining residual is
@@ -64,12 +66,16 @@ def evidence(before: Fit, after: Fit, effective_samples: float, n_candidates: in
         worst fit with the whitest residual could win.
     n_candidates
         Number of candidates.
+    n_effects
+        How many were chosen among them.
     """
     added = len(after.free) - len(before.free)
     if after.cost <= 0.0:
         return float("inf") if before.cost > 0.0 else -float("inf")
     gain = effective_samples * np.log(before.cost / after.cost)
-    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * np.log(max(n_candidates, 1))
+    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * n_effects * np.log(
+        max(n_candidates, 1)
+    )
     return float(gain - price)
 
 

@@ -17,7 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import is_noise, noise_floor, summarise
+from discover.closed_loop.residual import Expectation, summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
@@ -42,9 +42,6 @@ FEWEST_LINEAR_SAMPLES = 10
 
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
-
-STRUCTURE = 1.5
-"""A residual this many times larger than noise and linear error together is not explained."""
 
 
 def run_loop(
@@ -106,7 +103,15 @@ def run_loop(
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    search = Search(model, batch, held_batch, len(candidates), _admission(fitted_runs, held_runs))
+    expectation = Expectation(noise, declared.linear_error)
+    search = Search(
+        model,
+        batch,
+        held_batch,
+        len(candidates),
+        _admission(fitted_runs, held_runs),
+        expectation,
+    )
     say(f"declared model on {len(fitted_runs)} runs")
     search.start()
     _settle(search, fitted_runs, max_effects, say)
@@ -122,12 +127,10 @@ def run_loop(
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
-    floor = noise_floor(current.residual, np.asarray(batch.weight)) if noise is None else noise
-    expected = float(np.hypot(floor, declared.linear_error))
-    structured = after.fit > STRUCTURE * expected
-    if noise is None and declared.linear_error == 0.0:
-        # without an error of the linear data to allow for, what is left must be noise
-        structured = structured or not is_noise(current.residual, np.asarray(batch.weight))
+    weight = np.asarray(batch.weight)
+    floor = expectation.floor(current.residual, weight)
+    expected = expectation.size(current.residual, weight)
+    structured = not expectation.explains(current.residual, weight)
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if stages and not structured:
         verdict = "effects_added"
@@ -198,7 +201,11 @@ def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
 
 
 def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> None:
-    """Find instrument effects where the strain is small and no law differs from another."""
+    """Find instrument effects where the strain is small and no law differs from another.
+
+    That holds for fluids that are linear there. Where instrument effects alone do not explain the
+    small strains, the fluid may not be, and nothing is settled.
+    """
     small = []
     for run in runs:
         reached = np.maximum.accumulate(np.abs(strain_of(run)))
@@ -209,8 +216,8 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
         return
     linear = search.restricted(make_batch(small), lambda effect: effect.kind != "constitutive")
     linear.start()
-    linear.run(max_effects, lambda line: say(f"at small strain, {line}"))
-    if linear.active:
+    linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
+    if linear.active and linear.explained:
         search.adopt(linear)
 
 

@@ -118,6 +118,43 @@ def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "r
     return bool(min(pooled, each) > 0.5 * SIGNIFICANCE)
 
 
+STRUCTURE = 1.5
+"""A residual this many times larger than noise and linear error together is not explained."""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a complete model may leave of the data.
+
+    Attributes
+    ----------
+    noise
+        Relative noise, where it is known.
+    linear_error
+        Relative error of the linear data that the declared modes come from.
+    """
+
+    noise: float | None = None
+    linear_error: float = 0.0
+
+    def floor(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+        """Return the relative noise, known or estimated."""
+        return noise_floor(residual, weight) if self.noise is None else self.noise
+
+    def size(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+        """Return the relative error that noise and linear error together explain."""
+        return float(np.hypot(self.floor(residual, weight), self.linear_error))
+
+    def explains(self, residual: Float[np.ndarray, "runs n"], weight) -> bool:
+        """Return whether noise and the error of the linear data explain a residual."""
+        error = float(np.mean(np.sqrt(np.sum(np.asarray(residual) ** 2, axis=1))))
+        if error > STRUCTURE * self.size(residual, weight):
+            return False
+        # without an error of the linear data to allow for, what is left must look like noise
+        judged = self.noise is not None or self.linear_error > 0.0
+        return judged or is_noise(residual, weight)
+
+
 def _correlations(rows: Sequence[np.ndarray], lags: int) -> tuple[np.ndarray, np.ndarray]:
     """Return correlations at lags 1, 2, … over several rows, and their variance in white noise."""
     total = sum(float(row @ row) for row in rows)

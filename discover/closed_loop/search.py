@@ -6,8 +6,10 @@ import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore, attribute
 from discover.closed_loop.augment import (
+    IMPROVEMENT,
     INDISTINGUISHABLE,
     choose,
+    evidence,
     intervals,
     prune,
     refit,
@@ -23,7 +25,7 @@ from discover.closed_loop.least_squares import (
     jacobians,
     leave_one_run_out,
 )
-from discover.closed_loop.residual import is_noise, summarise
+from discover.closed_loop.residual import Expectation, summarise
 from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
@@ -49,6 +51,8 @@ class Search:
         Number of candidates, the price of choosing among which every effect must pay.
     admitted
         Which effects are candidates.
+    expectation
+        What a complete model may leave of the data.
 
     Attributes
     ----------
@@ -77,9 +81,11 @@ class Search:
         held_batch: RunBatch | None,
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
+        expectation: Expectation | None = None,
     ):
         self.model, self.batch, self.held_batch = model, batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
+        self.expectation = expectation or Expectation()
         self.active: list[str] = []
         self.settled: tuple[str, ...] = ()
         self.rankings: list[tuple[CandidateScore, ...]] = []
@@ -112,9 +118,14 @@ class Search:
         """Mean relative error of the fitted runs."""
         return float(np.mean(self.fit.run_errors))
 
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is what a complete model may leave."""
+        return self.expectation.explains(self.fit.residual, np.asarray(self.batch.weight))
+
     def restricted(self, batch: RunBatch, admitted: Callable[[AbstractEffect], bool]) -> "Search":
         """Return a new search on other samples among fewer candidates."""
-        return Search(self.model, batch, None, self.n_candidates, admitted)
+        return Search(self.model, batch, None, self.n_candidates, admitted, self.expectation)
 
     def start(self) -> None:
         """Fit the declared model.
@@ -134,11 +145,13 @@ class Search:
         self.path = [self.fit.theta]
         self._leave_out()
 
-    def run(self, max_effects: int, say: Callable[[str], None]) -> None:
+    def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
         """Add effects until none earns its place, and see that each still deserves its own."""
         for _ in range(_ROUNDS):
             while len(self.active) < max_effects:
                 name = self.advance()
+                if name is None and look_ahead and not self.explained:
+                    name = self.look_ahead(max_effects)
                 if name is None:
                     say("no further candidate earns its place")
                     break
@@ -147,6 +160,46 @@ class Search:
                 break
             say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
 
+    def look_ahead(self, max_effects: int) -> str | None:
+        """Add several effects at once that only together earn their places; return their names.
+
+        While two effects are missing, what the second leaves looks like correlated noise and hides
+        the evidence for the first. So the best is taken on trust, and the next; the whole must
+        then pay for all its members, and each of them is asked again.
+        """
+        before, left_out, active = self.fit, self.left_out, list(self.active)
+        fit, kept = before, list(active)
+        while len(kept) < max_effects:
+            leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.admitted).leading
+            choices = refit(self.model, self.batch, fit, leading, self.n_candidates, self.prior)
+            choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
+            if not choices:
+                break
+            best = max(choices, key=lambda choice: choice.candidate.evidence or -np.inf)
+            fit = best.fit
+            kept.append(best.candidate.effect)
+            added = len(kept) - len(active)
+            effective = summarise(fit.residual, np.asarray(self.batch.weight)).effective_samples
+            support = evidence(before, fit, effective, self.n_candidates, added)
+            errors = leave_one_run_out(self.model, self.batch, fit, self.prior)
+            if added < 2 or support <= 0.0 or np.mean(errors) >= IMPROVEMENT * left_out:
+                continue
+            self.fit = fit
+            self.fit, self.active = prune(
+                self.model, self.batch, fit, kept, self.n_candidates, self.settled, self.prior
+            )
+            new = [name for name in self.active if name not in active]
+            for name in new:
+                self.aliases[name] = ()
+                self.support[name] = support / len(new)
+            self._fit_path()
+            self._leave_out()
+            # the first was taken on trust, with the others still missing
+            for name in new[:-1]:
+                self._exchange(name)
+            return ", ".join(name for name in self.active if name not in active)
+        return None
+
     def reexamine(self) -> bool:
         """Ask of each effect but the last whether another serves better now; say if one does.
 
@@ -154,8 +207,7 @@ class Search:
         of them. What was settled at small strain is asked again only if the whole is explained:
         the misfit of a law still missing cannot judge the instrument.
         """
-        explained = is_noise(self.fit.residual, np.asarray(self.batch.weight))
-        asked = [n for n in self.active if n not in self.settled or explained]
+        asked = [n for n in self.active if n not in self.settled or self.explained]
         if self.active and not self.settled:
             asked = [name for name in asked if name != self.active[-1]]
         exchanged = False
