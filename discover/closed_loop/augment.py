@@ -27,8 +27,8 @@ INDISTINGUISHABLE = 6.0
 
 
 BARE_MENTION = 2.0
-"""A difference of the criterion below this is worth no more than a bare mention (same source), so
-the simpler of two effects is taken."""
+"""A difference of the criterion below this is worth no more than a bare mention (same source): it
+adds no effect, and of two effects the simpler is taken."""
 
 
 @dataclass
@@ -146,23 +146,25 @@ def choose(
     earned = [
         choice
         for choice in choices
-        if (choice.candidate.evidence or 0.0) > 0.0
+        if (choice.candidate.evidence or 0.0) > BARE_MENTION
         # a run left out of one run leaves nothing to fit
         and (one_run or np.mean(choice.left_out) < IMPROVEMENT * left_out_before)
     ]
     if not earned:
         return None
     best = simplest(earned, model)
-    best.candidate.aliases = tuple(
-        choice.candidate.effect
-        for choice in earned
-        if choice is not best and _difference(best, choice) < INDISTINGUISHABLE
-    )
+    best.candidate.aliases = aliases_of(best, earned)
     return best
 
 
-def _difference(best: Choice, other: Choice) -> float:
-    return abs((best.candidate.evidence or 0.0) - (other.candidate.evidence or 0.0))
+def aliases_of(best: Choice, choices: Sequence[Choice]) -> tuple[str, ...]:
+    """Return the effects whose refit is as good as that of the one chosen."""
+    own = best.candidate.evidence or 0.0
+    return tuple(
+        choice.candidate.effect
+        for choice in choices
+        if choice is not best and abs(own - (choice.candidate.evidence or 0.0)) < INDISTINGUISHABLE
+    )
 
 
 def prune(

@@ -89,10 +89,22 @@ def noise_floor(
 def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]) -> bool:
     """Return whether residuals may be noise, white or with a first-order correlation.
 
-    A portmanteau test   [Ljung & Box 1978, Biometrika 65, 297] of what an autoregression of first
-    order leaves, once on the correlations of all runs taken together, which finds a pattern that
-    they share, and once run by run, which finds patterns of their own. Runs of few samples say
-    nothing.
+    Runs too short to be tested do not say that they are not; see `noise_probability`.
+    """
+    probability = noise_probability(residual, weight)
+    return probability is None or probability > SIGNIFICANCE
+
+
+def noise_probability(
+    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
+) -> float | None:
+    """Return how probable residuals as structured as these are, if they are noise.
+
+    The noise may be white or have a first-order correlation. A portmanteau test   [Ljung & Box
+    1978, Biometrika 65, 297] of what an autoregression of first order leaves, once on the
+    correlations of all runs taken together, which finds a pattern that they share, and once run
+    by run, which finds patterns of their own; the smaller probability counts twice, for there are
+    two tests. None if every run is too short.
 
     Parameters
     ----------
@@ -102,7 +114,7 @@ def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "r
     rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
     rows = [row / np.sqrt(np.mean(row**2)) for row in rows if len(row) > 3 * LAGS and np.any(row)]
     if not rows:
-        return True
+        return None
     # noise of one instrument has one correlation
     together = _correlations(rows, 1)[0][0]
     rho = float(np.clip(together, 0.0, _LARGEST_CORRELATION))
@@ -115,7 +127,7 @@ def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "r
         correlation, variance = _correlations([row], LAGS)
         own += float(np.sum(correlation**2 / variance))
     each = chi2.sf(own, LAGS * len(white) - 1)
-    return bool(min(pooled, each) > 0.5 * SIGNIFICANCE)
+    return float(min(1.0, 2.0 * min(pooled, each)))
 
 
 STRUCTURE = 1.5

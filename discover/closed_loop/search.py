@@ -6,8 +6,9 @@ import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore, attribute
 from discover.closed_loop.augment import (
+    BARE_MENTION,
     IMPROVEMENT,
-    INDISTINGUISHABLE,
+    aliases_of,
     choose,
     evidence,
     intervals,
@@ -17,6 +18,7 @@ from discover.closed_loop.augment import (
 )
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
+    LANES,
     NO_PRIOR,
     Fit,
     Prior,
@@ -25,7 +27,12 @@ from discover.closed_loop.least_squares import (
     jacobians,
     leave_one_run_out,
 )
-from discover.closed_loop.residual import Expectation, summarise
+from discover.closed_loop.residual import (
+    SIGNIFICANCE,
+    Expectation,
+    noise_probability,
+    summarise,
+)
 from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
@@ -182,7 +189,7 @@ class Search:
             effective = summarise(fit.residual, np.asarray(self.batch.weight)).effective_samples
             support = evidence(before, fit, effective, self.n_candidates, added)
             errors = leave_one_run_out(self.model, self.batch, fit, self.prior)
-            if added < 2 or support <= 0.0 or np.mean(errors) >= IMPROVEMENT * left_out:
+            if added < 2 or support <= BARE_MENTION or np.mean(errors) >= IMPROVEMENT * left_out:
                 continue
             self.fit = fit
             self.fit, self.active = prune(
@@ -204,10 +211,10 @@ class Search:
         """Ask of each effect but the last whether another serves better now; say if one does.
 
         An effect was chosen when those after it were still missing, and may have stood for a part
-        of them. What was settled at small strain is asked again only if the whole is explained:
+        of them. What was settled at small strain gives way only where the whole is then explained:
         the misfit of a law still missing cannot judge the instrument.
         """
-        asked = [n for n in self.active if n not in self.settled or self.explained]
+        asked = list(self.active)
         if self.active and not self.settled:
             asked = [name for name in asked if name != self.active[-1]]
         exchanged = False
@@ -225,23 +232,20 @@ class Search:
 
         leading = attribute(self.model, self.batch, without, others, LEADERS, rival).leading
         current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
-        prior = self.prior
-        choices = refit(
-            self.model, self.batch, without, [current, *leading], self.n_candidates, prior
-        )
+        # one more than fills the lanes would cost twice as much
+        asked = [current, *leading][:LANES]
+        choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
         choices = [c for c in choices if self._predictable(c.fit.theta)]
         if not any(c.candidate is current for c in choices):
             return False
         best = simplest(choices, self.model)
-        gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
-        self.aliases[name] = tuple(
-            c.candidate.effect
-            for c in choices
-            if c.candidate is not best.candidate
-            and abs((best.candidate.evidence or 0.0) - (c.candidate.evidence or 0.0))
-            < INDISTINGUISHABLE
-        )
-        if best.candidate is current or gain < 0.0:
+        if (best.candidate.evidence or 0.0) < (current.evidence or 0.0):
+            best = next(c for c in choices if c.candidate is current)
+        explained = self.expectation.explains(best.fit.residual, np.asarray(self.batch.weight))
+        if name in self.settled and not explained:
+            return False
+        self.aliases[name] = aliases_of(best, choices)
+        if best.candidate is current:
             return False
         new = best.candidate.effect
         self.aliases[new] = self.aliases.pop(name)
@@ -255,7 +259,7 @@ class Search:
         return True
 
     def _without(self, positions: Sequence[int]) -> Fit:
-        """Return the current fit with some effect taken out and nothing refitted."""
+        """Return the current fit with an effect taken out and the others refitted."""
         theta = self.fit.theta.copy()
         theta[positions] = self.model.zero()[positions]
         free = tuple(p for p in self.fit.free if p not in positions)
@@ -281,7 +285,10 @@ class Search:
         choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
-        if chosen is None:
+        # what cannot be told from noise gives no reason to add anything
+        probability = noise_probability(self.fit.residual, np.asarray(self.batch.weight))
+        noise = probability is not None and probability > SIGNIFICANCE
+        if chosen is None or noise:
             return None
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
