@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-LAGS = 8
+LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
 
 SIGNIFICANCE = 1e-3
@@ -102,9 +102,10 @@ def noise_probability(
 
     The noise may be white or have a first-order correlation. A portmanteau test   [Ljung & Box
     1978, Biometrika 65, 297] of what an autoregression of first order leaves, once on the
-    correlations of all runs taken together, which finds a pattern that they share, and once run
-    by run, which finds patterns of their own; the smaller probability counts twice, for there are
-    two tests. None if every run is too short.
+    correlations of all runs taken together, and once run by run, which finds patterns of their
+    own; and a test of the sum over runs sample by sample, which finds a pattern that all share,
+    since the noise of one run knows nothing of another's. The smallest probability counts three
+    times, for there are three tests. None if every run is too short.
 
     Parameters
     ----------
@@ -112,13 +113,14 @@ def noise_probability(
         As in `summarise`.
     """
     rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
-    rows = [row / np.sqrt(np.mean(row**2)) for row in rows if len(row) > 3 * LAGS and np.any(row)]
+    rows = [row / np.sqrt(np.mean(row**2)) for row in rows if len(row) >= 2 * LAGS and np.any(row)]
     if not rows:
         return None
     # noise of one instrument has one correlation
     together = _correlations(rows, 1)[0][0]
     rho = float(np.clip(together, 0.0, _LARGEST_CORRELATION))
-    white = [row[1:] - rho * row[:-1] for row in rows]
+    first = np.sqrt(1.0 - rho**2)
+    white = [np.append(first * row[0], row[1:] - rho * row[:-1]) for row in rows]
     white = [row / np.sqrt(np.mean(row**2)) for row in white]
     shared, variance = _correlations(white, LAGS)
     pooled = chi2.sf(float(np.sum(shared**2 / variance)), LAGS - 1)
@@ -127,7 +129,11 @@ def noise_probability(
         correlation, variance = _correlations([row], LAGS)
         own += float(np.sum(correlation**2 / variance))
     each = chi2.sf(own, LAGS * len(white) - 1)
-    return float(min(1.0, 2.0 * min(pooled, each)))
+    length = min(len(row) for row in white)
+    common = np.sum([row[:length] for row in white], axis=0) / np.sqrt(len(white))
+    # one run shares its pattern with none
+    alike = chi2.sf(float(common @ common), length) if len(white) > 1 else 1.0
+    return float(min(1.0, 3.0 * min(pooled, each, alike)))
 
 
 STRUCTURE = 1.5
