@@ -37,7 +37,7 @@ from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 
-_ROUNDS = 3
+_ROUNDS, _POLISHES = 3, 5
 
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
@@ -254,6 +254,7 @@ class Search:
         self.settled = tuple(n for n in self.settled if n != name)
         self.known = {at: value for at, value in self.known.items() if at not in own}
         self.fit = best.fit
+        self._polish()
         self._fit_path()
         self._leave_out()
         return True
@@ -295,11 +296,7 @@ class Search:
         self.support[name] = chosen.candidate.evidence or 0.0
         kept = [*self.active, name]
         self.fit = chosen.fit
-        # a better fit weighs what is known otherwise
-        again = fit_batch(
-            self.model, self.batch, [self.fit.theta], [self.fit.free], prior=self.prior
-        )[0]
-        self.fit = again if again.usable else self.fit
+        self._polish()
         self.fit, self.active = prune(
             self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
         )
@@ -325,6 +322,7 @@ class Search:
                 if deviation > 0.0:
                     self.known[at] = (float(other.fit.theta[at]), deviation)
         self.fit = self._fit(self.active, other.fit.theta)
+        self._polish()
         self._fit_path()
         self._leave_out()
 
@@ -336,6 +334,19 @@ class Search:
         start = self.model.zero()
         start[positions] = values[positions]
         return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]
+
+    def _polish(self) -> None:
+        """Fit again while a better fit weighs what is known otherwise."""
+        for _ in range(_POLISHES if self.known else 0):
+            before = self.fit.cost
+            again = fit_batch(
+                self.model, self.batch, [self.fit.theta], [self.fit.free], prior=self.prior
+            )[0]
+            if not again.usable:
+                break
+            self.fit = again
+            if abs(again.cost - before) < 1e-3 * before:
+                break
 
     def _fit_path(self) -> None:
         earlier = [self._fit(self.active[:n], self.fit.theta) for n in range(len(self.active))]
