@@ -103,6 +103,8 @@ def refit(
     prior
         What is known of some parameters.
     """
+    if not leaders:
+        return []
     weight = np.asarray(batch.weight)
     free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
     fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free, prior=prior)

@@ -17,7 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import Expectation, summarise
+from discover.closed_loop.residual import STRUCTURE, Expectation, summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
@@ -149,7 +149,9 @@ def run_loop(
             "autocorrelation": float(np.mean(summary.autocorrelation)),
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
-            "description": _describe(after.fit, expected, structured, worst),
+            "description": _describe(
+                after.fit, expected, structured, declared.linear_error > 0.0, worst
+            ),
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
@@ -287,14 +289,17 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | No
     )
 
 
-def _describe(error: float, expected: float, structured: bool, worst) -> str:
-    if structured:
+def _describe(error: float, expected: float, structured: bool, linear: bool, worst) -> str:
+    causes = "noise and the error of the linear data explain" if linear else "noise explains"
+    missed = f"The fitted runs are missed by {100 * error:.2g} %"
+    if not structured:
+        return f"{missed}, as {causes} ({100 * expected:.2g} %)."
+    if error > STRUCTURE * expected:
         return (
-            f"The fitted runs are missed by {100 * error:.1f} %, more than noise and the error of "
-            f"the linear data explain ({100 * expected:.1f} %); the worst run is {worst.name}. "
-            "Some effect is still missing."
+            f"{missed}, more than {causes} ({100 * expected:.2g} %); the worst run is "
+            f"{worst.name}. Some effect is still missing."
         )
     return (
-        f"The fitted runs are missed by {100 * error:.1f} %, as noise and the error of the linear "
-        f"data explain ({100 * expected:.1f} %)."
+        f"{missed}, hardly more than {causes} ({100 * expected:.2g} %), but what is left has a "
+        f"pattern that noise has not; the worst run is {worst.name}. Some effect is still missing."
     )
