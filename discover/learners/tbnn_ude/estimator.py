@@ -7,6 +7,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
@@ -23,6 +24,12 @@ from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipe_default import DefaultRecipe, Trained, train_default
 from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
+from discover.learners.tbnn_ude.spread import (
+    MemberPredictions,
+    coefficient_spread,
+    member_predictions,
+)
+from discover.protocols.shear import ShearProtocol
 from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
@@ -69,6 +76,8 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         The projection.
     members_ : list of TensorBasisNetwork
         Every trained member, the first one's tensors shared by all.
+    ensemble_fluids_ : list of Fluid
+        Every member with moduli and relaxation times, ready to simulate.
     ensemble_ : str
         How the members came about; where constants suffice they do not differ.
     """
@@ -127,8 +136,9 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         self.members_ = members
         self.ensemble_ = agreement
         self.law_ = best.law
-        total = float(np.sum(np.atleast_1d(np.asarray(self.modulus, dtype=float))))
-        self.fluid_ = Fluid(best.law, problem.modulus * total, problem.relaxation_time)
+        modulus = jnp.atleast_1d(jnp.asarray(self.modulus, dtype=float))
+        self.fluid_ = Fluid(best.law, modulus, problem.relaxation_time)
+        self.ensemble_fluids_ = [Fluid(law, modulus, problem.relaxation_time) for law in members]
         cloud = sample_states(best.law, problem)
         library = self.projection_library or build_library(degree=1)
         projection = project(best.law, cloud, library)
@@ -147,6 +157,7 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
                 "coefficients_vary": best.varies,
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
+                "coefficient_spread_of_members": coefficient_spread(members, cloud),
                 "members": [
                     {
                         "misfit": float(misfit),
@@ -162,6 +173,19 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
     def predict(self, X: Sequence[ShearRun]) -> Float[np.ndarray, " rows"]:
         """Return σ12 in Pa at the samples of all runs, one run after the other."""
         return np.concatenate(self._predict_runs(X))
+
+    def predict_members(
+        self, protocol: ShearProtocol, times: Float[np.ndarray, " n"]
+    ) -> MemberPredictions:
+        """Return σ12, N1 and N2 of every member in a flow, with their bands.
+
+        Parameters
+        ----------
+        protocol, times
+            Any flow, also one that no training saw; times in s, from 0 on.
+        """
+        check_is_fitted(self, "ensemble_fluids_")
+        return member_predictions(self.ensemble_fluids_, protocol, times)
 
     def score(self, X: Sequence[ShearRun], y=None, sample_weight=None) -> float:
         """Return one minus the relative error of σ12, averaged over runs.
