@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, train_members
+from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
@@ -264,10 +264,7 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         law, losses = train_paper(
             problem, key, relaxes, recipe, self.progress, base_law=self.base_law
         )
-        errors = np.asarray(eqx.filter_jit(TrainingProblem.mean_squared_errors)(problem, law))
-        squares = np.asarray(problem.target) ** 2
-        scale = np.mean(squares, axis=1)
-        misfit = float(np.sqrt(np.mean(errors / np.where(scale > 0, scale, 1.0))))
+        misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
 
