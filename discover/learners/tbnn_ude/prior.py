@@ -47,7 +47,12 @@ class Cloud(eqx.Module):
 
     def coefficients(self, law: TensorBasisNetwork) -> Float[Array, "m 8"]:
         """Return the coefficients of a law at these states."""
-        return jax.vmap(law.coefficients)(self.stress, self.rate)
+        return _coefficients(law, self.stress, self.rate)
+
+
+@eqx.filter_jit
+def _coefficients(law, stress, rate):
+    return jax.vmap(law.coefficients)(stress, rate)
 
 
 def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
