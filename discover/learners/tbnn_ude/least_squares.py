@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import lineax
 import numpy as np
 import optimistix
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
@@ -165,6 +165,6 @@ def minimise(
     return best
 
 
-def norm_of_cost(cost: Float[Array, ""]) -> float:
+def norm_of_cost(cost: Float[ArrayLike, ""]) -> float:
     """Return the norm of residuals from half the sum of squares of the amplified ones."""
     return float(np.sqrt(max(2.0 * float(cost), 0.0))) / _AMPLIFICATION
