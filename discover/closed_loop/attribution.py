@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit, evaluate
+from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 
 ALIAS_COSINE = 0.99

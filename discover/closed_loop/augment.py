@@ -3,18 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
-from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.least_squares import (
+    NO_PRIOR,
+    Fit,
+    Prior,
+    fit_batch,
+    leave_one_run_out,
+)
 from discover.closed_loop.residual import summarise
-from discover.effects import ConstitutiveEffect
-from discover.laws import AbstractConstitutiveLaw
-from tensor_library.algebra import Symmetric
+from discover.closed_loop.run_batch import RunBatch
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""
@@ -24,32 +26,9 @@ INDISTINGUISHABLE = 6.0
 773: from 6 on the evidence is strong]."""
 
 
-class AugmentedLaw(AbstractConstitutiveLaw):
-    """A law with the extra terms of constitutive effects.
-
-    Attributes
-    ----------
-    base
-        The declared law.
-    values
-        Parameters of each effect.
-    effects
-        The effects.
-    linear_relaxation
-        As in the declared law.
-    """
-
-    base: AbstractConstitutiveLaw
-    values: tuple[Float[Array, " _"], ...]
-    effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
-    linear_relaxation: bool = eqx.field(static=True, default=True)
-
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h of the declared law plus the terms of the effects."""
-        extra = self.base.extra_term(stress, rate)
-        for effect, values in zip(self.effects, self.values, strict=True):
-            extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
-        return extra
+BARE_MENTION = 2.0
+"""A difference of the criterion below this is worth no more than a bare mention (same source): it
+adds no effect, and of two effects the simpler is taken."""
 
 
 @dataclass
@@ -69,7 +48,9 @@ class Choice:
     left_out: Float[np.ndarray, " runs"]
 
 
-def evidence(before: Fit, after: Fit, effective_samples: float, n_candidates: int) -> float:
+def evidence(
+    before: Fit, after: Fit, effective_samples: float, n_candidates: int, n_effects: int = 1
+) -> float:
     """Return by how much adding parameters lowers the information criterion.
 
     The Bayesian criterion on the number of independent samples that the remaining residual is
@@ -85,12 +66,16 @@ def evidence(before: Fit, after: Fit, effective_samples: float, n_candidates: in
         worst fit with the whitest residual could win.
     n_candidates
         Number of candidates.
+    n_effects
+        How many were chosen among them.
     """
     added = len(after.free) - len(before.free)
     if after.cost <= 0.0:
         return float("inf") if before.cost > 0.0 else -float("inf")
     gain = effective_samples * np.log(before.cost / after.cost)
-    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * np.log(max(n_candidates, 1))
+    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * n_effects * np.log(
+        max(n_candidates, 1)
+    )
     return float(gain - price)
 
 
@@ -100,6 +85,7 @@ def refit(
     fit: Fit,
     leaders: Sequence[CandidateScore],
     n_candidates: int,
+    prior: Prior = NO_PRIOR,
 ) -> list[Choice]:
     """Refit each leading candidate together with all that is fitted already.
 
@@ -114,17 +100,21 @@ def refit(
         Candidates to refit.
     n_candidates
         Number of candidates they were chosen from.
+    prior
+        What is known of some parameters.
     """
+    if not leaders:
+        return []
     weight = np.asarray(batch.weight)
     free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
-    fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free)
+    fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free, prior=prior)
     best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
     effective = summarise(best.residual, weight).effective_samples
     choices = []
     for candidate, trial in zip(leaders, fits, strict=True):
         if not trial.usable:
             continue
-        left_out = leave_one_run_out(model, batch, trial)
+        left_out = leave_one_run_out(model, batch, trial, prior)
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
         candidate.evidence = evidence(fit, trial, effective, n_candidates)
@@ -132,11 +122,23 @@ def refit(
     return choices
 
 
-def choose(choices: Sequence[Choice], left_out_before: float) -> Choice | None:
+def simplest(choices: Sequence[Choice], model: AugmentedModel) -> Choice:
+    """Return the choice with the strongest evidence, or a simpler one about as strong."""
+    strongest = max(choice.candidate.evidence or 0.0 for choice in choices)
+    complexity = {effect.name: effect.complexity for effect in model.effects}
+    near = [c for c in choices if (c.candidate.evidence or 0.0) > strongest - BARE_MENTION]
+    return min(near, key=lambda c: (complexity[c.candidate.effect], -(c.candidate.evidence or 0.0)))
+
+
+def choose(
+    model: AugmentedModel, choices: Sequence[Choice], left_out_before: float
+) -> Choice | None:
     """Return the choice with the strongest evidence that also predicts runs left out better.
 
     Parameters
     ----------
+    model
+        The model.
     choices
         Refitted candidates.
     left_out_before
@@ -146,23 +148,25 @@ def choose(choices: Sequence[Choice], left_out_before: float) -> Choice | None:
     earned = [
         choice
         for choice in choices
-        if (choice.candidate.evidence or 0.0) > 0.0
+        if (choice.candidate.evidence or 0.0) > BARE_MENTION
         # a run left out of one run leaves nothing to fit
         and (one_run or np.mean(choice.left_out) < IMPROVEMENT * left_out_before)
     ]
     if not earned:
         return None
-    best = max(earned, key=lambda choice: choice.candidate.evidence or 0.0)
-    best.candidate.aliases = tuple(
-        choice.candidate.effect
-        for choice in earned
-        if choice is not best and _difference(best, choice) < INDISTINGUISHABLE
-    )
+    best = simplest(earned, model)
+    best.candidate.aliases = aliases_of(best, earned)
     return best
 
 
-def _difference(best: Choice, other: Choice) -> float:
-    return (best.candidate.evidence or 0.0) - (other.candidate.evidence or 0.0)
+def aliases_of(best: Choice, choices: Sequence[Choice]) -> tuple[str, ...]:
+    """Return the effects whose refit is as good as that of the one chosen."""
+    own = best.candidate.evidence or 0.0
+    return tuple(
+        choice.candidate.effect
+        for choice in choices
+        if choice is not best and abs(own - (choice.candidate.evidence or 0.0)) < INDISTINGUISHABLE
+    )
 
 
 def prune(
@@ -172,6 +176,7 @@ def prune(
     active: Sequence[str],
     n_candidates: int,
     settled: Sequence[str] = (),
+    prior: Prior = NO_PRIOR,
 ) -> tuple[Fit, list[str]]:
     """Drop effects that later ones have made redundant, one after another.
 
@@ -185,6 +190,8 @@ def prune(
         As in `evidence`.
     settled
         Effects established on other grounds, which stay.
+    prior
+        What is known of some parameters.
 
     Returns
     -------
@@ -200,7 +207,7 @@ def prune(
             theta[at] = model.zero()[at]
             starts.append(theta)
             free.append(tuple(p for p in fit.free if p not in at))
-        fits = fit_batch(model, batch, starts, free)
+        fits = fit_batch(model, batch, starts, free, prior=prior)
         effective = summarise(fit.residual, weight).effective_samples
         support = [
             evidence(trial, fit, effective, n_candidates) if trial.usable else np.inf

@@ -5,6 +5,8 @@ zeros, never another program. Runs are padded to one grid and mapped over; so ar
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -13,146 +15,164 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.closed_loop.declared import DeclaredModel
-from discover.dataset import ShearRun
+from discover.closed_loop.integrator import Modes, Series, integrate
+from discover.closed_loop.library_matrix import LibraryMatrix
+from discover.closed_loop.run_batch import RunBatch
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
     LibraryTerm,
+    ModeEffect,
     Record,
+    SeriesElement,
     SignalEffect,
+    StateEffect,
 )
-from discover.simulate.exponential_runge_kutta import phi_functions
-from discover.simulate.grid import make_grid
-from tensor_library.integrity_basis import integrity_basis
-from tensor_library.invariants import scalar_invariants
-
-# An instrument effect acts within the first samples, so the first gap is divided this often
-_EARLY_STEPS = 0.5 ** np.arange(6)
+from discover.laws import LAWS, AbstractConstitutiveLaw
 
 
-class RunBatch(eqx.Module):
-    """Runs on padded grids, with a leading axis of runs.
+class _Numbers(eqx.Module):
+    """What of a declared model is data to the compiled program."""
 
-    Attributes
-    ----------
-    times
-        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s.
-    commanded_rate
-        Shear rate there, in 1/s.
-    sample_index
-        Position of the samples among step ends, shape (runs, n).
-    weight
-        1/(rms stress · √samples) at samples, 0 at padding: the squared residuals of a run then
-        sum to its squared relative error.
-    stress
-        Measured shear stress in Pa, shape (runs, n).
-    clock_factor
-        Shape (runs,).
-    """
-
-    times: Float[Array, "runs m"]
-    commanded_rate: Float[Array, "runs m"]
-    sample_index: Array
-    weight: Float[Array, "runs n"]
-    stress: Float[Array, "runs n"]
-    clock_factor: Float[Array, " runs"]
+    law: AbstractConstitutiveLaw
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+    solvent_viscosity: Float[Array, ""]
 
 
-def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
-    """Return runs as a batch.
+class _Structure(NamedTuple):
+    """What decides which program is compiled; models that share it share the program."""
 
-    Parameters
-    ----------
-    runs
-        One or more runs.
-    strain_step
-        Largest strain of one step.
-    """
-    grids = []
-    for run in runs:
-        # a window may have cut the first samples off, but not what the instrument did by then
-        gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
-        early = gap * _EARLY_STEPS
-        anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
-        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
-        grids.append((grid, np.searchsorted(grid, run.time)))
-    n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
-    n_samples = max(len(run) for run in runs)
-    rows = []
-    for run, (grid, index) in zip(runs, grids, strict=True):
-        spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
-        padded = np.concatenate([grid, grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)])
-        half = np.empty(2 * n_steps - 1)
-        half[::2] = padded
-        half[1::2] = 0.5 * (padded[1:] + padded[:-1])
-        rate = np.array(jax.vmap(run.protocol.shear_rate)(jnp.asarray(half)))
-        # beyond its last sample a run is padding: no flow, nothing to blow up
-        rate[half > grid[-1]] = 0.0
-        n = len(run)
-        size = np.sqrt(np.mean(run.shear_stress**2))
-        scale = 1.0 / ((size if size > 0 else 1.0) * np.sqrt(n))
-        pad = (0, n_samples - n)
-        rows.append(
-            (
-                half,
-                rate,
-                np.pad(index, pad, mode="edge"),
-                np.pad(np.full(n, scale), pad),
-                np.pad(run.shear_stress, pad),
-                run.clock_factor,
-            )
+    effects: tuple[AbstractEffect, ...]
+    free_parameters: tuple[str, ...]
+    law_name: str
+    parameters: tuple[tuple[str, float], ...]
+    fit_modulus: bool
+    fit_relaxation_time: bool
+
+
+class _Program:
+    """Predictions and residuals for one structure, compiled when first called."""
+
+    def __init__(self, structure: _Structure):
+        self.structure = structure
+        effects = structure.effects
+        self.slices: dict[str, slice] = {}
+        # first the logarithms of the factors on moduli and times, then the law's free parameters
+        position = 2 + len(structure.free_parameters)
+        for effect in effects:
+            self.slices[effect.name] = slice(position, position + len(effect.parameters))
+            position += len(effect.parameters)
+        self.size = position
+        terms = [e for e in effects if isinstance(e, LibraryTerm)]
+        closed = [t for t in terms if t.term.closed_form is not None]
+        plain = [t for t in terms if t.term.closed_form is None]
+        self._library = LibraryMatrix(plain, [self.slices[t.name].start for t in plain])
+        self._modes = [e for e in effects if isinstance(e, ModeEffect)]
+        self._states = [e for e in effects if isinstance(e, StateEffect)]
+        self._constitutive = [
+            e
+            for e in effects
+            if isinstance(e, ConstitutiveEffect)
+            and (e not in terms or e in closed)
+            and not isinstance(e, ModeEffect | StateEffect)
+        ]
+        self._kinematic = [e for e in effects if isinstance(e, KinematicEffect)]
+        self._series = [e for e in self._kinematic if isinstance(e, SeriesElement)]
+        self._signal = [e for e in effects if isinstance(e, SignalEffect)]
+        over_runs = jax.vmap(self._predict_run, in_axes=(None, None, 0))
+        self.predict = eqx.filter_jit(over_runs)
+        self.residuals = eqx.filter_jit(jax.vmap(self._residuals, in_axes=(None, 0, None)))
+
+    def _values(self, theta, effect):
+        return theta[self.slices[effect.name]]
+
+    def _residuals(self, numbers, theta, batch):
+        predicted = jax.vmap(self._predict_run, in_axes=(None, None, 0))(numbers, theta, batch)
+        return (predicted - batch.stress) * batch.weight
+
+    def _predict_run(self, numbers, theta, run):
+        instrument_times = run.times / run.clock_factor
+        rate = run.commanded_rate
+        for effect in self._kinematic:
+            rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+        times = run.times[::2]
+        stress, felt = self._integrate(numbers, theta, times, rate)
+        stress = stress + numbers.solvent_viscosity * felt + self._beside(theta, felt)
+        for effect in self._signal:
+            record = Record(times, felt, stress, run.clock_factor)
+            stress = effect.recorded_stress(self._values(theta, effect), record)
+        return stress[run.sample_index]
+
+    def _beside(self, theta, rate):
+        """Return the stress that effects add beside the modes."""
+        total = jnp.zeros_like(rate)
+        for effect in self._constitutive:
+            total = total + effect.instantaneous_stress(self._values(theta, effect), rate)
+        return total
+
+    def _law(self, numbers, theta):
+        """Return the law with the values of its free parameters."""
+        free = self.structure.free_parameters
+        if not free:
+            return numbers.law
+        known = dict(self.structure.parameters) | dict(
+            zip(free, theta[2 : 2 + len(free)], strict=True)
         )
-    return RunBatch(*(jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)))
+        return LAWS[self.structure.law_name].build(*known.values())
+
+    def _integrate(self, numbers, theta, times, rate):
+        law = self._law(numbers, theta)
+        # factors that are not fitted stay constants: no trial and no derivative passes through
+        modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
+        if self.structure.fit_modulus:
+            modulus = modulus * jnp.exp(theta[0])
+        if self.structure.fit_relaxation_time:
+            relaxation_time = relaxation_time * jnp.exp(theta[1])
+        matrix = self._library.matrix(theta)
+
+        def mode_rate(stress, shear_rate):
+            zero = jnp.zeros_like(shear_rate)
+            deformation = jnp.stack([zero, zero, zero, shear_rate])
+            change = law.stress_rate(stress, shear_rate)
+            if self._library.powers:
+                change = change - self._library.extra_term(matrix, stress, deformation)
+            for effect in self._constitutive:
+                values = self._values(theta, effect)
+                change = change - effect.extra_term(values, stress, deformation)
+            return change
+
+        extra = None
+        if self._modes:
+            pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
+            extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
+        series = None
+        if self._series:
+            pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
+            slip, compliance = (sum(column) for column in zip(*pairs, strict=True))
+            viscosity = numbers.solvent_viscosity + self._beside(theta, jnp.ones(1))[0]
+            series = Series(jnp.asarray(slip), jnp.asarray(compliance), viscosity)
+        return integrate(
+            jax.vmap(mode_rate, in_axes=(-1, 0), out_axes=-1),
+            law.linear_relaxation,
+            Modes(modulus, relaxation_time),
+            extra,
+            {effect: self._values(theta, effect) for effect in self._states},
+            series,
+            times,
+            rate,
+        )
 
 
-def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:
-    """Return the size of the properties in which effects scale their first trials.
-
-    Times are on the instrument's clock.
-    """
-    gaps = [float(np.min(np.diff(run.time))) / run.clock_factor for run in runs if len(run) > 1]
-    lengths = [float(run.time[-1]) / run.clock_factor for run in runs]
-    stresses = [float(np.sqrt(np.mean(run.shear_stress**2))) for run in runs]
-    rates = [float(np.max(np.abs(run.shear_rate))) for run in runs]
-    stress, gap = float(np.median(stresses)) or 1.0, float(np.median(gaps or [1.0]))
-    rate, length = float(np.median(rates)) or 1.0, float(np.median(lengths)) or 1.0
-    return {
-        "sampling_time": gap,
-        "stress": stress,
-        "viscosity": stress / rate,
-        "stress_rate": stress / length,
-        "inertia": stress * gap / rate,
-    }
-
-
-class _Library:
-    """Library terms as one coefficient matrix, basis tensors × monomials of the invariants."""
-
-    def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
-        self.positions = np.asarray(positions, dtype=int)
-        self.powers = tuple(dict.fromkeys(term.term.powers for term in terms))
-        self.rows = np.array([term.term.tensor for term in terms], dtype=int)
-        self.columns = np.array([self.powers.index(t.term.powers) for t in terms], dtype=int)
-
-    def matrix(self, theta):
-        empty = jnp.zeros((8, len(self.powers)))
-        return empty.at[self.rows, self.columns].add(theta[self.positions])
-
-    def extra_term(self, matrix, stress, rate):
-        invariants = scalar_invariants(stress, rate)
-        monomials = []
-        for powers in self.powers:
-            value = jnp.ones(())
-            for i, power in enumerate(powers):
-                for _ in range(power):
-                    value = value * invariants[i]
-            monomials.append(value)
-        return jnp.tensordot(matrix @ jnp.stack(monomials), integrity_basis(stress, rate), axes=1)
+_program = lru_cache(maxsize=16)(_Program)
 
 
 class AugmentedModel:
     """The declared model with a list of effects, as functions of one parameter vector.
+
+    Models that differ in numbers only (moduli, times, scales of the data) share one compiled
+    program for each shape of the runs.
 
     Parameters
     ----------
@@ -172,14 +192,19 @@ class AugmentedModel:
     ):
         self.declared = declared
         self.effects = tuple(effects)
-        self.slices: dict[str, slice] = {}
-        # first the logarithms of the factors on moduli and times, then the law's free parameters
         free = declared.free_parameters
-        position = 2 + len(free)
-        for effect in self.effects:
-            self.slices[effect.name] = slice(position, position + len(effect.parameters))
-            position += len(effect.parameters)
-        self.size = position
+        self._program = _program(
+            _Structure(
+                self.effects,
+                tuple(p.name for p in free),
+                # a law without free parameters is data; with them, its values are rebuilt
+                declared.law_name if free else "",
+                declared.parameters if free else (),
+                declared.fit_modulus,
+                declared.fit_relaxation_time,
+            )
+        )
+        self.slices, self.size = self._program.slices, self._program.size
         parameters = [p for effect in self.effects for p in effect.parameters]
         self.low = np.array([-10.0, -10.0, *(p.low for p in [*free, *parameters])])
         self.high = np.array([10.0, 10.0, *(p.high for p in [*free, *parameters])])
@@ -187,19 +212,16 @@ class AugmentedModel:
         self.first_trial = np.array(
             [0.01] * (2 + len(free)) + [p.first_trial * sizes.get(p.scale, 1.0) for p in parameters]
         )
-        terms = [e for e in self.effects if isinstance(e, LibraryTerm)]
-        closed = [t for t in terms if t.term.closed_form is not None]
-        plain = [t for t in terms if t.term.closed_form is None]
-        self._library = _Library(plain, [self.slices[t.name].start for t in plain])
-        self._constitutive = [
-            e
-            for e in self.effects
-            if isinstance(e, ConstitutiveEffect) and (e not in terms or e in closed)
-        ]
-        self._kinematic = [e for e in self.effects if isinstance(e, KinematicEffect)]
-        self._signal = [e for e in self.effects if isinstance(e, SignalEffect)]
-        self._predict = jax.jit(jax.vmap(self._predict_run, in_axes=(None, 0)))
-        self._residual = jax.jit(jax.vmap(self._residuals, in_axes=(0, None)))
+
+    @cached_property
+    def _numbers(self) -> _Numbers:
+        declared = self.declared
+        return _Numbers(
+            declared.law,
+            jnp.asarray(declared.modulus),
+            jnp.asarray(declared.relaxation_time),
+            jnp.asarray(float(declared.solvent_viscosity)),
+        )
 
     def zero(self) -> Float[np.ndarray, " p"]:
         """Return the vector of the declared model: amplitudes zero, inner parameters at start."""
@@ -219,94 +241,8 @@ class AugmentedModel:
 
     def predict(self, theta, batch: RunBatch) -> Float[np.ndarray, "runs n"]:
         """Return the predicted records, in Pa."""
-        return np.asarray(self._predict(jnp.asarray(theta), batch))
+        return np.asarray(self._program.predict(self._numbers, jnp.asarray(theta), batch))
 
     def residuals(self, thetas, batch: RunBatch) -> Float[np.ndarray, "trials runs n"]:
         """Return the weighted residuals of several parameter vectors; not finite if one fails."""
-        return np.array(self._residual(jnp.asarray(thetas), batch))
-
-    def _residuals(self, theta, batch):
-        predicted = jax.vmap(self._predict_run, in_axes=(None, 0))(theta, batch)
-        return (predicted - batch.stress) * batch.weight
-
-    def _predict_run(self, theta, run):
-        instrument_times = run.times / run.clock_factor
-        felt = run.commanded_rate
-        for effect in self._kinematic:
-            felt = effect.felt_rate(theta[self.slices[effect.name]], instrument_times, felt)
-        stress = self._integrate(theta, run.times[::2], felt)
-        stress = stress + self.declared.solvent_viscosity * felt[::2]
-        record = Record(run.times[::2], felt[::2], stress, run.clock_factor)
-        for effect in self._constitutive:
-            added = effect.instantaneous_stress(theta[self.slices[effect.name]], record.shear_rate)
-            record = Record(
-                record.times, record.shear_rate, record.stress + added, run.clock_factor
-            )
-        for effect in self._signal:
-            changed = effect.recorded_stress(theta[self.slices[effect.name]], record)
-            record = Record(record.times, record.shear_rate, changed, run.clock_factor)
-        return record.stress[run.sample_index]
-
-    def _integrate(self, theta, times, rate):
-        """Return σ12 at step ends: Krogstad's method, modes along the last axis."""
-        law = self.declared.law_with(theta[2 : 2 + len(self.declared.free_parameters)])
-        # factors that are not fitted stay constants: no trial and no derivative passes through
-        modulus = jnp.asarray(self.declared.modulus)
-        relaxation_time = jnp.asarray(self.declared.relaxation_time)
-        if self.declared.fit_modulus:
-            modulus = modulus * jnp.exp(theta[0])
-        if self.declared.fit_relaxation_time:
-            relaxation_time = relaxation_time * jnp.exp(theta[1])
-        matrix = self._library.matrix(theta)
-
-        def mode_rate(stress, shear_rate):
-            zero = jnp.zeros_like(shear_rate)
-            deformation = jnp.stack([zero, zero, zero, shear_rate])
-            change = law.stress_rate(stress, shear_rate)
-            if self._library.powers:
-                change = change - self._library.extra_term(matrix, stress, deformation)
-            for effect in self._constitutive:
-                values = theta[self.slices[effect.name]]
-                change = change - effect.extra_term(values, stress, deformation)
-            # the linear relaxation is integrated exactly and so is taken out here
-            return change + stress if law.linear_relaxation else change
-
-        all_modes = jax.vmap(mode_rate, in_axes=(-1, 0), out_axes=-1)
-        decay = 1.0 / relaxation_time if law.linear_relaxation else jnp.zeros_like(relaxation_time)
-
-        def slope(state, shear_rate):
-            return all_modes(state, relaxation_time * shear_rate)
-
-        # weights of all steps at once, outside the loop: they rarely depend on the parameters
-        width = jnp.diff(times)[:, None]
-        h = width / relaxation_time
-        z = -decay * width
-        half_first, half_second, _ = phi_functions(0.5 * z)
-        first, second, third = phi_functions(z)
-        weights = (
-            jnp.exp(0.5 * z),
-            jnp.exp(z),
-            0.5 * h * half_first,
-            h * (0.5 * half_first - half_second),
-            h * half_second,
-            h * (first - 2.0 * second),
-            2.0 * h * second,
-            h * (first - 3.0 * second + 4.0 * third),
-            h * (2.0 * second - 4.0 * third),
-            h * (4.0 * third - second),
-        )
-
-        def step(state, inputs):
-            first_rate, middle_rate, last_rate, weights = inputs
-            half, full, a21, a31, a32, a41, a43, b1, b23, b4 = weights
-            n1 = slope(state, first_rate)
-            n2 = slope(half * state + a21 * n1, middle_rate)
-            n3 = slope(half * state + a31 * n1 + a32 * n2, middle_rate)
-            n4 = slope(full * state + a41 * n1 + a43 * n3, last_rate)
-            after = full * state + b1 * n1 + b23 * (n2 + n3) + b4 * n4
-            return after, after[3] @ modulus
-
-        start = jnp.zeros((4, len(self.declared.modulus)))
-        inputs = (rate[:-2:2], rate[1::2], rate[2::2], weights)
-        _, stress = jax.lax.scan(step, start, inputs)
-        return jnp.concatenate([jnp.zeros(1), stress])
+        return np.array(self._program.residuals(self._numbers, jnp.asarray(thetas), batch))

@@ -7,8 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.result import ErrorPair, RunRecord
+from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
 from discover.errors import InputError
 

@@ -6,13 +6,49 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.run_batch import RunBatch
 
 LANES = 16
 """Parameter vectors in one call of the compiled model."""
 
 _LARGEST_DAMPING = 1e7
 _MISSED = 10.0
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What other data say of some parameters, as rows of the least-squares problem.
+
+    Attributes
+    ----------
+    positions
+        Of the parameters.
+    mean
+        Their values.
+    weight
+        Residual per unit of deviation, in the units of the weighted residuals.
+    """
+
+    positions: tuple[int, ...] = ()
+    mean: tuple[float, ...] = ()
+    weight: tuple[float, ...] = ()
+
+    def rows(
+        self, theta: np.ndarray, free: Sequence[int]
+    ) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows free"]]:
+        """Return residuals and their derivatives in the free parameters."""
+        known = [i for i, position in enumerate(self.positions) if position in free]
+        residual = np.array(
+            [self.weight[i] * (theta[self.positions[i]] - self.mean[i]) for i in known]
+        )
+        design = np.zeros((len(known), len(free)))
+        for row, i in enumerate(known):
+            design[row, list(free).index(self.positions[i])] = self.weight[i]
+        return residual, design
+
+
+NO_PRIOR = Prior()
 
 
 @dataclass
@@ -59,6 +95,7 @@ def fit_batch(
     free: Sequence[Sequence[int]],
     max_steps: int = 25,
     tolerance: float = 1e-4,
+    prior: Prior = NO_PRIOR,
 ) -> list[Fit]:
     """Minimise the squared residuals from several starts, each in its own free parameters.
 
@@ -78,11 +115,20 @@ def fit_batch(
         Largest number of steps.
     tolerance
         A problem is finished when a step lowers its cost by less than this fraction.
+    prior
+        What is known of some parameters; it counts where they are free.
     """
     theta = np.array(starts, dtype=float)
     count = len(theta)
     residual = evaluate(model, batch, theta)
-    cost = _costs(residual)
+
+    def priced(costs, vectors, problems):
+        known = [
+            np.sum(prior.rows(v, free[i])[0] ** 2) for v, i in zip(vectors, problems, strict=True)
+        ]
+        return costs + np.array(known)
+
+    cost = priced(_costs(residual), theta, range(count))
     damping = np.full(count, 1e-2)
     done = ~np.isfinite(cost) | np.array([len(positions) == 0 for positions in free])
     jacobian: list[np.ndarray | None] = [None] * count
@@ -97,10 +143,11 @@ def fit_batch(
         trial = theta[going].copy()
         for row, i in enumerate(going):
             at = list(free[i])
-            moved = theta[i, at] + _step(jacobian[i], residual[i], damping[i])
+            known = prior.rows(theta[i], free[i])
+            moved = theta[i, at] + _step(jacobian[i], residual[i], damping[i], known)
             trial[row, at] = np.clip(moved, model.low[at], model.high[at])
         trial_residual = evaluate(model, batch, trial)
-        trial_cost = _costs(trial_residual)
+        trial_cost = priced(_costs(trial_residual), trial, going)
         for row, i in enumerate(going):
             if trial_cost[row] < cost[i]:
                 done[i] = 1.0 - trial_cost[row] / cost[i] < tolerance
@@ -144,22 +191,26 @@ def _costs(residual):
     return np.where(np.isfinite(cost), cost, np.inf)
 
 
-def _step(jacobian, residual, damping):
+def _step(jacobian, residual, damping, known=None):
     if len(jacobian) == 0:
         return np.zeros(0)
     design = jacobian.reshape(len(jacobian), -1).T
     if not np.all(np.isfinite(design)):
         return np.zeros(len(jacobian))
+    residual = residual.ravel()
+    if known is not None and len(known[0]):
+        residual = np.concatenate([residual, known[0]])
+        design = np.concatenate([design, known[1]])
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     scaled = design / scale
     padded = np.concatenate([scaled, np.sqrt(damping) * np.eye(len(jacobian))])
-    target = np.concatenate([-residual.ravel(), np.zeros(len(jacobian))])
+    target = np.concatenate([-residual, np.zeros(len(jacobian))])
     return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
 
 
 def leave_one_run_out(
-    model: AugmentedModel, batch: RunBatch, fit: Fit
+    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> Float[np.ndarray, " runs"]:
     """Return the relative error of each run when it is left out of the fit.
 
@@ -176,7 +227,7 @@ def leave_one_run_out(
     for left_out in range(n_runs):
         others = np.arange(n_runs) != left_out
         theta, at = fit.theta.copy(), list(fit.free)
-        step = _step(fit.jacobian[:, others], fit.residual[others], 1e-8)
+        step = _step(fit.jacobian[:, others], fit.residual[others], 1e-8, prior.rows(theta, at))
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)
     errors = np.sqrt(np.sum(evaluate(model, batch, trials) ** 2, axis=2))

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augment import AugmentedLaw, intervals
-from discover.closed_loop.augmented_model import AugmentedModel, data_scales, make_batch
+from discover.closed_loop.augment import intervals
+from discover.closed_loop.augmented_law import AugmentedLaw
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.before_after import (
     cut_to_strain,
     errors_of,
@@ -16,13 +17,16 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import summarise
+from discover.closed_loop.residual import STRUCTURE, Expectation, summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
+from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
+    ModeEffect,
+    StateEffect,
     library_effects,
     make_effect,
     named_effects,
@@ -38,9 +42,6 @@ FEWEST_LINEAR_SAMPLES = 10
 
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
-
-STRUCTURE = 1.5
-"""A residual this many times larger than noise and linear error together is not explained."""
 
 
 def run_loop(
@@ -102,16 +103,19 @@ def run_loop(
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    search = Search(model, batch, held_batch, len(candidates), _admission(fitted_runs, held_runs))
+    expectation = Expectation(noise, declared.linear_error)
+    search = Search(
+        model,
+        batch,
+        held_batch,
+        len(candidates),
+        _admission(fitted_runs, held_runs),
+        expectation,
+    )
     say(f"declared model on {len(fitted_runs)} runs")
     search.start()
     _settle(search, fitted_runs, max_effects, say)
-    while len(search.active) < max_effects:
-        choice = search.advance()
-        if choice is None:
-            say("no further candidate earns its place")
-            break
-        say(f"{choice}: error {search.error:.4f}, runs left out {search.left_out:.4f}")
+    search.run(max_effects, say)
     current, active, thetas = search.fit, search.active, search.path
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False)
     if held_batch is not None:
@@ -123,9 +127,10 @@ def run_loop(
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
-    floor = summary.noise_floor if noise is None else noise
-    expected = float(np.hypot(floor, declared.linear_error))
-    structured = after.fit > STRUCTURE * expected
+    weight = np.asarray(batch.weight)
+    floor = expectation.floor(current.residual, weight)
+    expected = expectation.size(current.residual, weight)
+    structured = not expectation.explains(current.residual, weight)
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if stages and not structured:
         verdict = "effects_added"
@@ -144,7 +149,9 @@ def run_loop(
             "autocorrelation": float(np.mean(summary.autocorrelation)),
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
-            "description": _describe(after.fit, expected, structured, worst),
+            "description": _describe(
+                after.fit, expected, structured, declared.linear_error > 0.0, worst
+            ),
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
@@ -196,7 +203,11 @@ def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
 
 
 def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> None:
-    """Find instrument effects where the strain is small and no law differs from another."""
+    """Find instrument effects where the strain is small and no law differs from another.
+
+    That holds for fluids that are linear there. Where instrument effects alone do not explain the
+    small strains, the fluid may not be, and nothing is settled.
+    """
     small = []
     for run in runs:
         reached = np.maximum.accumulate(np.abs(strain_of(run)))
@@ -207,12 +218,8 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
         return
     linear = search.restricted(make_batch(small), lambda effect: effect.kind != "constitutive")
     linear.start()
-    while len(linear.active) < max_effects:
-        name = linear.advance()
-        if name is None:
-            break
-        say(f"at small strain, {name}: error {linear.error:.4f}")
-    if linear.active:
+    linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
+    if linear.active and linear.explained:
         search.adopt(linear)
 
 
@@ -250,13 +257,16 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
     return out
 
 
-def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
+def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:
+    """Return the augmented fluid; None where it has a state that a law cannot carry."""
     declared = model.declared
     added = [
         (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))
         for effect in model.effects
         if effect.name in active and isinstance(effect, ConstitutiveEffect)
     ]
+    if any(isinstance(effect, StateEffect) for effect, _ in added):
+        return None
     base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     law = AugmentedLaw(
         base=base,
@@ -268,22 +278,28 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
     viscosity = declared.solvent_viscosity + sum(
         float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
     )
+    modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
+    modulus = declared.modulus * np.exp(fit.theta[0])
+    relaxation_time = declared.relaxation_time * np.exp(fit.theta[1])
     return Fluid(
         law,
-        declared.modulus * np.exp(fit.theta[0]),
-        declared.relaxation_time * np.exp(fit.theta[1]),
+        np.append(modulus, [float(pair[0]) for pair in modes]),
+        np.append(relaxation_time, [float(pair[1]) for pair in modes]),
         viscosity,
     )
 
 
-def _describe(error: float, expected: float, structured: bool, worst) -> str:
-    if structured:
+def _describe(error: float, expected: float, structured: bool, linear: bool, worst) -> str:
+    causes = "noise and the error of the linear data explain" if linear else "noise explains"
+    missed = f"The fitted runs are missed by {100 * error:.2g} %"
+    if not structured:
+        return f"{missed}, as {causes} ({100 * expected:.2g} %)."
+    if error > STRUCTURE * expected:
         return (
-            f"The fitted runs are missed by {100 * error:.1f} %, more than noise and the error of "
-            f"the linear data explain ({100 * expected:.1f} %); the worst run is {worst.name}. "
-            "Some effect is still missing."
+            f"{missed}, more than {causes} ({100 * expected:.2g} %); the worst run is "
+            f"{worst.name}. Some effect is still missing."
         )
     return (
-        f"The fitted runs are missed by {100 * error:.1f} %, as noise and the error of the linear "
-        f"data explain ({100 * expected:.1f} %)."
+        f"{missed}, hardly more than {causes} ({100 * expected:.2g} %), but what is left has a "
+        f"pattern that noise has not; the worst run is {worst.name}. Some effect is still missing."
     )

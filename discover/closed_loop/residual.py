@@ -1,9 +1,19 @@
 """What a residual is made of: noise, or structure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
+
+LAGS = 12
+"""Neighbours up to which noise is tested for correlation."""
+
+SIGNIFICANCE = 1e-3
+"""Noise is taken for structure this often."""
+
+_LARGEST_CORRELATION = 0.9
 
 
 @dataclass(frozen=True)
@@ -60,3 +70,113 @@ def summarise(
         correlation.append(rho)
         effective += max(1.0, n * (1.0 - rho) / (1.0 + rho))
     return ResidualSummary(np.array(noise), np.array(correlation), effective)
+
+
+def noise_floor(
+    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
+) -> float:
+    """Return the relative noise, mean over runs.
+
+    Where the residual is noise, white or of first order, that is its size. Where it holds
+    structure, it is the part of it that changes from sample to sample, see `summarise`; noise
+    that is correlated itself is then underestimated.
+    """
+    if is_noise(residual, weight):
+        return float(np.mean(np.sqrt(np.sum(np.asarray(residual) ** 2, axis=1))))
+    return summarise(residual, weight).noise_floor
+
+
+def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]) -> bool:
+    """Return whether residuals may be noise, white or with a first-order correlation.
+
+    Runs too short to be tested do not say that they are not; see `noise_probability`.
+    """
+    probability = noise_probability(residual, weight)
+    return probability is None or probability > SIGNIFICANCE
+
+
+def noise_probability(
+    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
+) -> float | None:
+    """Return how probable residuals as structured as these are, if they are noise.
+
+    The noise may be white or have a first-order correlation. A portmanteau test   [Ljung & Box
+    1978, Biometrika 65, 297] of what an autoregression of first order leaves, once on the
+    correlations of all runs taken together, and once run by run, which finds patterns of their
+    own; and a test of the sum over runs sample by sample, which finds a pattern that all share,
+    since the noise of one run knows nothing of another's. The smallest probability counts three
+    times, for there are three tests. None if every run is too short.
+
+    Parameters
+    ----------
+    residual, weight
+        As in `summarise`.
+    """
+    rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
+    rows = [row / np.sqrt(np.mean(row**2)) for row in rows if len(row) >= 2 * LAGS and np.any(row)]
+    if not rows:
+        return None
+    # noise of one instrument has one correlation
+    together = _correlations(rows, 1)[0][0]
+    rho = float(np.clip(together, 0.0, _LARGEST_CORRELATION))
+    first = np.sqrt(1.0 - rho**2)
+    white = [np.append(first * row[0], row[1:] - rho * row[:-1]) for row in rows]
+    white = [row / np.sqrt(np.mean(row**2)) for row in white]
+    shared, variance = _correlations(white, LAGS)
+    pooled = chi2.sf(float(np.sum(shared**2 / variance)), LAGS - 1)
+    own = 0.0
+    for row in white:
+        correlation, variance = _correlations([row], LAGS)
+        own += float(np.sum(correlation**2 / variance))
+    each = chi2.sf(own, LAGS * len(white) - 1)
+    length = min(len(row) for row in white)
+    common = np.sum([row[:length] for row in white], axis=0) / np.sqrt(len(white))
+    # one run shares its pattern with none
+    alike = chi2.sf(float(common @ common), length) if len(white) > 1 else 1.0
+    return float(min(1.0, 3.0 * min(pooled, each, alike)))
+
+
+STRUCTURE = 1.5
+"""A residual this many times larger than noise and linear error together is not explained."""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a complete model may leave of the data.
+
+    Attributes
+    ----------
+    noise
+        Relative noise, where it is known.
+    linear_error
+        Relative error of the linear data that the declared modes come from.
+    """
+
+    noise: float | None = None
+    linear_error: float = 0.0
+
+    def floor(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+        """Return the relative noise, known or estimated."""
+        return noise_floor(residual, weight) if self.noise is None else self.noise
+
+    def size(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+        """Return the relative error that noise and linear error together explain."""
+        return float(np.hypot(self.floor(residual, weight), self.linear_error))
+
+    def explains(self, residual: Float[np.ndarray, "runs n"], weight) -> bool:
+        """Return whether noise and the error of the linear data explain a residual."""
+        error = float(np.mean(np.sqrt(np.sum(np.asarray(residual) ** 2, axis=1))))
+        if error > STRUCTURE * self.size(residual, weight):
+            return False
+        # without an error of the linear data to allow for, what is left must look like noise
+        judged = self.noise is not None or self.linear_error > 0.0
+        return judged or is_noise(residual, weight)
+
+
+def _correlations(rows: Sequence[np.ndarray], lags: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return correlations at lags 1, 2, … over several rows, and their variance in white noise."""
+    total = sum(float(row @ row) for row in rows)
+    count = sum(len(row) for row in rows)
+    values = [sum(float(row[k:] @ row[:-k]) for row in rows) / total for k in range(1, lags + 1)]
+    pairs = np.array([sum(len(row) - k for row in rows) for k in range(1, lags + 1)])
+    return np.array(values), pairs / (count * (count + 2.0))

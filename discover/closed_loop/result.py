@@ -122,7 +122,8 @@ class LoopResult:
     declared_parameters
         Fitted factors on moduli and relaxation times, where asked for.
     fluid
-        The augmented fluid, without instrument effects.
+        The augmented fluid, without instrument effects; None where an effect gives it a state that
+        no law of stress and rate can carry.
     seconds
         Time taken.
     """

@@ -5,11 +5,39 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore, attribute
-from discover.closed_loop.augment import choose, prune, refit
-from discover.closed_loop.augmented_model import AugmentedModel, RunBatch
-from discover.closed_loop.least_squares import Fit, fit_batch, leave_one_run_out
+from discover.closed_loop.augment import (
+    BARE_MENTION,
+    IMPROVEMENT,
+    aliases_of,
+    choose,
+    evidence,
+    intervals,
+    prune,
+    refit,
+    simplest,
+)
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.least_squares import (
+    LANES,
+    NO_PRIOR,
+    Fit,
+    Prior,
+    evaluate,
+    fit_batch,
+    jacobians,
+    leave_one_run_out,
+)
+from discover.closed_loop.residual import (
+    SIGNIFICANCE,
+    Expectation,
+    noise_probability,
+    summarise,
+)
+from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 from discover.errors import InputError
+
+_ROUNDS, _POLISHES = 3, 5
 
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
@@ -30,6 +58,8 @@ class Search:
         Number of candidates, the price of choosing among which every effect must pay.
     admitted
         Which effects are candidates.
+    expectation
+        What a complete model may leave of the data.
 
     Attributes
     ----------
@@ -45,6 +75,10 @@ class Search:
         Aliases and evidence of each effect when it was added.
     left_out
         Mean error of runs left out.
+    settled
+        Effects established at small strain.
+    known
+        Mean and standard deviation of parameters determined there, by position.
     """
 
     def __init__(
@@ -54,9 +88,11 @@ class Search:
         held_batch: RunBatch | None,
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
+        expectation: Expectation | None = None,
     ):
         self.model, self.batch, self.held_batch = model, batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
+        self.expectation = expectation or Expectation()
         self.active: list[str] = []
         self.settled: tuple[str, ...] = ()
         self.rankings: list[tuple[CandidateScore, ...]] = []
@@ -65,15 +101,38 @@ class Search:
         self.fit: Fit
         self.path: list[np.ndarray] = []
         self.left_out = float("inf")
+        self.known: dict[int, tuple[float, float]] = {}
+
+    @property
+    def prior(self) -> Prior:
+        """What small strains said of parameters, weighed against the current misfit.
+
+        The misfit counts as noise on as many samples as its correlation leaves independent: while
+        a law is still missing it cannot move an instrument's parameter that is known.
+        """
+        if not self.known:
+            return NO_PRIOR
+        effective = summarise(self.fit.residual, np.asarray(self.batch.weight)).effective_samples
+        size = float(np.sqrt(self.fit.cost / effective))
+        return Prior(
+            tuple(self.known),
+            tuple(mean for mean, _ in self.known.values()),
+            tuple(size / deviation for _, deviation in self.known.values()),
+        )
 
     @property
     def error(self) -> float:
         """Mean relative error of the fitted runs."""
         return float(np.mean(self.fit.run_errors))
 
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is what a complete model may leave."""
+        return self.expectation.explains(self.fit.residual, np.asarray(self.batch.weight))
+
     def restricted(self, batch: RunBatch, admitted: Callable[[AbstractEffect], bool]) -> "Search":
         """Return a new search on other samples among fewer candidates."""
-        return Search(self.model, batch, None, self.n_candidates, admitted)
+        return Search(self.model, batch, None, self.n_candidates, admitted, self.expectation)
 
     def start(self) -> None:
         """Fit the declared model.
@@ -93,23 +152,153 @@ class Search:
         self.path = [self.fit.theta]
         self._leave_out()
 
+    def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
+        """Add effects until none earns its place, and see that each still deserves its own."""
+        for _ in range(_ROUNDS):
+            while len(self.active) < max_effects:
+                name = self.advance()
+                if name is None and look_ahead and not self.explained:
+                    name = self.look_ahead(max_effects)
+                if name is None:
+                    say("no further candidate earns its place")
+                    break
+                say(f"{name}: error {self.error:.4f}, runs left out {self.left_out:.4f}")
+            if not self.reexamine():
+                break
+            say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
+
+    def look_ahead(self, max_effects: int) -> str | None:
+        """Add several effects at once that only together earn their places; return their names.
+
+        While two effects are missing, what the second leaves looks like correlated noise and hides
+        the evidence for the first. So the best is taken on trust, and the next; the whole must
+        then pay for all its members, and each of them is asked again.
+        """
+        before, left_out, active = self.fit, self.left_out, list(self.active)
+        fit, kept = before, list(active)
+        while len(kept) < max_effects:
+            leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.admitted).leading
+            choices = refit(self.model, self.batch, fit, leading, self.n_candidates, self.prior)
+            choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
+            if not choices:
+                break
+            best = max(choices, key=lambda choice: choice.candidate.evidence or -np.inf)
+            fit = best.fit
+            kept.append(best.candidate.effect)
+            added = len(kept) - len(active)
+            effective = summarise(fit.residual, np.asarray(self.batch.weight)).effective_samples
+            support = evidence(before, fit, effective, self.n_candidates, added)
+            errors = leave_one_run_out(self.model, self.batch, fit, self.prior)
+            if added < 2 or support <= BARE_MENTION or np.mean(errors) >= IMPROVEMENT * left_out:
+                continue
+            self.fit = fit
+            self.fit, self.active = prune(
+                self.model, self.batch, fit, kept, self.n_candidates, self.settled, self.prior
+            )
+            new = [name for name in self.active if name not in active]
+            for name in new:
+                self.aliases[name] = ()
+                self.support[name] = support / len(new)
+            self._fit_path()
+            self._leave_out()
+            # the first was taken on trust, with the others still missing
+            for name in new[:-1]:
+                self._exchange(name)
+            return ", ".join(name for name in self.active if name not in active)
+        return None
+
+    def reexamine(self) -> bool:
+        """Ask of each effect but the last whether another serves better now; say if one does.
+
+        An effect was chosen when those after it were still missing, and may have stood for a part
+        of them. What was settled at small strain gives way only where the whole is then explained:
+        the misfit of a law still missing cannot judge the instrument.
+        """
+        asked = list(self.active)
+        if self.active and not self.settled:
+            asked = [name for name in asked if name != self.active[-1]]
+        exchanged = False
+        for name in asked:
+            exchanged |= self._exchange(name)
+        return exchanged
+
+    def _exchange(self, name: str) -> bool:
+        own = self.model.positions(name)
+        without = self._without(own)
+        others = [other for other in self.active if other != name]
+
+        def rival(effect: AbstractEffect) -> bool:
+            return effect.name != name and self.admitted(effect)
+
+        leading = attribute(self.model, self.batch, without, others, LEADERS, rival).leading
+        current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
+        # one more than fills the lanes would cost twice as much
+        asked = [current, *leading][:LANES]
+        choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
+        choices = [c for c in choices if self._predictable(c.fit.theta)]
+        if not any(c.candidate is current for c in choices):
+            return False
+        best = simplest(choices, self.model)
+        if (best.candidate.evidence or 0.0) < (current.evidence or 0.0):
+            best = next(c for c in choices if c.candidate is current)
+        explained = self.expectation.explains(best.fit.residual, np.asarray(self.batch.weight))
+        if name in self.settled and not explained:
+            return False
+        self.aliases[name] = aliases_of(best, choices)
+        if best.candidate is current:
+            return False
+        new = best.candidate.effect
+        self.aliases[new] = self.aliases.pop(name)
+        self.support[new] = self.support.pop(name)
+        self.active[self.active.index(name)] = new
+        self.settled = tuple(n for n in self.settled if n != name)
+        self.known = {at: value for at, value in self.known.items() if at not in own}
+        self.fit = best.fit
+        self._polish()
+        self._fit_path()
+        self._leave_out()
+        return True
+
+    def _without(self, positions: Sequence[int]) -> Fit:
+        """Return the current fit with an effect taken out and the others refitted."""
+        theta = self.fit.theta.copy()
+        theta[positions] = self.model.zero()[positions]
+        free = tuple(p for p in self.fit.free if p not in positions)
+        fit = fit_batch(self.model, self.batch, [theta], [free], prior=self.prior)[0]
+        if fit.usable:
+            return fit
+        residual = evaluate(self.model, self.batch, [theta])
+        return Fit(
+            theta,
+            free,
+            residual[0],
+            jacobians(self.model, self.batch, [theta], residual, [free])[0],
+        )
+
     def advance(self) -> str | None:
         """Add the effect that earns its place, and return its name, or None."""
         attribution = attribute(
             self.model, self.batch, self.fit, self.active, LEADERS, self.admitted
         )
-        choices = refit(self.model, self.batch, self.fit, attribution.leading, self.n_candidates)
+        choices = refit(
+            self.model, self.batch, self.fit, attribution.leading, self.n_candidates, self.prior
+        )
         choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
-        chosen = choose(choices, self.left_out)
+        chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
-        if chosen is None:
+        # what cannot be told from noise gives no reason to add anything
+        probability = noise_probability(self.fit.residual, np.asarray(self.batch.weight))
+        noise = probability is not None and probability > SIGNIFICANCE
+        if chosen is None or noise:
             return None
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
         kept = [*self.active, name]
+        self.fit = chosen.fit
+        self._polish()
         self.fit, self.active = prune(
-            self.model, self.batch, chosen.fit, kept, self.n_candidates, self.settled
+            self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
         )
         if len(self.active) < len(kept):
             # the stages must tell how the final model is reached, so they are fitted again
@@ -126,7 +315,14 @@ class Search:
         self.aliases |= other.aliases
         self.support |= other.support
         self.rankings += other.rankings[: len(other.active)]
+        bounds = intervals(other.model, other.batch, other.fit)
+        for name in other.active:
+            for at in self.model.positions(name):
+                deviation = (bounds[at][1] - bounds[at][0]) / (2.0 * 1.96)
+                if deviation > 0.0:
+                    self.known[at] = (float(other.fit.theta[at]), deviation)
         self.fit = self._fit(self.active, other.fit.theta)
+        self._polish()
         self._fit_path()
         self._leave_out()
 
@@ -137,14 +333,29 @@ class Search:
         ]
         start = self.model.zero()
         start[positions] = values[positions]
-        return fit_batch(self.model, self.batch, [start], [positions])[0]
+        return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]
+
+    def _polish(self) -> None:
+        """Fit again while a better fit weighs what is known otherwise."""
+        for _ in range(_POLISHES if self.known else 0):
+            before = self.fit.cost
+            again = fit_batch(
+                self.model, self.batch, [self.fit.theta], [self.fit.free], prior=self.prior
+            )[0]
+            if not again.usable:
+                break
+            self.fit = again
+            if abs(again.cost - before) < 1e-3 * before:
+                break
 
     def _fit_path(self) -> None:
         earlier = [self._fit(self.active[:n], self.fit.theta) for n in range(len(self.active))]
         self.path = [*(fit.theta for fit in earlier), self.fit.theta]
 
     def _leave_out(self) -> None:
-        self.left_out = float(np.mean(leave_one_run_out(self.model, self.batch, self.fit)))
+        self.left_out = float(
+            np.mean(leave_one_run_out(self.model, self.batch, self.fit, self.prior))
+        )
 
     def _predictable(self, theta: np.ndarray) -> bool:
         # flows are commanded before they are measured: a law that cannot be integrated through a

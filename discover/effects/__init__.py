@@ -5,8 +5,11 @@ from discover.effects.base import (
     ConstitutiveEffect,
     EffectParameter,
     KinematicEffect,
+    ModeEffect,
     Record,
+    SeriesElement,
     SignalEffect,
+    StateEffect,
 )
 from discover.effects.library_term import LibraryTerm, library_effects, library_term
 from discover.effects.registry import make_effect, named_effects
@@ -17,8 +20,11 @@ __all__ = [
     "EffectParameter",
     "KinematicEffect",
     "LibraryTerm",
+    "ModeEffect",
     "Record",
+    "SeriesElement",
     "SignalEffect",
+    "StateEffect",
     "library_effects",
     "library_term",
     "make_effect",

@@ -11,7 +11,18 @@ from tensor_library.algebra import Symmetric
 
 Kind = Literal["constitutive", "kinematic", "signal"]
 
-Scale = Literal["one", "sampling_time", "stress", "viscosity", "stress_rate", "inertia"]
+Scale = Literal[
+    "one",
+    "sampling_time",
+    "run_time",
+    "strain",
+    "stress",
+    "inverse_stress",
+    "fluidity",
+    "viscosity",
+    "stress_rate",
+    "inertia",
+]
 """What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
 
 
@@ -60,6 +71,9 @@ class AbstractEffect(ABC):
         Literature.
     check
         What a user should do in the laboratory to confirm it.
+    visible
+        Size from which it shows, in words: the amplitude that changes the stress by about 5 % in
+        a flow that it affects.
     complexity
         Used to prefer the simpler of two explanations that the data cannot separate.
     """
@@ -69,6 +83,7 @@ class AbstractEffect(ABC):
     equation: str
     source: str
     check: str
+    visible: str = ""
     complexity: int = 1
     kind: ClassVar[Kind]
 
@@ -109,6 +124,53 @@ class ConstitutiveEffect(AbstractEffect):
         return jnp.zeros_like(shear_rate)
 
 
+class ModeEffect(ConstitutiveEffect):
+    """A relaxation mode beside the declared ones, which obeys the same law."""
+
+    @abstractmethod
+    def mode(self, values: Float[Array, " p"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
+        """Return its modulus in Pa and its relaxation time in s."""
+
+
+class StateEffect(ConstitutiveEffect):
+    """A scalar state of the fluid, integrated with the modes, that changes their stress or time.
+
+    The state starts at `rest` and obeys ds/dt = source − decay · s, both of which may depend on
+    the flow. With all factors one the law is unchanged.
+    """
+
+    rest: ClassVar[float] = 0.0
+
+    @abstractmethod
+    def source_and_decay(
+        self,
+        values: Float[Array, " p"],
+        shear_rate: Float[Array, ""],
+        stress: Float[Array, ""],
+    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
+        """Return source and decay in 1/s.
+
+        Parameters
+        ----------
+        values
+            Parameters in their order.
+        shear_rate, stress
+            In 1/s and Pa.
+        """
+
+    def modulus_factor(
+        self, values: Float[Array, " p"], state: Float[Array, ""]
+    ) -> Float[Array, ""]:
+        """Return the factor on the stress of all modes."""
+        del values
+        return jnp.ones_like(state)
+
+    def time_factor(self, values: Float[Array, " p"], state: Float[Array, ""]) -> Float[Array, ""]:
+        """Return the factor on all relaxation times."""
+        del values
+        return jnp.ones_like(state)
+
+
 @dataclass(frozen=True)
 class Record:
     """A signal of one run on a grid of times.
@@ -135,13 +197,19 @@ class Record:
         """Times on the instrument's clock, in s."""
         return self.times / self.clock_factor
 
+    @property
+    def total_strain(self) -> Float[Array, " n"]:
+        """Strain added up without regard to its sign, at each time."""
+        size = jnp.abs(self.shear_rate)
+        steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(self.times)
+        return jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
+
 
 class KinematicEffect(AbstractEffect):
     """Changes the deformation that the fluid really felt."""
 
     kind: ClassVar[Kind] = "kinematic"
 
-    @abstractmethod
     def felt_rate(
         self,
         values: Float[Array, " p"],
@@ -160,6 +228,22 @@ class KinematicEffect(AbstractEffect):
         shear_rate
             In 1/s, taken to be linear between times.
         """
+        del values, instrument_times
+        return shear_rate
+
+
+class SeriesElement(KinematicEffect):
+    """Something that gives way in series with the fluid and so feels its stress.
+
+    Of the commanded deformation it takes C σ (a spring) and ∫ s σ dt (a dashpot):
+    γ̇_felt = γ̇ − s σ − C dσ/dt. The integrator solves this with the stress.
+    """
+
+    @abstractmethod
+    def slip_and_compliance(
+        self, values: Float[Array, " p"]
+    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
+        """Return s in 1/(Pa s) and C in 1/Pa."""
 
 
 class SignalEffect(AbstractEffect):

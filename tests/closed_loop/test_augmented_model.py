@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.augmented_model import AugmentedModel, make_batch
+from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import fit_batch, leave_one_run_out
+from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearRun
 from discover.effects import make_effect
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
@@ -51,11 +52,14 @@ def test_a_slow_rise_of_the_rate_is_the_flow_with_that_rate():
 
 
 def test_runs_of_different_length_do_not_touch_each_other():
-    model = AugmentedModel(DECLARED, [make_effect("giesekus_mobility")])
+    effects = ["giesekus_mobility", "instrument_inertia", "tool_compliance"]
+    model = AugmentedModel(DECLARED, [make_effect(name) for name in effects])
     short = make_run("short", start_up(1.0), times=np.array([0.5, 1.0]))
     long = make_run("long", start_up(5.0))
     theta = model.zero() + 0.0
     theta[model.positions("giesekus_mobility")] = 0.2
+    # the rate is steady: no inertia, unless it were seen to stop where the padding starts
+    theta[model.positions("instrument_inertia")] = 10.0
     alone = model.predict(theta, make_batch([short]))[0]
     together = model.predict(theta, make_batch([short, long]))[0][:2]
     np.testing.assert_allclose(together, alone, rtol=1e-9)

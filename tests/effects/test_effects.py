@@ -6,15 +6,18 @@ import pytest
 from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
+    ModeEffect,
     Record,
+    SeriesElement,
     SignalEffect,
+    StateEffect,
     library_effects,
     make_effect,
     named_effects,
 )
 from discover.effects.filters import first_order_lag
 from discover.errors import InputError
-from discover.laws import LAWS
+from discover.laws import LAWS, FenePeterlin
 from tensor_library.algebra import from_shear
 
 NAMED = list(named_effects().values())
@@ -31,6 +34,15 @@ def values_of(effect, amplitude):
 def response(effect, amplitude):
     """Return all that an effect can change, as one vector."""
     values = values_of(effect, amplitude)
+    if isinstance(effect, ModeEffect):
+        return effect.mode(values)[0]
+    if isinstance(effect, StateEffect):
+        source, decay = effect.source_and_decay(values, jnp.asarray(1.5), jnp.asarray(0.7))
+        state = effect.rest + 0.1 * (source - decay * effect.rest)
+        factors = [effect.modulus_factor(values, state), effect.time_factor(values, state)]
+        return jnp.stack(factors) - 1.0
+    if isinstance(effect, SeriesElement):
+        return jnp.stack(effect.slip_and_compliance(values))
     if isinstance(effect, ConstitutiveEffect):
         return jnp.concatenate(
             [
@@ -59,6 +71,7 @@ def test_an_effect_says_where_it_comes_from_and_how_to_confirm_it(effect):
     assert effect.source
     assert effect.check
     assert effect.equation
+    assert effect.visible
     assert effect.parameters[0].low <= 0.0 <= effect.parameters[0].high
 
 
@@ -129,6 +142,49 @@ def test_inertia_adds_the_slope_of_the_rate():
     added = make_effect("instrument_inertia").recorded_stress(jnp.array([3.0]), record()) - SIGNAL
     # central differences of step 0.05: error below h^2/6
     np.testing.assert_allclose(added[1:-1], -3.0 * jnp.sin(TIMES[1:-1]), atol=3.0 * 0.05**2)
+
+
+def test_inertia_grows_as_the_square_of_frequency_in_phase_with_the_strains_acceleration():
+    inertia = make_effect("instrument_inertia")
+
+    def added(frequency):
+        # strain sin(ωt), so that the rate is ω cos(ωt) and the acceleration −ω² sin(ωt)
+        times = jnp.linspace(0.0, 2 * jnp.pi / frequency, 2001)
+        rate = frequency * jnp.cos(frequency * times)
+        flow = Record(times, rate, jnp.zeros_like(times), jnp.ones(()))
+        return jnp.sin(frequency * times), inertia.recorded_stress(jnp.array([0.1]), flow)
+
+    (strain, slow), (_, fast) = added(1.0), added(2.0)
+    # central differences of step 2π/2000: error of 2e-6, one-sided at the ends
+    np.testing.assert_allclose(slow[1:-1], -0.1 * strain[1:-1], atol=1e-6)
+    np.testing.assert_allclose(fast[1:-1], 4.0 * slow[1:-1], atol=4e-6)
+
+
+def test_friction_turns_with_the_direction_and_an_offset_does_not():
+    friction = make_effect("bearing_friction").recorded_stress(jnp.array([0.2]), record()) - SIGNAL
+    np.testing.assert_allclose(friction, 0.2 * jnp.sign(jnp.cos(TIMES)), atol=1e-15)
+    offset = make_effect("stress_offset").recorded_stress(jnp.array([0.2]), record()) - SIGNAL
+    np.testing.assert_allclose(offset, 0.2, atol=1e-15)
+
+
+def test_an_edge_is_whole_up_to_the_critical_strain_and_then_loses_its_share_with_strain():
+    steady = Record(TIMES, jnp.full_like(TIMES, 2.0), SIGNAL, jnp.ones(()))
+    ratio = make_effect("edge_fracture").recorded_stress(jnp.array([0.3, 3.0]), steady) / SIGNAL
+    strain = 2.0 * TIMES
+    np.testing.assert_allclose(ratio, jnp.exp(-0.3 * jnp.maximum(strain - 3.0, 0)), rtol=1e-12)
+
+
+def test_finite_extensibility_is_the_law_of_bird_dotson_and_johnson():
+    added = make_effect("finite_extensibility").extra_term(jnp.array([1 / 30]), STRESS, RATE)
+    law = FenePeterlin(30.0)
+    np.testing.assert_allclose(added, law.extra_term(STRESS, RATE), rtol=1e-12)
+
+
+def test_below_yield_nothing_relaxes_and_far_beyond_it_all_does():
+    effect = make_effect("yield_stress")
+    np.testing.assert_allclose(effect.extra_term(jnp.array([5.0]), STRESS, RATE), -STRESS)
+    large = effect.extra_term(jnp.array([5.0]), 1e6 * STRESS, RATE)
+    assert np.max(np.abs(large)) < 1e-4 * np.max(np.abs(1e6 * STRESS))
 
 
 def test_any_library_term_is_an_effect_and_an_unknown_name_is_refused():

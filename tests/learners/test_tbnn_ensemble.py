@@ -14,7 +14,7 @@ from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, t
 from discover.learners.tbnn_ude.least_squares import Stopping
 from discover.learners.tbnn_ude.prior import sample_states
 from discover.learners.tbnn_ude.problem import make_problem
-from discover.learners.tbnn_ude.recipe_default import train_default
+from discover.learners.tbnn_ude.recipe_default import initial_law, invariant_sizes
 from discover.learners.tbnn_ude.spread import coefficient_spread, member_predictions
 from discover.protocols import oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
@@ -31,44 +31,47 @@ def problem():
 
 
 @pytest.fixture(scope="module")
-def first(problem):
-    return train_default(problem, jax.random.key(0), True, RECIPE)
+def found(problem):
+    """A law whose coefficient on σ may vary, as a search for tensors would leave it."""
+    law = initial_law(jax.random.key(0), RECIPE.width, True, jnp.ones(8))
+    scale = invariant_sizes(sample_states(law, problem))
+    law = initial_law(jax.random.key(0), RECIPE.width, True, scale)
+    return eqx.tree_at(lambda tree: tree.network_mask, law, jnp.zeros(8).at[1].set(1.0))
 
 
 @pytest.fixture(scope="module")
-def members(problem, first):
-    return train_members(problem, first.law, jax.random.split(jax.random.key(1), 3), RECIPE)
+def members(problem, found):
+    return train_members(problem, found, jax.random.split(jax.random.key(1), 3), RECIPE)
 
 
-def test_members_share_the_tensors_and_differ_in_their_weights(first, members):
-    assert first.varies
+def test_members_share_the_tensors_and_differ_in_their_weights(found, members):
     for member in members:
-        np.testing.assert_array_equal(member.network_mask, first.law.network_mask)
+        np.testing.assert_array_equal(member.network_mask, found.network_mask)
     layers = [np.asarray(member.network.layers[0].weight) for member in members]
     assert not np.allclose(layers[0], layers[1])
 
 
-def test_a_member_side_by_side_is_the_member_alone(problem, first, members):
-    alone = train_members(problem, first.law, jax.random.split(jax.random.key(1), 3)[1:2], RECIPE)
+def test_a_member_side_by_side_is_the_member_alone(problem, found, members):
+    alone = train_members(problem, found, jax.random.split(jax.random.key(1), 3)[1:2], RECIPE)
     together, single = (member_misfits(stack_members(m), problem) for m in (members, alone))
     # a batched matrix product rounds otherwise; twenty steps of a descent amplify that
     assert together[1] == pytest.approx(single[0], rel=1e-3)
 
 
-def test_early_steps_side_by_side_are_those_alone_to_rounding(problem, first):
+def test_early_steps_side_by_side_are_those_alone_to_rounding(problem, found):
     few = replace(RECIPE, steps=2, polish_steps=2)
     keys = jax.random.split(jax.random.key(1), 3)
-    together = train_members(problem, first.law, keys, few)[1]
-    (alone,) = train_members(problem, first.law, keys[1:2], few)
-    cloud = sample_states(first.law, problem)
+    together = train_members(problem, found, keys, few)[1]
+    (alone,) = train_members(problem, found, keys[1:2], few)
+    cloud = sample_states(found, problem)
     # rounding of batched products, 1e-16, by the condition of damped normal equations
     np.testing.assert_allclose(cloud.coefficients(together), cloud.coefficients(alone), atol=1e-8)
 
 
-def test_every_member_learns(problem, first, members):
+def test_every_member_learns(problem, found, members):
     untrained = train_members(
         problem,
-        first.law,
+        found,
         jax.random.split(jax.random.key(1), 3),
         DefaultRecipe(width=6, steps=1, polish_steps=1, max_tensors=1),
     )
@@ -86,7 +89,8 @@ def test_where_constants_suffice_members_do_not_differ_and_it_is_said(constant):
     assert len(constant.members_) == len(constant.ensemble_fluids_) == 3
     assert constant.result_.details["ensemble"].startswith("constants suffice")
     assert all(member is constant.law_ for member in constant.members_)
-    assert not any(constant.result_.details["coefficient_spread_of_members"].values())
+    spread = constant.result_.details["coefficient_spread_of_members"]
+    assert max(spread.values()) < 1e-15  # rounding of a mean of three equal numbers
     predicted = constant.predict_members(TEST, TIMES)
     for quantity in ("sigma12", "N1", "N2"):
         low, high = predicted.band(quantity)

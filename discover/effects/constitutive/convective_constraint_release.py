@@ -28,6 +28,7 @@ EFFECT = ConvectiveConstraintRelease(
     ),
     source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
     check="A steady shear stress that does not fall with rate; step strain after start-up.",
+    visible="c of about 0.02 at a Weissenberg number of 1.",
     complexity=3,
     explicit_rate=True,
 )

@@ -19,4 +19,5 @@ EFFECT = GiesekusMobility(
     equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
     source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
     check="A second normal stress difference N2/N1 near -alpha/2 at low rates.",
+    visible="alpha of about 0.05 at a Weissenberg number of 1.",
 )

@@ -19,4 +19,5 @@ EFFECT = SolventViscosity(
     equation=r"\sigma \mathrel{+}= \eta_s\,\dot\gamma",
     source="Oldroyd 1950, Proc. R. Soc. A 200, 523",
     check="A stress jump when the rate jumps; G'' linear in frequency at high frequency.",
+    visible="eta_s of about 5 % of the zero-shear viscosity; less where the rate changes fast.",
 )

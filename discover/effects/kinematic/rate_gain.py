@@ -18,4 +18,5 @@ EFFECT = RateGain(
     equation=r"\dot\gamma_\mathrm{felt} = (1 + g)\,\dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: errors of cone angle and gap",
     check="Measure a Newtonian oil; measure the gap and the cone angle.",
+    visible="g of about 0.05.",
 )

@@ -27,4 +27,5 @@ EFFECT = InstrumentInertia(
     equation=r"\sigma_\mathrm{rec} = \sigma + I\,\frac{d\dot\gamma}{dt}",
     source="Krieger 1990, J. Rheol. 34, 471",
     check="Oscillate a Newtonian oil over the same frequencies; compare the raw phase.",
+    visible="I omega of about 5 % of the dynamic viscosity at the highest frequency omega.",
 )

@@ -17,4 +17,5 @@ EFFECT = StressDrift(
     equation=r"\sigma_\mathrm{rec} = \sigma + d\,t",
     source="Macosko 1994, Rheology, ch. 8: transducer drift",
     check="Record the stress of a sample at rest for as long as the longest run.",
+    visible="d times the length of a run of about 10 % of its root-mean-square stress.",
 )

@@ -17,4 +17,5 @@ EFFECT = StressGain(
     equation=r"\sigma_\mathrm{rec} = (1 + g)\,\sigma",
     source="Macosko 1994, Rheology, ch. 8: calibration and sample radius",
     check="Calibrate the transducer with a dead weight; look at the filling of the gap.",
+    visible="g of about 0.05.",
 )

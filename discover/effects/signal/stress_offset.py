@@ -17,4 +17,5 @@ EFFECT = StressOffset(
     equation=r"\sigma_\mathrm{rec} = \sigma + \sigma_0",
     source="Macosko 1994, Rheology, ch. 8: transducer zero",
     check="Record the stress before the flow starts.",
+    visible="sigma_0 of about 5 % of the root-mean-square stress.",
 )

@@ -22,4 +22,7 @@ EFFECT = TimeDelay(
     equation=r"\sigma_\mathrm{rec}(t) = \sigma(t - \delta)",
     source="Macosko 1994, Rheology, ch. 8: data acquisition",
     check="Record the angle and the torque of an elastic spring together.",
+    visible=(
+        "delta of about 5 % of the time in which the stress changes, 0.05/omega in oscillation."
+    ),
 )

@@ -20,4 +20,5 @@ EFFECT = TransducerLag(
     equation=r"\tau\,\frac{d\sigma_\mathrm{rec}}{dt} + \sigma_\mathrm{rec} = \sigma",
     source="Mackay & Halley 1991, J. Rheol. 35, 1609: response of force transducers",
     check="Look up the filter of the transducer; strike it and record the response.",
+    visible="tau of about 5 % of the time in which the stress changes, 0.05/omega in oscillation.",
 )

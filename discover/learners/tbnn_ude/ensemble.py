@@ -161,7 +161,7 @@ def _round(
         weights, state, _ = _advance(weights, parts, problem, state)
         costs = np.asarray(_costs(state))
         for i in np.flatnonzero(going):
-            misfits[i] = norm_of_cost(costs[i])
+            misfits[i] = norm_of_cost(float(costs[i]))
             if np.isfinite(misfits[i]):
                 best[i] = np.asarray(weights[i])
             going[i] = not stopping[i].done(float(misfits[i]))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import lineax
 import numpy as np
 import optimistix
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
@@ -155,7 +155,7 @@ def minimise(
     best, stopping = weights, Stopping(target)
     for _ in range(steps):
         weights, state, _ = next_state(weights, objective, state)
-        misfit = norm_of_cost(state.f_info.as_min())
+        misfit = norm_of_cost(float(state.f_info.as_min()))
         if np.isfinite(misfit):
             best = weights
         if callback is not None:
@@ -165,6 +165,6 @@ def minimise(
     return best
 
 
-def norm_of_cost(cost: Float[ArrayLike, ""]) -> float:
+def norm_of_cost(cost: float) -> float:
     """Return the norm of residuals from half the sum of squares of the amplified ones."""
-    return float(np.sqrt(max(2.0 * float(cost), 0.0))) / _AMPLIFICATION
+    return float(np.sqrt(max(2.0 * cost, 0.0))) / _AMPLIFICATION

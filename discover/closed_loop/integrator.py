@@ -1,0 +1,211 @@
+"""Integration of the modes together with what effects add to their state.
+
+The scheme is Krogstad's exponential method for the modes. Beside them run the scalar states of the
+fluid, with steps that are exact for constant coefficients, and the deformation that elements in
+series with the fluid take away. What no candidate needs is not compiled.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.effects import StateEffect
+from discover.simulate.exponential_runge_kutta import phi_functions
+
+# Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
+_JUMP = 1e-9
+
+ModeSlope = Callable[[Float[Array, "4 k"], Float[Array, " k"]], Float[Array, "4 k"]]
+
+
+class Modes(NamedTuple):
+    """Modes: moduli in Pa, relaxation times in s, both shape (k,)."""
+
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+
+
+class Series(NamedTuple):
+    """Elements in series with the fluid.
+
+    Slip s in 1/(Pa s), compliance C in 1/Pa, and the viscosity in Pa s of the torque beside the
+    modes.
+    """
+
+    slip: Float[Array, ""]
+    compliance: Float[Array, ""]
+    viscosity: Float[Array, ""]
+
+
+def _weights(relaxation_time, width, linear_relaxation):
+    """Return the ten weights of Krogstad's method, shape (steps, 10, k)."""
+    h = width[:, None] / relaxation_time
+    z = -h if linear_relaxation else jnp.zeros_like(h)
+    half_first, half_second, _ = phi_functions(0.5 * z)
+    first, second, third = phi_functions(z)
+    return jnp.stack(
+        [
+            jnp.exp(0.5 * z),
+            jnp.exp(z),
+            0.5 * h * half_first,
+            h * (0.5 * half_first - half_second),
+            h * half_second,
+            h * (first - 2.0 * second),
+            2.0 * h * second,
+            h * (first - 3.0 * second + 4.0 * third),
+            h * (2.0 * second - 4.0 * third),
+            h * (4.0 * third - second),
+        ],
+        axis=1,
+    )
+
+
+def _relax(effect: StateEffect, values, state, shear_rate, stress, width):
+    """Return the state after a step in which source and decay are constant."""
+    source, decay = effect.source_and_decay(values, shear_rate, stress)
+    z = -decay * width
+    return state * jnp.exp(z) + source * width * phi_functions(z)[0]
+
+
+def _combined(factor: str, states: dict[StateEffect, Array], levels):
+    total = jnp.ones(())
+    for (effect, values), level in zip(states.items(), levels, strict=True):
+        total = total * getattr(effect, factor)(values, level)
+    return total
+
+
+def integrate(
+    slope: Callable,
+    linear_relaxation: bool,
+    declared: Modes,
+    extra: Modes | None,
+    states: dict[StateEffect, Float[Array, " p"]],
+    series: Series | None,
+    times: Float[Array, " s"],
+    rate: Float[Array, " m"],
+) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
+    """Return σ12 of the modes in Pa and the felt shear rate in 1/s at step ends.
+
+    Parameters
+    ----------
+    slope
+        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and λγ̇, shape (k,).
+    linear_relaxation
+        Whether −σ is part of it; it is then integrated exactly.
+    declared, extra
+        The declared modes, and those of effects. Apart, because the weights of the declared ones
+        depend on no trial and are then computed once for all trials.
+    states
+        State effects and their parameters.
+    series
+        Elements in series with the fluid.
+    times, rate
+        Step ends, shape (s,), and the shear rate at ends and middles in turn, shape (2 s − 1,).
+    """
+    width = jnp.diff(times)
+    weights = [_weights(declared.relaxation_time, width, linear_relaxation)]
+    modes = declared
+    if extra is not None:
+        weights.append(_weights(extra.relaxation_time, width, linear_relaxation))
+        modes = Modes(*(jnp.concatenate(pair) for pair in zip(declared, extra, strict=True)))
+    modulus, relaxation_time = modes
+
+    def remainder(stress, shear_rate, factor):
+        # with all times longer by a factor the law holds in its own time, which runs slower
+        if states:
+            change = slope(stress, factor * relaxation_time * shear_rate) / factor
+        else:
+            change = slope(stress, relaxation_time * shear_rate)
+        return change + stress if linear_relaxation else change
+
+    def step(carry, inputs):
+        stress, levels, missing, given_way = carry
+        (first_rate, middle_rate, last_rate), h, parts = inputs
+        w = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
+        half, full, a21, a31, a32, a41, a43, b1, b23, b4 = w
+        scale = _combined("modulus_factor", states, levels)
+        shear_before = scale * (stress[3] @ modulus)
+        predicted = [
+            [_relax(e, v, s, middle_rate, shear_before, share * h) for share in (0.5, 1.0)]
+            for (e, v), s in zip(states.items(), levels, strict=True)
+        ]
+        slow_first = _combined("time_factor", states, levels)
+        slow_middle = _combined("time_factor", states, [p[0] for p in predicted])
+        slow_last = _combined("time_factor", states, [p[1] for p in predicted])
+
+        n1 = remainder(stress, first_rate + given_way, slow_first)
+        if series is not None:
+            scale_last = _combined("modulus_factor", states, [p[1] for p in predicted])
+            n1, given_way = _give_way(
+                series, modes, scale_last, stress, shear_before, missing, given_way, n1, w,
+                first_rate, last_rate, h, times[-1],
+            )  # fmt: skip
+        n2 = remainder(half * stress + a21 * n1, middle_rate + given_way, slow_middle)
+        n3 = remainder(half * stress + a31 * n1 + a32 * n2, middle_rate + given_way, slow_middle)
+        n4 = remainder(full * stress + a41 * n1 + a43 * n3, last_rate + given_way, slow_last)
+        after = full * stress + b1 * n1 + b23 * (n2 + n3) + b4 * n4
+
+        # the states once more, now with the mean of the stress at both ends
+        shear_after = after[3] @ modulus
+        if states:
+            guess = _combined("modulus_factor", states, [p[1] for p in predicted]) * shear_after
+            middle_stress = 0.5 * (shear_before + guess)
+            levels = tuple(
+                _relax(e, v, s, middle_rate + given_way, middle_stress, h)
+                for (e, v), s in zip(states.items(), levels, strict=True)
+            )
+            shear_after = _combined("modulus_factor", states, levels) * shear_after
+        if series is not None:
+            torque = 0.5 * (
+                shear_before + shear_after
+                + series.viscosity * (first_rate + last_rate + 2.0 * given_way)
+            )  # fmt: skip
+            missing = missing + given_way * h + series.slip * h * torque
+        return (after, levels, missing, given_way), (shear_after, given_way)
+
+    zero = jnp.zeros(())
+    start = (
+        jnp.zeros((4, len(modulus))),
+        tuple(jnp.full((), effect.rest, dtype=modulus.dtype) for effect in states),
+        zero,
+        zero,
+    )
+    rates = (rate[:-2:2], rate[1::2], rate[2::2])
+    _, (stress, given_way) = jax.lax.scan(step, start, (rates, width, tuple(weights)))
+    felt = rate[::2]
+    if series is not None:
+        # constant in each step; at its ends the mean of both sides
+        inside = 0.5 * (given_way[1:] + given_way[:-1])
+        felt = felt + jnp.concatenate([given_way[:1], inside, given_way[-1:]])
+    return jnp.concatenate([jnp.zeros(1), stress]), felt
+
+
+def _give_way(
+    series, modes, scale, stress, before, missing, earlier, n1, w, first_rate, last_rate, h, end
+):
+    """Return the slope with it, and the rate that the series elements take in this step.
+
+    The strain that they have taken at the end of the step must be −C σ − ∫ s σ dt there. The
+    stress at the end is predicted by one exponential Euler step, linear in the rate; what the
+    prediction misses is carried in `missing` to the next step.
+    """
+    full, whole = w[1], w[7] + 2.0 * w[8] + w[9]
+    stretch = modes.relaxation_time * (1.0 + stress[1])
+    predicted = scale * ((full * stress[3] + whole * n1[3]) @ modes.modulus)
+    stiffness = scale * ((whole * stretch) @ modes.modulus)
+    compliance = series.compliance + 0.5 * series.slip * h
+    viscous = series.viscosity
+    # torque at the ends for the rate that was given way to before
+    predicted = predicted + viscous * (last_rate + earlier)
+    before = before + viscous * (first_rate + earlier)
+    taken = compliance * (predicted - (stiffness + viscous) * earlier)
+    taken = taken + 0.5 * series.slip * h * before + missing
+    now = -taken / (h + compliance * (stiffness + viscous))
+    now = jnp.where(h > _JUMP * end, now, earlier)
+    change = (now - earlier) * modes.relaxation_time
+    # the upper convected derivative is linear in the rate
+    zero = jnp.zeros_like(stress[0])
+    return n1 + change * jnp.stack([2.0 * stress[3], zero, zero, 1.0 + stress[1]]), now

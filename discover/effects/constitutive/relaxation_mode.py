@@ -1,0 +1,28 @@
+"""A relaxation time that the declared spectrum lacks."""
+
+from discover.effects.base import EffectParameter, ModeEffect
+
+
+class RelaxationMode(ModeEffect):
+    """One more mode under the declared law   [generalised Maxwell model, Ferry 1980, ch. 1]."""
+
+    def mode(self, values):
+        """Return G and λ."""
+        return values[0], values[1]
+
+
+EFFECT = RelaxationMode(
+    name="relaxation_mode",
+    parameters=(
+        EffectParameter("G", "G_+", "Pa", low=0.0, scale="stress", first_trial=0.05),
+        EffectParameter("lambda", r"\lambda_+", "s", low=1e-9, scale="run_time", first_trial=0.1),
+    ),
+    equation=(
+        r"\sigma \mathrel{+}= G_+\,\sigma_+,\quad \lambda_+\overset{\nabla}{\sigma}_+ + \sigma_+"
+        r" + h(\sigma_+) = \lambda_+\dot\gamma"
+    ),
+    source="Ferry 1980, Viscoelastic Properties of Polymers, ch. 1",
+    check="Small-amplitude oscillation around the angular frequency 1/lambda; stress relaxation.",
+    visible="G lambda of about 5 % of the zero-shear viscosity.",
+    complexity=2,
+)

@@ -1,0 +1,27 @@
+"""A tool or transducer that twists under its torque."""
+
+import jax.numpy as jnp
+
+from discover.effects.base import EffectParameter, SeriesElement
+
+
+class ToolCompliance(SeriesElement):
+    """The strain felt is the commanded one less C σ   [Gottlieb & Macosko 1982]."""
+
+    def slip_and_compliance(self, values):
+        """Return 0 and C."""
+        return jnp.zeros_like(values[0]), values[0]
+
+
+EFFECT = ToolCompliance(
+    name="tool_compliance",
+    parameters=(
+        EffectParameter(
+            "compliance", "C", "1/Pa", low=0.0, scale="inverse_stress", first_trial=0.01
+        ),
+    ),
+    equation=r"\gamma_\mathrm{felt} = \gamma - C\,\sigma",
+    source="Gottlieb & Macosko 1982, Rheol. Acta 21, 90",
+    check="Glue the tools together and twist; repeat with smaller plates, which need less torque.",
+    visible="C times the plateau modulus of about 0.05.",
+)

@@ -1,0 +1,59 @@
+"""When is a residual noise, and when is something missing."""
+
+import numpy as np
+import pytest
+
+from discover.closed_loop.planting import Noise
+from discover.closed_loop.residual import (
+    Expectation,
+    is_noise,
+    noise_floor,
+    noise_probability,
+)
+
+RUNS, SAMPLES = 6, 60
+WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))
+PHASE = np.linspace(0.0, 6.0, SAMPLES)
+
+
+def noise(correlation=0.0, seed=0, size=0.01):
+    drawn = Noise(size, correlation).draw((RUNS, SAMPLES), np.random.default_rng(seed))
+    return drawn / np.sqrt(SAMPLES)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_noise_is_rarely_taken_for_structure(correlation):
+    taken = [not is_noise(noise(correlation, seed), WEIGHT) for seed in range(200)]
+    # significance 0.001: more than 4 of 200 has a probability below 1e-5
+    assert sum(taken) <= 4
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+@pytest.mark.parametrize(
+    "pattern",
+    [np.sin(PHASE), np.sin(12 * PHASE), np.sign(np.cos(3 * PHASE)), np.exp(-PHASE)],
+    ids=["smooth", "hum", "friction", "decay"],
+)
+def test_a_pattern_three_times_the_noise_is_structure(pattern, correlation):
+    pattern = 0.03 * pattern / np.sqrt(np.mean(pattern**2)) / np.sqrt(SAMPLES)
+    missed = [is_noise(noise(correlation, seed) + pattern, WEIGHT) for seed in range(20)]
+    assert sum(missed) == 0
+
+
+def test_runs_of_a_few_samples_say_nothing():
+    assert noise_probability(np.ones((3, 10)), np.ones((3, 10))) is None
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_the_floor_is_the_size_of_the_noise_correlated_or_not(correlation):
+    # 360 samples, of which the correlation leaves 90: 7 % standard error
+    assert noise_floor(noise(correlation), WEIGHT) == pytest.approx(0.01, rel=0.2)
+
+
+def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
+    smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
+    left = noise() + smooth
+    assert not Expectation().explains(left, WEIGHT)
+    assert Expectation(linear_error=0.02).explains(left, WEIGHT)
+    assert Expectation(noise=0.015).explains(left, WEIGHT)
+    assert not Expectation(noise=0.005).explains(left, WEIGHT)
