@@ -8,15 +8,17 @@ from sklearn.base import clone
 from sklearn.model_selection import KFold, cross_val_score
 
 import tensor_library as tl
+from discover.dataset.run import ShearRun
 from discover.errors import InputError
-from discover.laws import TensorBasisNetwork
+from discover.laws import Fluid, Giesekus, TensorBasisNetwork, UpperConvectedMaxwell
+from discover.learners.distillation import MaxwellSurrogate
 from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe, load_law, save_law
 from discover.learners.tbnn_ude.prior import sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.projection import project
 from discover.learners.tbnn_ude.recipe_default import initial_law
 from discover.protocols import oscillatory_shear
-from discover.simulate import synthetic_dataset
+from discover.simulate import simulate, synthetic_dataset
 
 FLOWS = {
     "laos_1_0.5": oscillatory_shear(1.0, 0.5),
@@ -79,6 +81,23 @@ def test_units_come_in_through_modulus_and_relaxation_time(data):
     model = TBNNUDE(recipe=SMALL, modulus=50.0, relaxation_time=4.0).fit(slow)
     assert float(model.law_.constants[3]) == pytest.approx(0.3, abs=1e-4)
     assert model.score(slow) > 0.9999
+
+
+def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
+    fluid = Fluid(Giesekus(0.3), [70.0, 30.0], [1.0, 0.2])
+    times = np.linspace(0.0, 10.0, 51)
+    runs = [
+        ShearRun(name, times, flow, np.zeros(51), simulate(fluid, flow, times).shear_stress)
+        for name, flow in FLOWS.items()
+    ]
+    model = TBNNUDE(recipe=SMALL, modulus=[70.0, 30.0], relaxation_time=[1.0, 0.2]).fit(runs)
+    # integration on the training grid errs by 4e-6 of the stress
+    np.testing.assert_allclose(model.law_.constants, [0, 0, 0, 0.3, 0, 0, 0, 0], atol=1e-4)
+    np.testing.assert_array_equal(model.fluid_.modulus, [70.0, 30.0])
+    # negative control: all of the modulus in the slow mode is another fluid
+    assert model.score(runs) > 0.9999
+    model.fluid_ = Fluid(model.law_, 100.0, 1.0)
+    assert model.set_params(modulus=100.0, relaxation_time=1.0).score(runs) < 0.99
 
 
 def test_it_is_a_scikit_learn_estimator(data):
@@ -144,6 +163,25 @@ def test_a_stored_network_comes_back_the_same(tmp_path):
     assert back.linear_relaxation is False
     for one, two in zip(jax.tree.leaves(law), jax.tree.leaves(back), strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("base", [Giesekus(0.1), UpperConvectedMaxwell(), "network"])
+def test_a_stored_network_keeps_the_law_beneath_it(tmp_path, base):
+    if base == "network":
+        base = initial_law(jax.random.key(5), 3, True, jnp.ones(8), Giesekus(0.3))
+    law = initial_law(jax.random.key(4), 6, True, jnp.ones(8), base)
+    save_law(law, tmp_path / "law.net")
+    back = load_law(tmp_path / "law.net")
+    assert jax.tree.structure(back) == jax.tree.structure(law)
+    for one, two in zip(jax.tree.leaves(law), jax.tree.leaves(back), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_a_base_law_without_a_name_is_not_stored(tmp_path):
+    base = MaxwellSurrogate(1.0, 1.0)
+    with pytest.raises(InputError, match="on top of MaxwellSurrogate cannot be stored"):
+        save_law(initial_law(jax.random.key(4), 6, True, jnp.ones(8), base), tmp_path / "law.net")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("content", [b"", b"{}\n", b"not json", b'{"format": 3}\nxx'])

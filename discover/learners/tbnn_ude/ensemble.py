@@ -80,27 +80,29 @@ def train_members(
 def stack_members(members: list[TensorBasisNetwork]) -> TensorBasisNetwork:
     """Return the members as one law with a leading axis on every array."""
     arrays = [eqx.partition(member, eqx.is_array) for member in members]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(a for a, _ in arrays))
-    return eqx.combine(stacked, arrays[0][1])
+    return eqx.combine(_stack([a for a, _ in arrays]), arrays[0][1])
+
+
+def _stack(trees):
+    # on the host: no program to compile for every shape of a leaf
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *trees)
 
 
 def member_of(laws: TensorBasisNetwork, index: int) -> TensorBasisNetwork:
     """Return one member of a stacked law."""
     arrays, rest = eqx.partition(laws, eqx.is_array)
-    return eqx.combine(jax.tree.map(lambda leaf: leaf[index], arrays), rest)
-
-
-@eqx.filter_jit
-def _misfit_rows(laws, problem):
-    return eqx.filter_vmap(lambda law: law_misfit(law, problem))(laws)
+    return eqx.combine(
+        jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), arrays), rest
+    )
 
 
 def member_misfits(
     laws: TensorBasisNetwork, problem: TrainingProblem
 ) -> Float[np.ndarray, " members"]:
     """Return the relative misfit of every member of a stacked law; infinite where it runs away."""
-    rows = np.asarray(_misfit_rows(laws, problem))
-    misfits = np.sqrt(np.sum(rows**2, axis=(1, 2)))
+    # one by one: a batched integration would be one more program to compile, for milliseconds
+    members = [member_of(laws, i) for i in range(laws.constants.shape[0])]
+    misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in members])
     return np.where(np.isfinite(misfits), misfits, np.inf)
 
 
@@ -115,15 +117,14 @@ def _initial(
 
 
 @eqx.filter_jit
-def _begin(laws, problem, tensors, strengths):
-    def one(law, strength):
-        cloud = sample_states(law, problem)
+def _begin(laws, clouds, problem, tensors, strengths):
+    def one(law, cloud, strength):
         rebuild = Rebuild.with_network(law, tensors, constant_scale(cloud))
         prior = reweighted(law, cloud, strength)
         state = first_state(rebuild.start, Objective(problem, rebuild, cloud, prior))
         return (rebuild, cloud, prior), rebuild.start, state
 
-    return eqx.filter_vmap(one)(laws, strengths)
+    return eqx.filter_vmap(one)(laws, clouds, strengths)
 
 
 @eqx.filter_jit
@@ -151,7 +152,8 @@ def _round(
     """Train every member for one round; one that has ended keeps its weights while others go on."""
     n = laws.constants.shape[0]
     strengths = jnp.asarray(np.broadcast_to(strength, (n,)).astype(float))
-    parts, weights, state = _begin(laws, problem, jnp.asarray(tensors), strengths)
+    clouds = _stack([sample_states(member_of(laws, i), problem) for i in range(n)])
+    parts, weights, state = _begin(laws, clouds, problem, jnp.asarray(tensors), strengths)
     best = np.array(weights)
     stopping, going = [Stopping(target) for _ in range(n)], np.ones(n, bool)
     misfits = np.full(n, np.inf)

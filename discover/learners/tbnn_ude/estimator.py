@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
@@ -19,11 +19,18 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, train_members
+from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipe_default import DefaultRecipe, Trained, train_default
 from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
+from discover.learners.tbnn_ude.spread import (
+    MemberPredictions,
+    coefficient_spread,
+    member_predictions,
+)
+from discover.protocols.shear import ShearProtocol
 from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
@@ -70,6 +77,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         The projection.
     members_ : list of TensorBasisNetwork
         Every trained member, the first one's tensors shared by all.
+    ensemble_fluids_ : list of Fluid
+        Every member with moduli and relaxation times, ready to simulate.
     ensemble_ : str
         How the members came about; where constants suffice they do not differ.
     """
@@ -128,8 +137,9 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.members_ = members
         self.ensemble_ = agreement
         self.law_ = best.law
-        total = float(np.sum(np.atleast_1d(np.asarray(self.modulus, dtype=float))))
-        self.fluid_ = Fluid(best.law, problem.modulus * total, problem.relaxation_time)
+        modulus = jnp.atleast_1d(jnp.asarray(self.modulus, dtype=float))
+        self.fluid_ = Fluid(best.law, modulus, problem.relaxation_time)
+        self.ensemble_fluids_ = [Fluid(law, modulus, problem.relaxation_time) for law in members]
         cloud = sample_states(best.law, problem)
         library = self.projection_library or build_library(degree=1)
         projection = project(best.law, cloud, library)
@@ -148,6 +158,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                 "coefficients_vary": best.varies,
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
+                "coefficient_spread_of_members": coefficient_spread(members, cloud),
                 "members": [
                     {
                         "misfit": float(misfit),
@@ -159,6 +170,19 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             message=best.message,
         )
         return self
+
+    def predict_members(
+        self, protocol: ShearProtocol, times: Float[np.ndarray, " n"]
+    ) -> MemberPredictions:
+        """Return σ12, N1 and N2 of every member in a flow, with their bands.
+
+        Parameters
+        ----------
+        protocol, times
+            Any flow, also one that no training saw; times in s, from 0 on.
+        """
+        check_is_fitted(self, "ensemble_fluids_")
+        return member_predictions(self.ensemble_fluids_, protocol, times)
 
     def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
@@ -222,10 +246,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         law, losses = train_paper(
             problem, key, relaxes, recipe, self.progress, base_law=self.base_law
         )
-        errors = np.asarray(eqx.filter_jit(TrainingProblem.mean_squared_errors)(problem, law))
-        squares = np.asarray(problem.target) ** 2
-        scale = np.mean(squares, axis=1)
-        misfit = float(np.sqrt(np.mean(errors / np.where(scale > 0, scale, 1.0))))
+        misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
 

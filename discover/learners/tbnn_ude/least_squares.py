@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
-from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.problem import TrainingProblem, trajectories
 from discover.learners.tbnn_ude.variational import residual_of_weights
 from discover.learners.tbnn_ude.weights import Rebuild
 
@@ -114,10 +114,16 @@ def next_state(weights: Float[Array, " p"], objective: Objective, state):
     return weights, state, aux
 
 
-@eqx.filter_jit
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
     """Return the data's residuals under a law; their norm is the relative misfit."""
-    return problem.residual(law) * data_scale(problem)
+    return _misses(trajectories(law, problem), problem)
+
+
+@eqx.filter_jit
+def _misses(states, problem):
+    predicted = jnp.tensordot(states[..., 3], problem.modulus, axes=1)
+    misses = jnp.where(problem.grids.sample_mask, predicted - problem.target, 0.0)
+    return misses * data_scale(problem)
 
 
 def minimise(

@@ -18,8 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.simulate.solve import solve_states_on_grid
+from discover.learners.tbnn_ude.problem import TrainingProblem, trajectories
 from tensor_library.algebra import inner
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
@@ -48,22 +47,28 @@ class Cloud(eqx.Module):
 
     def coefficients(self, law: TensorBasisNetwork) -> Float[Array, "m 8"]:
         """Return the coefficients of a law at these states."""
-        return jax.vmap(law.coefficients)(self.stress, self.rate)
+        return _coefficients(law, self.stress, self.rate)
 
 
 @eqx.filter_jit
+def _coefficients(law, stress, rate):
+    return jax.vmap(law.coefficients)(stress, rate)
+
+
 def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
     """Return states evenly spread over the samples of every run and mode."""
-    fluid = problem.fluid(law)
+    return _cloud(trajectories(law, problem), problem)
 
-    def one(protocol, grid):
-        states = solve_states_on_grid(fluid, protocol, grid)
+
+@eqx.filter_jit
+def _cloud(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
+    def one(states, protocol, grid):
         pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
         times = grid.times[grid.sample_index][pick]
         shear_rates = jax.vmap(protocol.shear_rate)(times)[:, None] * problem.relaxation_time
         return states[pick], shear_rates
 
-    stress, shear_rate = jax.vmap(one)(problem.protocols, problem.grids)
+    stress, shear_rate = jax.vmap(one)(states, problem.protocols, problem.grids)
     stress, shear_rate = stress.reshape(-1, 4), shear_rate.reshape(-1)
     rate = jax.vmap(rate_of_deformation)(shear_rate)
     basis = jax.vmap(integrity_basis)(stress, rate)
@@ -78,6 +83,7 @@ class PriorWeights(eqx.Module):
     variation: Float[Array, "8"]
 
 
+@eqx.filter_jit
 def parts(law: TensorBasisNetwork, cloud: Cloud) -> tuple[Float[Array, "m 8"], Float[Array, "m 8"]]:
     """Return the size of every term, and of its departure from a constant coefficient."""
     coefficients = cloud.coefficients(law)
@@ -95,6 +101,7 @@ def prior_residual(
     return jnp.concatenate([row.ravel() for row in rows])
 
 
+@eqx.filter_jit
 def reweighted(
     law: TensorBasisNetwork,
     cloud: Cloud,

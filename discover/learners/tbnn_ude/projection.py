@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -62,15 +63,16 @@ def project(
     max_terms
         Largest number of terms.
     """
-    target = np.asarray(jax.vmap(law.extra_term)(cloud.stress, cloud.rate)).ravel()
+    target = np.asarray(_extra_term(law, cloud.stress, cloud.rate)).ravel()
     norm = float(np.linalg.norm(target))
     if norm < 1e-12 or not np.isfinite(norm):
         return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
 
+    evaluate = jax.jit(jax.vmap(library.evaluate, (0, 0, None)))
+
     def design(inner):
-        values = jax.vmap(lambda s, g: library.evaluate(s, g, jnp.asarray(inner)))
         return (
-            np.asarray(values(cloud.stress, cloud.rate))
+            np.asarray(evaluate(cloud.stress, cloud.rate, jnp.asarray(inner)))
             .transpose(0, 2, 1)
             .reshape(target.size, len(library))
         )
@@ -119,6 +121,11 @@ def project(
     chosen = library.subset(support)
     kept = [inner[i] for i, form in enumerate(library.forms) if form in chosen.forms]
     return Projection(chosen, _solve(matrix[:, support], target), np.array(kept), misfit)
+
+
+@eqx.filter_jit
+def _extra_term(law, stress, rate):
+    return jax.vmap(law.extra_term)(stress, rate)
 
 
 def _solve(matrix: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwor
 from discover.learners.tbnn_ude.least_squares import Objective, law_misfit, minimise
 from discover.learners.tbnn_ude.prior import Cloud, parts, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 from tensor_library.invariants import scalar_invariants
 
 Progress = Callable[[int, int, float], None]
@@ -99,6 +99,7 @@ class Trained:
     message: str
 
 
+@eqx.filter_jit
 def initial_law(
     key: PRNGKeyArray,
     width: int,
@@ -120,6 +121,7 @@ def initial_law(
     )
 
 
+@eqx.filter_jit
 def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     """Return the root mean square of every invariant, or one where it vanishes."""
     invariants = jax.vmap(scalar_invariants)(cloud.stress, cloud.rate)
@@ -127,6 +129,7 @@ def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     return jnp.where(size > 1e-12, size, 1.0)
 
 
+@eqx.filter_jit
 def constant_scale(cloud: Cloud) -> Float[Array, "8"]:
     """Return the unit of each constant: one over the root mean square of its tensor."""
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
@@ -174,10 +177,12 @@ class _Session:
             return law
         make = Rebuild.with_network if network else Rebuild.of_constants
         rebuild = make(law, tensors, constant_scale(cloud))
-        objective = Objective(self.problem, rebuild, cloud, reweighted(law, cloud, strength))
+        objective = Objective(
+            self.problem, rebuild, cloud, reweighted(law, cloud, jnp.asarray(strength))
+        )
         target = 0.1 * self.recipe.exact
         weights = minimise(rebuild.start, objective, steps, self.record, target)
-        trained = rebuild(weights)
+        trained = rebuilt(rebuild, weights)
         # a law that runs away in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
 

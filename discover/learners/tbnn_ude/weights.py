@@ -100,7 +100,7 @@ class Rebuild(eqx.Module):
     @property
     def start(self) -> Float[Array, " q"]:
         """The vector that makes the template."""
-        return weights_of(self.template)[self.positions] / self.scale
+        return _start(self)
 
     def __call__(self, weights: Float[Array, " q"]) -> TensorBasisNetwork:
         """Return the law with these numbers."""
@@ -108,3 +108,14 @@ class Rebuild(eqx.Module):
         held, unravel = ravel_pytree(dynamic)
         moved = jnp.where(self.moves, self.scale * weights, held[self.positions])
         return eqx.combine(unravel(held.at[self.positions].set(moved)), static)
+
+
+@eqx.filter_jit
+def _start(rebuild):
+    return weights_of(rebuild.template)[rebuild.positions] / rebuild.scale
+
+
+@eqx.filter_jit
+def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork:
+    """Return the law with these numbers, by one compiled program."""
+    return rebuild(weights)
