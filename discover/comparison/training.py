@@ -73,8 +73,9 @@ def train(
     }
     library = study_library(study)
     if learner == "tensor_sindy":
-        from discover.identify.rivals import find_rivals
+        from discover.identify.rivals import MOST_RIVALS, find_rivals
         from discover.learners.tensor_sindy import TensorSINDy
+        from discover.learners.tensor_sindy.report import covariance_table
 
         sparse = TensorSINDy(
             library=library,
@@ -88,7 +89,11 @@ def train(
         ).fit(list(runs))
         result = sparse.result_
         # while the search with all its fits is at hand; only its result is kept in files
-        table = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]]).to_json()
+        found = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]])
+        table = found.to_json()
+        for row, rival in zip(table["rivals"][:MOST_RIVALS], found.rivals, strict=False):
+            assert rival.fit is not None  # the search at hand refitted it
+            row["covariance"] = covariance_table(sparse.search_, rival.fit)
         table["rivals_text"] = table.pop("text")
         return replace(result, details={**result.details, **table}), sparse.fluid_
     if learner == "tbnn_ude":

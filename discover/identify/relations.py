@@ -56,7 +56,7 @@ class TermRelation:
         }
 
 
-def spell(coefficients: Mapping[str, float]) -> str:
+def spell(coefficients: Mapping[str, float | int]) -> str:
     """Return a sum of terms as text, such as ``tr(sigma)*sigma − 2 gammadot``."""
     text = ""
     for name, value in coefficients.items():

@@ -12,7 +12,7 @@ library; `RivalTable.simplest` says whether it is.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from discover.identify.evidence import LEVEL, Evidence, compare_residuals
 from discover.identify.lanes import LawTerms
 from discover.identify.relations import spell
 from discover.learners.tensor_sindy.refit import LANES, POLISHING, Fit, refit
-from discover.learners.tensor_sindy.report import covariance_table
 from discover.learners.tensor_sindy.search import SupportSearch
 
 MOST_RIVALS = 8
@@ -48,8 +47,8 @@ class FittedRival:
         The test that could not tell them apart.
     simpler
         Whether it comes before the chosen law in the order of simplicity.
-    covariance
-        Of its coefficients, then of its inner parameters; None where it was not computed.
+    fit
+        The refit itself.
     """
 
     law: LawTerms
@@ -57,7 +56,7 @@ class FittedRival:
     difference: float
     evidence: Evidence
     simpler: bool = False
-    covariance: list[list[float]] | None = None
+    fit: Fit | None = field(default=None, repr=False)
 
     @property
     def text(self) -> str:
@@ -85,7 +84,6 @@ class FittedRival:
             "p_value": self.evidence.p_value,
             "effective_samples": self.evidence.effective_samples,
             "simpler": self.simpler,
-            "covariance": self.covariance,
             "text": self.text,
         }
 
@@ -169,7 +167,6 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
     residual = chosen.predicted[rows] - target
     order = search.complexity(chosen.support)
     found: list[FittedRival] = []
-    fitted: dict[int, Fit] = {}
     for screened in fits:
         fit = polished.get(screened.support, screened)
         nested = size - len(fit.support) if set(fit.support) < set(chosen.support) else 0
@@ -189,15 +186,10 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
                 float(np.linalg.norm(fit.predicted - chosen.predicted)),
                 evidence,
                 search.complexity(fit.support) < order,
+                fit,
             )
         )
-        fitted[id(found[-1])] = fit
     found.sort(key=lambda rival: rival.difference)
-    # the rest is never shown
-    found[:MOST_RIVALS] = [
-        replace(rival, covariance=covariance_table(search, fitted[id(rival)]))
-        for rival in found[:MOST_RIVALS]
-    ]
     return RivalTable(tuple(found), len(fits), not any(rival.simpler for rival in found))
 
 

@@ -130,7 +130,8 @@ def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypat
 
 
 def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, trained):
-    to_fit = 'modulus_Pa = "fit"\nrelaxation_time_s = "fit"\n[loop]\nnoise = 0.01'
+    to_fit = 'modulus_Pa = "fit"\nrelaxation_time_s = "fit"\n'
+    to_fit += '[loop]\nnoise = 0.01\nmax_effects = 1\neffects = ["stress_offset"]'
     study = STUDY + '[model]\nlaw = "giesekus"\nparameters = {alpha = "fit"}\n' + to_fit
     (tmp_path / "s.toml").write_text(study)
     result = invoke("close-loop", tmp_path / "s.toml", "--out", tmp_path / "loop")

@@ -89,7 +89,7 @@ def parameter_uncertainty(
 def least_squares_covariance(
     columns: Float[np.ndarray, "rows p"],
     residual: Float[np.ndarray, " rows"],
-    sequences: list[Int[np.ndarray, " n"]],
+    sequences: list[Int[np.ndarray, " _"]],
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
 

@@ -40,7 +40,7 @@ class NoiseModel:
         return self.variance[sequence] * matmul_toeplitz((first, first), columns)
 
 
-def noise_model(residuals: list[Float[np.ndarray, " n"]], n_parameters: int = 0) -> NoiseModel:
+def noise_model(residuals: list[Float[np.ndarray, " _"]], n_parameters: int = 0) -> NoiseModel:
     """Return the noise model of residuals, its order chosen by BIC.
 
     The autocovariance is pooled over the sequences, so that short runs share one correlation; the
