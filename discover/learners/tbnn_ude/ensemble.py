@@ -59,7 +59,6 @@ def train_members(
         Called after every step with step, total number of steps (at most) and mean misfit.
     """
     tensors = np.asarray(found.network_mask) > 0
-    assert found.invariant_scale is not None  # a law with varying coefficients has one
     laws = _initial(keys, found, recipe.width)
     total = recipe.steps + recipe.polish_steps
     steps = 0
@@ -109,8 +108,11 @@ def member_misfits(
 def _initial(
     keys: Key[Array, " members"], found: TensorBasisNetwork, width: int
 ) -> TensorBasisNetwork:
+    scale = found.invariant_scale
+    assert scale is not None  # a law with varying coefficients has one
+
     def one(key):
-        law = initial_law(key, width, found.linear_relaxation, found.invariant_scale, found.base)
+        law = initial_law(key, width, found.linear_relaxation, scale, found.base)
         return eqx.tree_at(lambda tree: tree.network_mask, law, found.network_mask)
 
     return eqx.filter_vmap(one)(keys)
