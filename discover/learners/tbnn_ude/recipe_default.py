@@ -2,8 +2,8 @@
 
 Gradient descent needs thousands of passes because the trajectories make the weights very unequal:
 a few directions decide almost all of the stress. The Jacobian from the variational equation costs
-little more than a gradient, and a few dozen Gauss–Newton steps with it reach a misfit that Adam
-does not reach in 7,200.
+a few gradients, and a few dozen Gauss–Newton steps with it reach a misfit that Adam does not reach
+in 7,200.
 
 Shear stress cannot tell apart laws that differ in tensors nobody measured, so the recipe asks for
 the smallest law that explains it, in this order:
