@@ -159,8 +159,10 @@ def fit_declared(model, dataset):
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name
     fitted = run_loop(dataset, declared_for_loop(model), effects=["stress_offset"], max_effects=0)
-    values = {name: entry.value for name, entry in fitted.declared_parameters.items()}
-    parameters = {name: values.get(name, known) for name, known in model.parameters.items()}
+    values: dict[str, float] = {
+        name: entry.value for name, entry in fitted.declared_parameters.items()
+    }
+    parameters = {**model.parameters, **{n: values[n] for n in model.parameters if n in values}}
     law = make_law(model.law_name, parameters) if model.law.linear_relaxation else model.law
     return replace(
         model,

@@ -70,7 +70,11 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
 
     def make(coefficients, inner):
         law = LibraryExpansion(
-            coefficients, inner, library, declared.law.linear_relaxation, declared.law
+            coefficients=coefficients,
+            inner=inner,
+            library=library,
+            linear_relaxation=declared.law.linear_relaxation,
+            base=declared.law,
         )
         return Fluid(law, declared.modulus, declared.relaxation_time, declared.solvent_viscosity)
 

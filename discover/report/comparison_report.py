@@ -15,7 +15,13 @@ from discover.report.plots.next_experiment import next_picture
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
-from discover.report.wording import RULES, comparison_verdict, interval, selection_sentence
+from discover.report.wording import (
+    RULES,
+    comparison_verdict,
+    interval,
+    selection_sentence,
+    spoken,
+)
 from discover.study.run_folder import RunFolder
 
 _COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
@@ -69,6 +75,10 @@ def write_comparison(
         pictures=pictures,
         training_pictures=training,
         selection=selection,
+        rivals_text=_rivals_text(comparison),
+        structure=_structure(comparison),
+        physics_titles=[LEARNER_TITLES[name] for name in comparison.physics],
+        physics_rows=_physics_rows(comparison),
         proposed=proposed,
         proposals=_proposals(comparison),
         rivals=[_rival(rival) for rival in comparison.rivals],
@@ -201,6 +211,39 @@ def _proposals(comparison: Comparison) -> list[dict[str, Any]]:
         }
         for proposal in following.proposals
     ]
+
+
+def _rivals_text(comparison: Comparison) -> str:
+    sparse = comparison.outcomes.get("tensor_sindy")
+    return "" if sparse is None else str(sparse.details.get("rivals_text", ""))
+
+
+def _structure(comparison: Comparison) -> dict[str, Any] | None:
+    if comparison.structure is None:
+        return None
+    relations = [spoken(relation.text) for relation in comparison.structure.relations]
+    return {"text": comparison.structure.text, "relations": relations}
+
+
+_MARKS = {True: "✓", False: "✗", None: "–"}
+
+
+def _physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return one row for each check, with what every law says to it."""
+    reports = [report or {"checks": []} for report in comparison.physics.values()]
+    names = dict.fromkeys(check["name"] for report in reports for check in report["checks"])
+    rows = []
+    for name in names:
+        cells = []
+        for report in reports:
+            check = next((c for c in report["checks"] if c["name"] == name), None)
+            cells.append(
+                {"mark": _MARKS[None], "text": ""}
+                if check is None
+                else {"mark": _MARKS[check["passed"]], "text": check["text"]}
+            )
+        rows.append({"name": name, "cells": cells})
+    return rows
 
 
 def _rival(rival) -> dict[str, Any]:

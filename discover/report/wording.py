@@ -160,5 +160,11 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
             f"Not determined by these data: {names}. What is shown of it is the choice of the "
             "simplest law that fits, not a measurement."
         )
+    for name, report in comparison.physics.items():
+        failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
+        if failed:
+            sentences.append(
+                f"{LEARNERS[name]}'s law is not sound everywhere: {', '.join(failed)}."
+            )
     sentences += next_sentences(comparison.next_measurement)
     return sentences

@@ -28,3 +28,11 @@ def test_the_loop_notebook_finds_the_planted_effect():
     text = executed_text("closed_loop.py")
     assert "effects_added" in text
     assert "giesekus_mobility" in text
+
+
+def test_the_identifiability_notebook_separates_the_twins():
+    text = executed_text("identifiability.py")
+    assert "tr(sigma)*gammadot" in text
+    assert "Measure sigma12 and N2" in text
+    assert "slip" in text
+    assert "twin: probability 0, refuted" in text

@@ -17,6 +17,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, train_members
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
@@ -37,7 +38,7 @@ from tensor_library.library import TermLibrary, build_library
 RECIPES = ("default", "paper")
 
 
-class TBNNUDE(RegressorMixin, BaseEstimator):
+class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     """A tensor-basis neural network inside the differential equation, from shear stress alone.
 
     Parameters
@@ -123,7 +124,7 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         """
         del y
         started = time.perf_counter()
-        runs = _as_runs(X)
+        runs = as_runs(X)
         recipe = self._recipe()
         problem = self._problem(runs)
         if self.n_members < 1:
@@ -170,10 +171,6 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         )
         return self
 
-    def predict(self, X: Sequence[ShearRun]) -> Float[np.ndarray, " rows"]:
-        """Return σ12 in Pa at the samples of all runs, one run after the other."""
-        return np.concatenate(self._predict_runs(X))
-
     def predict_members(
         self, protocol: ShearProtocol, times: Float[np.ndarray, " n"]
     ) -> MemberPredictions:
@@ -187,23 +184,8 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         check_is_fitted(self, "ensemble_fluids_")
         return member_predictions(self.ensemble_fluids_, protocol, times)
 
-    def score(self, X: Sequence[ShearRun], y=None, sample_weight=None) -> float:
-        """Return one minus the relative error of σ12, averaged over runs.
-
-        The error of a run is the root-mean-square of prediction minus measurement over the
-        root-mean-square of the measurement. A law that runs away scores minus infinity.
-        """
-        del y, sample_weight
-        errors = [
-            np.sqrt(np.mean((p - run.shear_stress) ** 2) / np.mean(run.shear_stress**2))
-            for p, run in zip(self._predict_runs(X), _as_runs(X), strict=True)
-        ]
-        error = float(np.mean(errors))
-        return 1.0 - error if np.isfinite(error) else -np.inf
-
-    def _predict_runs(self, X) -> list[Float[np.ndarray, " n"]]:
+    def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        runs = _as_runs(X)
         problem = self._problem(runs)
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
         return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
@@ -267,18 +249,6 @@ class TBNNUDE(RegressorMixin, BaseEstimator):
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
-
-
-def _as_runs(X) -> list[ShearRun]:
-    runs = list(X)
-    for run in runs:
-        if not isinstance(run, ShearRun):
-            raise InputError(
-                f"The learner takes a sequence of ShearRun; got a {type(run).__name__}."
-            )
-    if not runs:
-        raise InputError("The learner needs at least one run; got none.")
-    return runs
 
 
 def _or_infinite(value: float) -> float:

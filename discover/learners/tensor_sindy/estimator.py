@@ -10,17 +10,19 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
+from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.run_prediction import RunPrediction
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
     check_optimiser,
     default_support,
     solve_sparse,
 )
-from discover.learners.tensor_sindy.problem import as_runs, make_problem
+from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.report import covariance_table, path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
@@ -34,7 +36,7 @@ from tensor_library.library import TermLibrary, build_library
 SELECTIONS = ("bic", "held_out")
 
 
-class TensorSINDy(RegressorMixin, BaseEstimator):
+class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
     """Sparse regression on a frame-invariant library, from shear stress alone.
 
     The normal stresses are integrated, never observed. Along a trial law's trajectory the data
@@ -262,27 +264,8 @@ class TensorSINDy(RegressorMixin, BaseEstimator):
         )
         return self
 
-    def predict(self, X: Iterable[Any]) -> Float[np.ndarray, " rows"]:
-        """Return σ12 in Pa at the samples of all runs, one run after the other."""
-        return np.concatenate(self._predict_runs(X))
-
-    def score(self, X: Iterable[Any], y=None, sample_weight=None) -> float:
-        """Return one minus the relative error of σ12, averaged over runs.
-
-        The error of a run is the root-mean-square of prediction minus measurement over the
-        root-mean-square of the measurement. A law that runs away scores minus infinity.
-        """
-        del y, sample_weight
-        errors = [
-            np.sqrt(np.mean((p - run.shear_stress) ** 2) / np.mean(run.shear_stress**2))
-            for p, run in zip(self._predict_runs(X), as_runs(X), strict=True)
-        ]
-        error = float(np.mean(errors))
-        return 1.0 - error if np.isfinite(error) else -np.inf
-
-    def _predict_runs(self, X) -> list[Float[np.ndarray, " n"]]:
+    def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        runs = as_runs(X)
         # the same padded layout as in the fit, so that folds share a compilation
         problem = make_problem(runs, self.library_, strain_step=self.strain_step)
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))

@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.learners.run_prediction import as_runs
 from discover.protocols.shear import ShearProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from tensor_library.library import TermLibrary
@@ -69,26 +69,6 @@ class TrajectoryProblem(eqx.Module):
         """Run to which each row of the flattened observations belongs."""
         runs, samples, kinds = self.target.shape
         return np.repeat(np.arange(runs), samples * kinds)
-
-
-def as_runs(runs: Iterable[Any]) -> list[ShearRun]:
-    """Return the runs as a list, having checked that they are runs.
-
-    Raises
-    ------
-    InputError
-        If there is none, or one is something else.
-    """
-    listed = list(runs)
-    if not listed:
-        raise InputError("A fit needs at least one run; got none.")
-    for run in listed:
-        if not isinstance(run, ShearRun):
-            raise InputError(
-                f"Runs must be discover.dataset.ShearRun objects; got a {type(run).__name__}. "
-                "Load a folder or make a synthetic data set."
-            )
-    return listed
 
 
 def make_problem(

@@ -109,7 +109,7 @@ def _half(problem: TrajectoryProblem, rng: np.random.Generator) -> Bool[np.ndarr
 def _choose(design, target, optimizer, max_terms, floor, known) -> tuple[int, ...]:
     """Return the support that the extended BIC prefers of those the optimiser proposes."""
     observations, n = design.shape
-    triangular = np.linalg.qr(np.column_stack([design, target]), mode="r")
+    triangular = np.asarray(np.linalg.qr(np.column_stack([design, target]), mode="r"))
     matrix, right = triangular[:, :-1], triangular[:, -1]
     # the weights make the norm over all rows a relative misfit; a half has its share of that
     scale = np.sqrt(2.0)
