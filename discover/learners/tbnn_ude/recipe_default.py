@@ -2,8 +2,8 @@
 
 Gradient descent needs thousands of passes because the trajectories make the weights very unequal:
 a few directions decide almost all of the stress. The Jacobian from the variational equation costs
-little more than a gradient, and a few dozen Gauss–Newton steps with it reach a misfit that Adam
-does not reach in 7,200.
+a few gradients, and a few dozen Gauss–Newton steps with it reach a misfit that Adam does not reach
+in 7,200.
 
 Shear stress cannot tell apart laws that differ in tensors nobody measured, so the recipe asks for
 the smallest law that explains it, in this order:
@@ -152,7 +152,7 @@ class _Session:
         self.misfits: list[float] = []
         first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
         trials = N_COEFFICIENTS * _START_STEPS + _MOST_TRIALS * recipe.steps
-        search = recipe.max_tensors * (trials + recipe.polish_steps)
+        search = recipe.max_tensors * (trials + _MOST_POLISHES * recipe.polish_steps)
         self.total = first + search
 
     def record(self, misfit: float) -> None:
@@ -211,6 +211,22 @@ class _Session:
                 break
         return penalised, law
 
+    def polish(
+        self, law: TensorBasisNetwork, misfit: float, tensors: np.ndarray
+    ) -> TensorBasisNetwork:
+        """Return a law trained on almost without prior, round by round while that pays.
+
+        Each round begins with a fresh damping and with a prior as weak as the misfit is by then.
+        """
+        for _ in range(_MOST_POLISHES):
+            before = misfit
+            share = PRIOR_SHARE * min(1.0, before) ** 2
+            law = self.round(law, share, tensors, True, self.recipe.polish_steps)
+            misfit = self.misfit(law)
+            if misfit > 0.5 * before or self.settled(law):
+                break
+        return law
+
     def functions(self, start: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
         """Return the best law of few tensors with varying coefficients, before and after polish."""
         chosen = np.zeros(N_COEFFICIENTS, bool)
@@ -235,8 +251,7 @@ class _Session:
             chosen[found[1]] = True
             law = penalised = found[2]
             if not self.settled(law):
-                share = PRIOR_SHARE * min(1.0, found[0]) ** 2
-                law = self.round(law, share, chosen, True, self.recipe.polish_steps)
+                law = self.polish(law, found[0], chosen)
             misfit = self.misfit(law)
             if misfit < self.recipe.resolved or self.settled(law):
                 break
@@ -246,6 +261,7 @@ class _Session:
 _CLEARINGS = 3
 _START_STEPS = 6
 _MOST_TRIALS = 4
+_MOST_POLISHES = 3
 
 PRIOR_SHARE = 1e-6
 """Strength of the prior while functions are learned. It only settles what the data leave open."""
