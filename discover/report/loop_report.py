@@ -148,6 +148,10 @@ def _ranking(ranking, shown: int = 12) -> list[dict[str, Any]]:
     ]
 
 
+_SHARES = ("error", "floor")
+"""Last words of what is a share of the root-mean-square stress."""
+
+
 def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:
     if isinstance(content, dict):
         rows = []
@@ -156,6 +160,8 @@ def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:
         return rows
     if isinstance(content, list | tuple):
         return [(prefix, ", ".join(_cell(item) for item in content) or "none")]
+    if isinstance(content, float) and prefix.endswith(_SHARES):
+        return [(prefix, percent(content))]
     return [(prefix, _cell(content))]
 
 

@@ -164,7 +164,8 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
         failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
         if failed:
             sentences.append(
-                f"{LEARNERS[name]}'s law is not sound everywhere: {', '.join(failed)}."
+                f"{LEARNERS[name]}'s law fails {len(failed)} of the checks of physical soundness: "
+                f"{', '.join(failed)}."
             )
     sentences += next_sentences(comparison.next_measurement)
     return sentences
