@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from discover.precision import enable_x64
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -87,7 +89,7 @@ def run_close_loop(
     if folder.complete and page.is_file() and data.is_file():
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
-    from discover.closed_loop import run_loop
+    from discover.closed_loop import run_loop, run_loop_on_each
     from discover.report.loop_report import loop_verdict, write_loop
     from discover.study.build import declared_model, load_study_data
 
@@ -96,6 +98,9 @@ def run_close_loop(
     model = declared_model(study, data_of_study.dataset)
     declared = declared_for_loop(model)
     stages = study.loop.max_effects + 1
+    each = data_of_study.each
+    if each:
+        stages *= 1 + len(data_of_study.fit)
     lines = 0
 
     def say(line: str) -> None:
@@ -103,17 +108,19 @@ def run_close_loop(
         lines += 1
         progress(line, min(lines / (stages + 1), 0.95))
 
-    result = run_loop(
-        data_of_study.dataset,
-        declared,
-        fit=data_of_study.fit.names,
-        held_out=data_of_study.held_out.names,
-        effects=study.loop.effects,
-        max_effects=study.loop.max_effects,
-        strain=study.loop.strain,
-        noise=study.loop.noise,
-        progress=say,
-    )
+    options = {
+        "fit": data_of_study.fit.names,
+        "effects": study.loop.effects,
+        "max_effects": study.loop.max_effects,
+        "strain": study.loop.strain,
+        "noise": study.loop.noise,
+        "progress": say,
+    }
+    if each:
+        result = run_loop_on_each(data_of_study.dataset, declared, **options)
+    else:
+        held_out = data_of_study.held_out.names
+        result = run_loop(data_of_study.dataset, declared, held_out=held_out, **options)
     progress("drawing", 0.97)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
@@ -122,7 +129,8 @@ def run_close_loop(
         modes += f" from the linear sweep (error {100 * model.spectrum.relative_error:.2g} %)"
     summary = (
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
-        f"{len(data_of_study.held_out)} held out{window}. "
+        f"{'each' if each else len(data_of_study.held_out)} held out"
+        f"{' in turn' if each else ''}{window}. "
         f"Declared model: {model.law_name}, {modes}."
     )
     write_loop(result, folder, study.name, summary, path.read_text("utf-8"))
@@ -164,12 +172,15 @@ def fit_declared(model, dataset):
     }
     parameters = {**model.parameters, **{n: values[n] for n in model.parameters if n in values}}
     law = make_law(model.law_name, parameters) if model.law.linear_relaxation else model.law
+    # only a single mode can be left to be fitted
     return replace(
         model,
         law=law,
         parameters=parameters,
-        modulus=model.modulus * values.get("modulus_factor", 1.0),
-        relaxation_time=model.relaxation_time * values.get("relaxation_time_factor", 1.0),
+        modulus=np.array([values["modulus_Pa"]]) if "modulus_Pa" in values else model.modulus,
+        relaxation_time=np.array([values["relaxation_time_s"]])
+        if "relaxation_time_s" in values
+        else model.relaxation_time,
         free=(),
     )
 

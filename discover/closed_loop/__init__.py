@@ -2,17 +2,27 @@
 
 from discover.closed_loop.attribution import Attribution, CandidateScore
 from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
-from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.closed_loop.result import (
+    ErrorPair,
+    Fold,
+    LoopResult,
+    RunRecord,
+    Stage,
+    StageParameter,
+)
 
 __all__ = [
     "Attribution",
     "CandidateScore",
     "DeclaredModel",
     "ErrorPair",
+    "Fold",
     "LoopResult",
     "RunRecord",
     "Stage",
     "StageParameter",
     "run_loop",
+    "run_loop_on_each",
 ]

@@ -15,7 +15,7 @@ from discover.closed_loop.before_after import (
     record_runs,
     strain_of,
 )
-from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.residual import STRUCTURE, Expectation, summarise
 from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
@@ -25,6 +25,7 @@ from discover.dataset import ShearDataset, ShearRun
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
+    KinematicEffect,
     ModeEffect,
     StateEffect,
     library_effects,
@@ -188,15 +189,20 @@ def _candidates(effects: Sequence[str | AbstractEffect] | None) -> list[Abstract
 
 
 def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
-    """Return which effects are candidates, given how far the loop must extrapolate in rate.
+    """Return which effects are candidates, given the rates.
 
-    Rates are commanded before anything is measured, so this looks at no held-out stress.
+    Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
+    command is none where the rate was measured. Rates are set, or measured, apart from the stress,
+    so this looks at no held-out stress.
     """
+    measured = any(run.rate_is_measured for run in fitted)
     fastest = max(float(np.max(np.abs(run.shear_rate))) for run in fitted)
     asked = max((float(np.max(np.abs(run.shear_rate))) for run in held), default=0.0)
     far = asked > EXTRAPOLATION * fastest
 
     def admitted(effect: AbstractEffect) -> bool:
+        if isinstance(effect, KinematicEffect):
+            return not (measured and effect.shapes_command)
         return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
 
     return admitted
@@ -210,6 +216,8 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
     """
     small = []
     for run in runs:
+        if run.rate_before != 0.0:
+            continue  # a fluid that flowed before is not at small strain
         reached = np.maximum.accumulate(np.abs(strain_of(run)))
         keep = reached <= LINEAR_STRAIN
         if np.count_nonzero(keep) >= FEWEST_LINEAR_SAMPLES:
@@ -245,15 +253,23 @@ def _stage(search: Search, name: str, bounds, error) -> Stage:
 
 def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
-    # the common factors are fitted as logarithms
-    factors = {0: "modulus_factor", 1: "relaxation_time_factor"}
+    # of several modes only a common factor is fitted, which has no unit
+    single = len(declared.modulus) == 1
+    constants = {
+        0: (MODULUS, declared.modulus[0], "Pa") if single else ("modulus_factor", 1.0, ""),
+        1: (RELAXATION_TIME, declared.relaxation_time[0], "s")
+        if single
+        else ("relaxation_time_factor", 1.0, ""),
+    }
     out = {}
     for at in declared.free_positions:
-        value, (low, high) = fit.theta[at], bounds[at]
-        if at in factors:
-            value, low, high = np.exp(value), np.exp(low), np.exp(high)
-        name = factors.get(at) or named[at]
-        out[name] = StageParameter(float(value), (float(low), float(high)), "")
+        values = np.array([fit.theta[at], *bounds[at]])
+        name, scale, unit = constants.get(at) or (named[at], 1.0, "")
+        if at in constants:
+            # fitted as the logarithm of a factor
+            values = scale * np.exp(values)
+        value, low, high = (float(v) for v in values)
+        out[name] = StageParameter(value, (low, high), unit)
     return out
 
 

@@ -100,6 +100,27 @@ class RunRecord:
 
 
 @dataclass(frozen=True)
+class Fold:
+    """A loop that left one run out, where each run is held out in turn.
+
+    Attributes
+    ----------
+    run
+        The run left out.
+    verdict, effects
+        What the loop said of the other runs, and what it added.
+    error_before, error_after
+        Relative error of the run left out.
+    """
+
+    run: str
+    verdict: Verdict
+    effects: tuple[str, ...]
+    error_before: float
+    error_after: float
+
+
+@dataclass(frozen=True)
 class LoopResult:
     """The outcome of a closed loop.
 
@@ -120,10 +141,14 @@ class LoopResult:
     records
         Every run with its predictions.
     declared_parameters
-        Fitted factors on moduli and relaxation times, where asked for.
+        What was fitted of the declared model: modulus in Pa and relaxation time in s, or for
+        several modes a common factor on each, and parameters of the law.
     fluid
         The augmented fluid, without instrument effects; None where an effect gives it a state that
         no law of stress and rate can carry.
+    folds
+        The loops that left each run out in turn, where they were asked for; the held-out errors
+        are then their means.
     seconds
         Time taken.
     """
@@ -138,6 +163,7 @@ class LoopResult:
     records: tuple[RunRecord, ...] = field(repr=False, default=())
     declared_parameters: dict[str, StageParameter] = field(default_factory=dict)
     fluid: Fluid | None = field(repr=False, default=None)
+    folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
@@ -170,6 +196,7 @@ class LoopResult:
                 record.name: {"held_out": record.held_out, "errors": record.errors}
                 for record in self.records
             },
+            "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,
         }
         return _plain(contents)

@@ -14,6 +14,15 @@ from discover.simulate.grid import make_grid
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)
 
+PRE_SHEAR_LENGTH = 2.0
+"""A steady flow before a run is computed over this multiple of the run's length."""
+
+PRE_SHEAR_STRAIN = 1000.0
+"""Strain after which any fluid is taken to be steady."""
+
+# The steady state is a fixed point of the scheme whatever its step, so steps need only be stable
+_PRE_SHEAR_STEP, _FEWEST_PRE_SHEAR_STEPS = 1.0, 100
+
 
 class RunBatch(eqx.Module):
     """Runs on padded grids, with a leading axis of runs.
@@ -21,7 +30,8 @@ class RunBatch(eqx.Module):
     Attributes
     ----------
     times
-        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s.
+        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in a
+        steady flow before the run.
     commanded_rate
         Shear rate there, in 1/s.
     sample_index
@@ -60,6 +70,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         early = gap * _EARLY_STEPS
         anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
         grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
+        grid = np.concatenate([_pre_shear(run), grid])
         grids.append((grid, np.searchsorted(grid, run.time)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
     n_samples = max(len(run) for run in runs)
@@ -71,6 +82,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         half[::2] = padded
         half[1::2] = 0.5 * (padded[1:] + padded[:-1])
         rate = np.array(jax.vmap(run.protocol.shear_rate)(jnp.asarray(half)))
+        rate[half < 0.0] = run.rate_before
         # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
         # that the slope of the rate at the last sample is the flow's own
         rate[half > grid[-1] + 1.01 * spacing] = 0.0
@@ -89,6 +101,19 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
             )
         )
     return RunBatch(*(jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)))
+
+
+def _pre_shear(run: ShearRun) -> Float[np.ndarray, " p"]:
+    """Return times before t = 0, in s, over which the flow before a run becomes steady."""
+    speed = abs(run.rate_before)
+    if speed == 0.0:
+        return np.zeros(0)
+    length = min(PRE_SHEAR_LENGTH * run.time[-1], PRE_SHEAR_STRAIN / speed)
+    count = max(_FEWEST_PRE_SHEAR_STEPS, int(np.ceil(length * speed / _PRE_SHEAR_STEP)))
+    times = np.linspace(-length, 0.0, count + 1)
+    # the rate jumps at 0: step to just before, so that no step straddles it
+    times[-1] = -1e-12 * length
+    return times
 
 
 def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:

@@ -39,6 +39,10 @@ from discover.errors import InputError
 
 _ROUNDS, _POLISHES = 3, 5
 
+# A relaxation time to be fitted starts at these multiples of its first guess too: from far off its
+# effect on the stress is flat
+_TIME_STARTS = (1e-3, 1e-2, 0.1, 0.3, 3.0, 10.0)
+
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
 
@@ -135,7 +139,7 @@ class Search:
         return Search(self.model, batch, None, self.n_candidates, admitted, self.expectation)
 
     def start(self) -> None:
-        """Fit the declared model.
+        """Fit the declared model; an unknown relaxation time from several starts.
 
         Raises
         ------
@@ -143,7 +147,16 @@ class Search:
             If it cannot be integrated through the runs.
         """
         free = self.model.declared.free_positions
-        self.fit = fit_batch(self.model, self.batch, [self.model.zero()], [free])[0]
+        starts = [self.model.zero()]
+        if self.model.declared.fit_relaxation_time:
+            starts += [self.model.zero() for _ in _TIME_STARTS]
+            for start, factor in zip(starts[1:], _TIME_STARTS, strict=True):
+                start[1] = np.log(factor)
+                if self.model.declared.fit_modulus:
+                    start[0] = -start[1]  # the viscosity is known better than either
+        fits = fit_batch(self.model, self.batch, starts, [free] * len(starts))
+        usable = [fit for fit in fits if fit.usable]
+        self.fit = min(usable, key=lambda fit: fit.cost, default=fits[0])
         if not self.fit.usable:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: its stress runs "

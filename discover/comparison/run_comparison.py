@@ -58,6 +58,7 @@ def compare(
     """
     options = study.compare
     data = load_study_data(study, seed)
+    _require_plain_runs(data)
     declared = declared_model(study, data.dataset)
     model = declared if settle is None else settle(declared, data.fit)
     require_numbers(model)
@@ -203,6 +204,21 @@ def _truth(study: Study, model: DeclaredModel) -> tuple[TrueTerm, ...] | None:
     if synthetic is None or model.law_name != "ucm":
         return None
     return true_terms(synthetic.law, synthetic.parameters, study.model.known_relaxation)
+
+
+def _require_plain_runs(data: StudyData) -> None:
+    """Refuse what only the closed loop can do."""
+    if data.each:
+        raise InputError(
+            'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
+            'such as held_out = ["fast.csv"].'
+        )
+    flowing = [run.name for run in data.dataset if run.rate_before != 0.0]
+    if flowing:
+        raise InputError(
+            f"The run {flowing[0]!r} starts from a steady flow (rate_before); the learners start "
+            "every run from rest. Use close-loop, or compare runs from rest."
+        )
 
 
 def _summary(data: StudyData, study: Study) -> str:

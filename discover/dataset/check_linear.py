@@ -9,6 +9,7 @@ from discover.dataset.finding import Finding
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.sweep_inertia import sweep_inertia
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
 _LINEAR_STRAIN = 0.2
@@ -19,6 +20,12 @@ _STRESS_TOLERANCE = 0.15
 _COX_MERZ_FACTOR = 1.3
 _COX_MERZ_RATE = 1.0
 _SWEEP_TOLERANCE = 0.05
+# Inertia may make this share of the modulus before a frequency is not to be used
+_INERTIA_SHARE = 0.01
+_FEWEST_FOR_INERTIA = 6
+# A sweep that modes describe better than this is as good as sweeps are
+_VISIBLE_MISFIT = 0.02
+_STRONG_EVIDENCE = 6.0
 # Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number
 _SLOW = 0.3
 
@@ -39,10 +46,41 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
             "instrument at high frequency, a shift of one column, or too large an amplitude do "
             "that.",
         )
+    yield from _inertia(sweep)
     if len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency):
         yield Finding(
             "note", "sweep", SWEEP_FILE, f"{SWEEP_FILE} holds some frequencies more than once."
         )
+
+
+def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
+    """Yield whether G' bends at high frequency as only a wrong inertia correction makes it."""
+    if len(sweep.angular_frequency) < _FEWEST_FOR_INERTIA:
+        return
+    found = sweep_inertia(sweep)
+    omega, size = sweep.angular_frequency, np.hypot(sweep.storage_modulus, sweep.loss_modulus)
+    share = np.abs(found.inertia) * omega**2 / size
+    if found.evidence < _STRONG_EVIDENCE or found.error_before < _VISIBLE_MISFIT:
+        return
+    if np.max(share) < _SWEEP_TOLERANCE:
+        return
+    usable = omega[share < _INERTIA_SHARE]
+    remedy = (
+        f'Give the study [model] modes = "lve" and sweep_rad_s = [{omega[0]:.4g}, '
+        f"{np.max(usable):.4g}], or correct the inertia."
+        if usable.size
+        else "Correct the inertia."
+    )
+    yield Finding(
+        "warning",
+        "sweep",
+        SWEEP_FILE,
+        f"G' in {SWEEP_FILE} holds {-found.inertia:.3g} Pa s2 (± {1.96 * found.deviation:.2g}) "
+        "times frequency squared, which no fluid has: a tool's inertia, or a correction for it "
+        f"that is off. It makes {100 * np.max(share):.0f} % of the modulus at the highest "
+        f"frequency; Maxwell modes alone miss by {100 * found.error_before:.2g} %, with it by "
+        f"{100 * found.error_after:.2g} %. {remedy}",
+    )
 
 
 def against_linear_theory(

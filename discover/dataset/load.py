@@ -86,6 +86,7 @@ def load_dataset(
     base: str | Path | None = None,
     rate_is_measured: bool = False,
     rate_window: int = DEFAULT_WINDOW,
+    rate_before: str | None = None,
 ) -> ShearDataset:
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
@@ -101,10 +102,13 @@ def load_dataset(
     clock_factor
         Column of ``runs.csv`` with instrument time = time / factor, if any.
     rate_is_measured
-        Whether a shear rate that stays constant was measured all the same. A rate that varies is
-        always followed sample by sample.
+        Whether the shear rate was measured and not commanded. A rate that varies is always followed
+        sample by sample; one that is derived from strain is always measured.
     rate_window
         Samples in the moving window when the rate is derived from strain.
+    rate_before
+        Column of ``runs.csv`` with the shear rate in 1/s of the steady flow before each run; by
+        default every run starts from rest.
 
     Raises
     ------
@@ -114,8 +118,9 @@ def load_dataset(
     root = resolve_folder(folder, base)
     index = read_index(root)
     factors = read_clock_factors(index, clock_factor)
+    before = read_rates_before(index, rate_before)
     runs = tuple(
-        read_run(root, index, row, factors[row], rate_is_measured, rate_window)
+        read_run(root, index, row, factors[row], rate_is_measured, rate_window, before[row])
         for row in range(len(index))
     )
     provenance = root / "PROVENANCE.md"
@@ -196,6 +201,24 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
     return factors
 
 
+def read_rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
+    """Return the shear rate before every run, in 1/s; zeros, which is rest, if no column is named.
+
+    Raises
+    ------
+    InputError
+        If the column is missing or holds something other than numbers.
+    """
+    if column is None:
+        return np.zeros(len(index))
+    if column not in index.columns:
+        raise InputError(
+            f"rate_before names the column {column!r}, but {INDEX_FILE} has only {index.listed}. "
+            "Correct the name, or leave rate_before out if every run starts from rest."
+        )
+    return index.numbers(column)
+
+
 def read_run(
     root: Path,
     index: Table,
@@ -203,6 +226,7 @@ def read_run(
     clock_factor: float = 1.0,
     rate_is_measured: bool = False,
     rate_window: int = DEFAULT_WINDOW,
+    rate_before: float = 0.0,
 ) -> ShearRun:
     """Return the run on one line of ``runs.csv``.
 
@@ -255,6 +279,8 @@ def read_run(
         second_normal_stress_difference=second,
         strain=strain,
         clock_factor=float(clock_factor),
+        rate_is_measured=derived or rate_is_measured,
+        rate_before=float(rate_before),
         metadata=metadata,
     )
 

@@ -33,6 +33,10 @@ class ShearRun:
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``; differs from one for data that
         were shifted to another temperature.
+    rate_is_measured
+        Whether the shear rate was measured, or derived from measured strain, and not commanded.
+    rate_before
+        Shear rate in 1/s of the steady flow before t = 0; zero is rest.
     metadata
         What else the source says of the run.
     """
@@ -46,6 +50,8 @@ class ShearRun:
     second_normal_stress_difference: Float[np.ndarray, " _"] | None = None
     strain: Float[np.ndarray, " _"] | None = None
     clock_factor: float = 1.0
+    rate_is_measured: bool = False
+    rate_before: float = 0.0
     metadata: Mapping[str, float | str] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -83,6 +89,11 @@ class ShearRun:
             raise InputError(
                 f"The clock factor of the run {self.name!r} must be positive; got "
                 f"{self.clock_factor}."
+            )
+        if not np.isfinite(self.rate_before):
+            raise InputError(
+                f"The shear rate before the run {self.name!r} must be finite; got "
+                f"{self.rate_before}. Give 0 for a run from rest."
             )
 
     def __len__(self) -> int:

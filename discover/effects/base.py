@@ -178,7 +178,7 @@ class Record:
     Attributes
     ----------
     times
-        In s, shape (n,), increasing from the start of the flow.
+        In s, shape (n,), increasing; from 0, or from before where a steady flow came before.
     shear_rate
         Felt by the fluid, in 1/s, shape (n,).
     stress
@@ -199,15 +199,26 @@ class Record:
 
     @property
     def total_strain(self) -> Float[Array, " n"]:
-        """Strain added up without regard to its sign, at each time."""
+        """Strain added up without regard to its sign since t = 0, at each time."""
         size = jnp.abs(self.shear_rate)
-        steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(self.times)
+        # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
+        steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(jnp.maximum(self.times, 0.0))
         return jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
 
 
+@dataclass(frozen=True)
 class KinematicEffect(AbstractEffect):
-    """Changes the deformation that the fluid really felt."""
+    """Changes the deformation that the fluid really felt.
 
+    Attributes
+    ----------
+    shapes_command
+        Whether it acts on the way from the command to the tool. A rate that was measured at the
+        tool contains it already, so it is then no candidate; what lies between the tool and the
+        fluid, such as slip or a wrong gap, still is.
+    """
+
+    shapes_command: bool = False
     kind: ClassVar[Kind] = "kinematic"
 
     def felt_rate(

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discover.closed_loop.result import LoopResult, Stage
+from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import render
@@ -46,9 +46,11 @@ def loop_verdict(result: LoopResult) -> list[str]:
         sentences.append(text)
     change = f"Error on fitted runs: {percent(before.fit)} before, {percent(after.fit)} after"
     if before.held_out is not None:
+        unseen = "runs that no fit saw"
+        if result.folds:
+            unseen = "each run by a search that did not see it"
         change += (
-            f"; on runs that no fit saw: {percent(before.held_out)} before, "
-            f"{percent(after.held_out)} after"
+            f"; on {unseen}: {percent(before.held_out)} before, {percent(after.held_out)} after"
         )
     sentences.append(f"{change}. The noise is about {percent(result.noise_floor)}.")
     return sentences
@@ -95,6 +97,7 @@ def write_loop(
         verdict=loop_verdict(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         rankings=[_ranking(ranking) for ranking in result.rankings],
+        folds=[_fold(fold) for fold in result.folds],
         remaining=_flatten(result.remaining),
         pictures=drawn,
         study_text=study_text,
@@ -130,6 +133,15 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "source": stage.source,
         "check": stage.check,
         "error": stage.error,
+    }
+
+
+def _fold(fold: Fold) -> dict[str, Any]:
+    return {
+        "run": fold.run,
+        "error_before": fold.error_before,
+        "error_after": fold.error_after,
+        "effects": ", ".join(map(spoken, fold.effects)) or "none",
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
-from discover.dataset.run import ShearDataset
+from discover.dataset.run import LinearSweep, ShearDataset
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
@@ -25,11 +25,14 @@ class StudyData:
         All runs.
     fit, held_out
         Runs that fits may see, and runs that only judge.
+    each
+        Whether every fitted run is also to be held out in turn.
     """
 
     dataset: ShearDataset
     fit: ShearDataset
     held_out: ShearDataset
+    each: bool = False
 
     @property
     def truth(self) -> Fluid | None:
@@ -101,13 +104,24 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     else:
         base = None if study.path is None else study.path.parent
         dataset = load_dataset(
-            str(data.folder), data.clock_factor, base, rate_is_measured=data.rate == "measured"
+            str(data.folder),
+            data.clock_factor,
+            base,
+            rate_is_measured=data.rate == "measured",
+            rate_before=data.rate_before,
         )
-    held_out = dataset.select(data.held_out)
-    fit_names = data.fit or tuple(name for name in dataset.names if name not in data.held_out)
+    each = data.held_out == "each"
+    named = () if data.held_out == "each" else data.held_out
+    held_out = dataset.select(named)
+    fit_names = data.fit or tuple(name for name in dataset.names if name not in named)
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
-    return StudyData(dataset, dataset.select(fit_names), held_out)
+    if each and len(fit_names) < 2:
+        raise InputError(
+            f'held_out = "each" needs at least 2 runs, one to leave out and one to fit; got '
+            f"{len(fit_names)}. Leave held_out out."
+        )
+    return StudyData(dataset, dataset.select(fit_names), held_out, each)
 
 
 def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
@@ -142,7 +156,7 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
                 f'modes = "lve" needs a linear sweep, but {dataset.name!r} has no lve.csv. Give '
                 "modulus_Pa and relaxation_time_s, or add the file."
             )
-        spectrum = relaxation_spectrum(dataset.linear_sweep)
+        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, model.sweep_rad_s))
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
     else:
         start = _linear_start(dataset)
@@ -164,6 +178,21 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
         spectrum,
         model.solvent_viscosity_Pa_s,
     )
+
+
+def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:
+    """Return the frequencies of a sweep that the study lets count."""
+    if window is None:
+        return sweep
+    omega = sweep.angular_frequency
+    keep = (omega >= window[0]) & (omega <= window[1])
+    if np.count_nonzero(keep) < 2:
+        raise InputError(
+            f"lve.csv has {np.count_nonzero(keep)} frequencies from {window[0]:g} to "
+            f"{window[1]:g} rad/s; at least 2 are needed, and it goes from {omega.min():g} to "
+            f"{omega.max():g}. Widen [model] sweep_rad_s."
+        )
+    return LinearSweep(omega[keep], sweep.storage_modulus[keep], sweep.loss_modulus[keep])
 
 
 def _start(law: str, parameter: str) -> float:

@@ -36,15 +36,16 @@ class Data(_Section):
     folder: str | None = None
     synthetic: Synthetic | None = None
     fit: tuple[str, ...] | None = None
-    held_out: tuple[str, ...] = ()
+    held_out: tuple[str, ...] | Literal["each"] = ()
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
+    rate_before: str | None = None
 
     @model_validator(mode="after")
     def _one_source(self):
         if (self.folder is None) == (self.synthetic is None):
             raise ValueError('write either folder = "..." or synthetic = {...}, not both or none')
-        both = set(self.fit or ()) & set(self.held_out)
+        both = set(self.fit or ()) & set(() if self.held_out == "each" else self.held_out)
         if both:
             raise ValueError(f"the run {sorted(both)[0]!r} is both in fit and in held_out")
         return self
@@ -57,9 +58,18 @@ class Model(_Section):
     modulus_Pa: Positive | Literal["fit"] = 1.0
     relaxation_time_s: Positive | Literal["fit"] = 1.0
     modes: Literal["lve"] | None = None
+    sweep_rad_s: tuple[Positive, Positive] | None = None
     solvent_viscosity_Pa_s: Annotated[float, Field(ge=0)] = 0.0
     parameters: dict[str, float | Literal["fit"]] = {}
     known_relaxation: bool = True
+
+    @model_validator(mode="after")
+    def _window(self):
+        if self.sweep_rad_s is not None and self.modes is None:
+            raise ValueError('sweep_rad_s limits the sweep of modes = "lve"; write that too')
+        if self.sweep_rad_s is not None and not self.sweep_rad_s[0] < self.sweep_rad_s[1]:
+            raise ValueError(f"sweep_rad_s must be [low, high]; got {list(self.sweep_rad_s)}")
+        return self
 
 
 class Loop(_Section):

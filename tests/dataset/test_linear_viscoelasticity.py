@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
+from discover.dataset.sweep_inertia import sweep_inertia
 from discover.errors import InputError
 
 
@@ -55,3 +56,30 @@ def test_the_melt_needs_a_dozen_modes_and_misses_its_sweep_by_under_4_percent(me
     spectrum = relaxation_spectrum(sweep)
     assert 10 <= len(spectrum) <= 16
     assert spectrum.relative_error < 0.04
+
+
+@pytest.mark.parametrize("inertia", [0.0, 2e-3, -2e-3])
+def test_inertia_left_in_a_sweep_comes_back_with_its_sign(inertia):
+    omega = np.geomspace(0.1, 100.0, 25)
+    x = omega[:, None] * np.array([0.1, 1.0])
+    modulus = np.array([40.0, 100.0])
+    generator = np.random.default_rng(0)
+    storage = (x**2 / (1 + x**2)) @ modulus - inertia * omega**2
+    loss = (x / (1 + x**2)) @ modulus
+    noisy = [v * (1 + 0.01 * generator.standard_normal(25)) for v in (storage, loss)]
+    found = sweep_inertia(LinearSweep(omega, *noisy))
+    assert found.inertia == pytest.approx(inertia, abs=4 * found.deviation)
+    assert (found.evidence > 6.0) == (inertia != 0.0)
+    if inertia != 0.0:
+        assert found.deviation < 0.1 * abs(inertia)
+        assert found.error_after < 0.3 * found.error_before
+
+
+def test_the_inertia_left_in_the_gel_sweep_is_a_small_part_of_the_stated_one(measured_data):
+    sweep = load_dataset(measured_data / "gel-laos").linear_sweep
+    assert sweep is not None
+    found = sweep_inertia(sweep)
+    # inertia of motor and tool in the file's header, strain and stress constants of its plates
+    stated = (20.5844e-6 + 1.65747e-6) * 9947180 / 5.714
+    assert found.evidence > 6.0
+    assert 0.01 * stated < found.inertia < 0.05 * stated

@@ -75,6 +75,26 @@ def test_the_rate_is_derived_from_strain_and_the_run_says_so(folder):
     assert "derived from strain" in str(run.metadata["shear_rate_source"])
 
 
+def test_a_rate_is_measured_if_it_was_derived_or_the_caller_says_so(folder):
+    rows = "\n".join(f"{t},{0.5 * t},1" for t in range(8))
+    made = folder(b__csv="time_s,strain,stress_Pa\n" + rows)
+    data = load_dataset(made)
+    assert not data["a.csv"].rate_is_measured
+    assert data["b.csv"].rate_is_measured
+    assert load_dataset(made, rate_is_measured=True)["a.csv"].rate_is_measured
+
+
+def test_the_steady_flow_before_a_run_is_read_from_the_column_that_is_named(folder):
+    made = folder(runs__csv="file,before\na.csv,-0.25\nb.csv,0\n")
+    assert [run.rate_before for run in load_dataset(made, rate_before="before")] == [-0.25, 0.0]
+    assert [run.rate_before for run in load_dataset(made)] == [0.0, 0.0]
+    with pytest.raises(InputError, match="rate_before names the column 'earlier'"):
+        load_dataset(made, rate_before="earlier")
+    bad = folder(runs__csv="file,before\na.csv,slow\nb.csv,0\n")
+    with pytest.raises(InputError, match="finite numbers; line 2 holds slow"):
+        load_dataset(bad, rate_before="before")
+
+
 def test_smoothing_reduces_noise_and_keeps_a_cubic_on_uneven_samples():
     generator = np.random.default_rng(0)
     time = np.cumsum(generator.uniform(0.5, 1.5, 200)) * 1e-2

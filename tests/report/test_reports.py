@@ -1,5 +1,6 @@
 """Reports: what they contain, that they stand alone, that names are escaped."""
 
+import json
 import re
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -8,7 +9,14 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import CandidateScore
-from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.closed_loop.result import (
+    ErrorPair,
+    Fold,
+    LoopResult,
+    RunRecord,
+    Stage,
+    StageParameter,
+)
 from discover.comparison import compare
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.result import LearnerResult, RecoveredTerm
@@ -243,3 +251,20 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
     )  # fmt: skip
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
     assert "no effect earned its place" in page
+
+
+def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):
+    result = replace(
+        loop_result(),
+        folds=(Fold("only.csv", "unexplained", ("tr(sigma)*sigma",), 0.7, 0.123),),
+        declared_parameters={"modulus_Pa": StageParameter(41.5, (41.0, 42.0), "Pa")},
+    )
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    for text in ("by a search that did not see it", "only.csv", "12 %", "tr(σ) σ"):
+        assert text in page
+    declared = page[page.index('<table id="declared"') :]
+    row = declared[: declared.index("</table>")]
+    assert all(text in row for text in ("modulus_Pa", "41.5", "41 to 42", ">Pa<"))
+    contents = json.loads((tmp_path / "loop.json").read_text())
+    assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
+    assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"

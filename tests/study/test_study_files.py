@@ -70,6 +70,9 @@ test = "paper"
         ({"data": SYNTHETIC, "loop": {"strain": [3, 1]}}, ["strain", "low < high"]),
         ({"data": SYNTHETIC, "compare": {"learners": []}}, ["learner"]),
         ({"data": {"folder": "a", "fit": ["x"], "held_out": ["x"]}}, ["'x'", "both"]),
+        ({"data": {"folder": "a", "held_out": "all"}}, ["data.held_out", "'each'", "'all'"]),
+        ({"data": SYNTHETIC, "model": {"sweep_rad_s": [1, 2]}}, ["sweep_rad_s", "lve"]),
+        ({"data": SYNTHETIC, "model": {"modes": "lve", "sweep_rad_s": [2, 1]}}, ["[low, high]"]),
         ({"data": {"synthetic": {"law": "ucm", "noise": float("nan")}}}, ["noise"]),
     ],
 )
@@ -98,6 +101,16 @@ def test_held_out_runs_are_not_among_those_to_fit():
     assert data.held_out.names == ("laos_1_1",)
     assert "laos_1_1" not in data.fit.names
     assert len(data.fit) == 7
+
+
+def test_all_runs_are_to_fit_where_each_is_held_out_in_turn():
+    data = load_study_data(parse_study({"data": {**SYNTHETIC, "held_out": "each"}}))
+    assert data.each
+    assert len(data.fit) == 8
+    assert len(data.held_out) == 0
+    alone = {**SYNTHETIC, "held_out": "each", "fit": ["laos_1_1"]}
+    with pytest.raises(InputError, match="at least 2 runs"):
+        load_study_data(parse_study({"data": alone}))
 
 
 def test_a_held_out_run_that_does_not_exist_is_an_input_error():

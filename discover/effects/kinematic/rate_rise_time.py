@@ -24,4 +24,5 @@ EFFECT = RateRiseTime(
     source="Macosko 1994, Rheology, ch. 8: response time of the drive",
     check="Record the angle of the motor in start-up; repeat at another rate.",
     visible="tau of about 5 % of the time in which the stress grows.",
+    shapes_command=True,
 )

@@ -4,6 +4,10 @@ import jax.numpy as jnp
 
 from discover.effects.base import EffectParameter, SignalEffect
 
+# Below this fraction of the record a step only marks a jump of the rate, whose torque is over
+# before a sample is taken
+_JUMP = 1e-9
+
 
 class InstrumentInertia(SignalEffect):
     """The stress recorded contains the inertia of the moving tool."""
@@ -11,7 +15,8 @@ class InstrumentInertia(SignalEffect):
     def recorded_stress(self, values, record):
         """Return σ + I dγ̇/dt."""
         step = jnp.diff(record.instrument_times)
-        slope = jnp.diff(record.shear_rate) / step
+        shortest = _JUMP * (record.instrument_times[-1] - record.instrument_times[0])
+        slope = jnp.where(step > shortest, jnp.diff(record.shear_rate) / step, 0.0)
         # slope at the points, from the intervals at both sides
         inside = 0.5 * (slope[1:] + slope[:-1])
         at_points = jnp.concatenate([slope[:1], inside, slope[-1:]])

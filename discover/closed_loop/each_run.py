@@ -1,0 +1,84 @@
+"""The closed loop with every run held out in turn, where there are too few to spare one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.loop import run_loop
+from discover.closed_loop.result import ErrorPair, Fold, LoopResult
+from discover.dataset import ShearDataset
+from discover.effects import AbstractEffect
+from discover.errors import InputError
+
+
+def run_loop_on_each(
+    dataset: ShearDataset,
+    declared: DeclaredModel,
+    fit: Sequence[str] | None = None,
+    effects: Sequence[str | AbstractEffect] | None = None,
+    max_effects: int = 3,
+    strain: tuple[float, float] | None = None,
+    noise: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> LoopResult:
+    """Close the loop on all runs, and judge it by loops that each leave one run out.
+
+    What is found, and the verdict, come from all runs. The held-out errors are means over loops
+    that search afresh without one run, so that neither its stress nor the choice of effects has
+    seen it   [Stone 1974, J. R. Stat. Soc. B 36, 111]. They judge the way of finding a law rather
+    than the one law found, and that the loops find the same effects is part of the judgement.
+
+    Parameters
+    ----------
+    dataset, declared, effects, max_effects, strain, noise, progress
+        As in `run_loop`.
+    fit
+        Names of the runs; by default all.
+
+    Raises
+    ------
+    InputError
+        As in `run_loop`, or if there are fewer than two runs.
+    """
+    names = list(dataset.names if fit is None else fit)
+    if len(names) < 2:
+        raise InputError(
+            f"To hold out each run in turn, at least 2 are needed; got {len(names)}. Fit without "
+            "held-out runs, or measure more."
+        )
+    say = progress or (lambda line: None)
+
+    def loop(fitted: Sequence[str], held_out: Sequence[str], prefix: str) -> LoopResult:
+        return run_loop(
+            dataset,
+            declared,
+            fit=fitted,
+            held_out=held_out,
+            effects=effects,
+            max_effects=max_effects,
+            strain=strain,
+            noise=noise,
+            progress=lambda line: say(f"{prefix}: {line}"),
+        )
+
+    whole = loop(names, (), "all runs")
+    folds = []
+    for name in names:
+        part = loop([other for other in names if other != name], [name], f"without {name}")
+        before, after = part.error_before.held_out, part.error_after.held_out
+        assert before is not None  # one run is held out
+        assert after is not None
+        found = tuple(stage.effect for stage in part.stages)
+        folds.append(Fold(name, part.verdict, found, before, after))
+    return replace(
+        whole,
+        error_before=_with_folds(whole.error_before, [fold.error_before for fold in folds]),
+        error_after=_with_folds(whole.error_after, [fold.error_after for fold in folds]),
+        folds=tuple(folds),
+    )
+
+
+def _with_folds(error: ErrorPair, left_out: Sequence[float]) -> ErrorPair:
+    return ErrorPair(error.fit, float(np.mean(left_out)))

@@ -1,0 +1,86 @@
+"""Inertia of the instrument in a linear sweep: a part of G′ that grows with frequency squared."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from discover.dataset.linear_viscoelasticity import MARGINS
+from discover.dataset.run import LinearSweep
+
+# Modes enough for any sweep of so many points; more would only fit its noise
+_POINTS_PER_MODE = 1.5
+
+
+@dataclass(frozen=True)
+class SweepInertia:
+    """What a term −I ω² in G′ does for a sum of Maxwell modes.
+
+    Attributes
+    ----------
+    inertia
+        I in Pa s². Positive where the tool's inertia was not subtracted, or not enough of it;
+        negative where too much was.
+    deviation
+        Its standard deviation.
+    error_before, error_after
+        Root mean square of the misfit of G′ and G″ over the magnitude of the complex modulus,
+        without and with the term.
+    evidence
+        Lowering of the Bayesian information criterion; 6 is strong   [Kass & Raftery 1995, JASA
+        90, 773].
+    """
+
+    inertia: float
+    deviation: float
+    error_before: float
+    error_after: float
+    evidence: float
+
+
+def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
+    """Return how much of G′ is inertia, with a sum of Maxwell modes as the fluid.
+
+    The torque on tool and sample is G* − I ω² times the strain   [Krieger 1990, J. Rheol. 34, 471].
+    A sum of modes with positive moduli only rises in G′, so a G′ that falls with ω² is no fluid's.
+
+    Parameters
+    ----------
+    sweep
+        G′ and G″. As recorded, or raw; raw G′ may be negative.
+    """
+    omega = np.asarray(sweep.angular_frequency, dtype=float)
+    size = np.hypot(sweep.storage_modulus, sweep.loss_modulus)
+    data = np.concatenate([sweep.storage_modulus / size, sweep.loss_modulus / size])
+    zero = np.zeros_like(omega)
+    falling = np.concatenate([-(omega**2) / size, zero])[:, None]
+    n_modes = max(1, int(len(omega) / _POINTS_PER_MODE))
+    trials = []
+    for margin in MARGINS:
+        times = np.geomspace(10.0**-margin / omega.max(), 10.0**margin / omega.min(), n_modes)
+        x = omega[:, None] * times
+        modes = np.concatenate([x**2 / (1 + x**2), x / (1 + x**2)]) / np.tile(size, 2)[:, None]
+        # either sign: the correction may have been too small or too large
+        trials.append((_fit(modes, data), _fit(np.hstack([modes, falling, -falling]), data)))
+    before = min((without for without, _ in trials), key=lambda fit: fit[1])
+    after = min((with_it for _, with_it in trials), key=lambda fit: fit[1])
+    inertia = float(after[0][-2] - after[0][-1])
+    n = len(data)
+    gain = n * np.log(max(before[1], 1e-300) / max(after[1], 1e-300)) - np.log(n)
+    column = falling[:, 0]
+    deviation = np.sqrt(after[1] / max(n - 1, 1) / max(float(column @ column), 1e-300))
+    return SweepInertia(
+        inertia,
+        float(deviation),
+        float(np.sqrt(before[1] / n)),
+        float(np.sqrt(after[1] / n)),
+        float(gain),
+    )
+
+
+def _fit(design: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return coefficients of non-negative least squares, and the squared misfit."""
+    scale = np.linalg.norm(design, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    solution, residual = nnls(design / scale, data, maxiter=100 * design.shape[1] + 100)
+    return solution / scale, float(residual**2)
