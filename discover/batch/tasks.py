@@ -114,6 +114,7 @@ def run_close_loop(
         "max_effects": study.loop.max_effects,
         "strain": study.loop.strain,
         "noise": study.loop.noise,
+        "most_samples": study.loop.most_samples,
         "progress": say,
     }
     if each:

@@ -15,6 +15,8 @@ ALIAS_COSINE = 0.99
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
+_INNER_STRETCHES = (1.0 / 30.0, 1.0 / 6.0, 5.0)
+
 
 @dataclass
 class CandidateScore:
@@ -91,10 +93,12 @@ def attribute(
         Which effects are candidates.
     """
     waiting = [e for e in model.effects if e.name not in active and admitted(e)]
-    at = [model.slices[effect.name].start for effect in waiting]
+    bases = [base for effect in waiting for base in _bases(model, fit, effect)]
+    owners = [effect for effect in waiting for _ in _bases(model, fit, effect)]
+    at = [model.slices[effect.name].start for effect in owners]
     probes = []
-    for position in at:
-        theta = fit.theta.copy()
+    for base, position in zip(bases, at, strict=True):
+        theta = base.copy()
         theta[position] += 0.1 * model.first_trial[position]
         probes.append(theta)
     residual = fit.residual.ravel()
@@ -103,8 +107,8 @@ def attribute(
     basis = np.zeros((residual.size, 0))
     if len(fit.free):
         basis, _ = np.linalg.qr(fit.jacobian.reshape(len(fit.free), -1).T)
-    candidates, signatures = [], []
-    for effect, position, change in zip(waiting, at, changes, strict=True):
+    tried, sides = [], []
+    for effect, position, change in zip(owners, at, changes, strict=True):
         signature = np.where(np.isfinite(change), change, 0.0) / (0.1 * model.first_trial[position])
         length = np.linalg.norm(signature)
         beyond = signature - basis @ (basis.T @ signature)
@@ -116,9 +120,15 @@ def attribute(
             # an amplitude outside its range explains nothing
             if not model.low[position] < step < np.inf:
                 score, step = 0.0, 0.0
-        candidates.append(CandidateScore(effect.name, effect.kind, score, step))
-        signatures.append(beyond / beyond_length if score > 0 else np.zeros_like(beyond))
-    _try_amplitudes(model, batch, fit, candidates, at)
+        tried.append(CandidateScore(effect.name, effect.kind, score, step))
+        sides.append(beyond / beyond_length if score > 0 else np.zeros_like(beyond))
+    _try_amplitudes(model, batch, fit, tried, bases, at)
+    candidates, signatures = [], []
+    for effect in waiting:
+        own = [i for i, owner in enumerate(owners) if owner is effect]
+        best = max(own, key=lambda i: tried[i].reduction)
+        candidates.append(tried[best])
+        signatures.append(sides[best])
     order = sorted(
         range(len(waiting)),
         key=lambda i: (-round(candidates[i].reduction, 6), waiting[i].complexity, i),
@@ -138,14 +148,29 @@ def attribute(
     return Attribution([candidates[i] for i in leading], [candidates[i] for i in rest])
 
 
-def _try_amplitudes(model, batch, fit, candidates, at):
+def _bases(model: AugmentedModel, fit: Fit, effect: AbstractEffect) -> list[np.ndarray]:
+    """Return parameter vectors from which an effect is tried: its inner parameters at some sizes.
+
+    At zero amplitude they change nothing, but the signature depends on them, and from a time that
+    is far off a fit finds no way.
+    """
+    bases = [fit.theta.copy()]
+    inner = model.positions(effect.name)[1:]
+    for stretch in _INNER_STRETCHES if inner else ():
+        base = fit.theta.copy()
+        base[inner] = np.clip(stretch * base[inner], model.low[inner], model.high[inner])
+        bases.append(base)
+    return bases
+
+
+def _try_amplitudes(model, batch, fit, candidates, bases, at):
     trials, owner = [], []
-    for i, (candidate, position) in enumerate(zip(candidates, at, strict=True)):
-        candidate.start = fit.theta.copy()
+    for i, (candidate, base, position) in enumerate(zip(candidates, bases, at, strict=True)):
+        candidate.start = base.copy()
         if candidate.score <= 0:
             continue
         for stretch in _STRETCHES:
-            theta = fit.theta.copy()
+            theta = base.copy()
             theta[position] = np.clip(
                 stretch * candidate.step, model.low[position], model.high[position]
             )

@@ -101,7 +101,7 @@ class _Program:
         stress, felt = self._integrate(numbers, theta, times, rate)
         stress = stress + numbers.solvent_viscosity * felt + self._beside(theta, felt)
         for effect in self._signal:
-            record = Record(times, felt, stress, run.clock_factor)
+            record = Record(times, felt, stress, run.clock_factor, run.strain_before)
             stress = effect.recorded_stress(self._values(theta, effect), record)
         return stress[run.sample_index]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.loop import run_loop
+from discover.closed_loop.loop import MOST_SAMPLES, run_loop
 from discover.closed_loop.result import ErrorPair, Fold, LoopResult
 from discover.dataset import ShearDataset
 from discover.effects import AbstractEffect
@@ -21,6 +21,7 @@ def run_loop_on_each(
     max_effects: int = 3,
     strain: tuple[float, float] | None = None,
     noise: float | None = None,
+    most_samples: int = MOST_SAMPLES,
     progress: Callable[[str], None] | None = None,
 ) -> LoopResult:
     """Close the loop on all runs, and judge it by loops that each leave one run out.
@@ -32,7 +33,7 @@ def run_loop_on_each(
 
     Parameters
     ----------
-    dataset, declared, effects, max_effects, strain, noise, progress
+    dataset, declared, effects, max_effects, strain, noise, most_samples, progress
         As in `run_loop`.
     fit
         Names of the runs; by default all.
@@ -60,6 +61,7 @@ def run_loop_on_each(
             max_effects=max_effects,
             strain=strain,
             noise=noise,
+            most_samples=most_samples,
             progress=lambda line: say(f"{prefix}: {line}"),
         )
 

@@ -22,6 +22,7 @@ from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdi
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
+from discover.dataset.thinning import thin_run
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -41,6 +42,10 @@ LINEAR_STRAIN = 0.4
 FEWEST_LINEAR_SAMPLES = 10
 """Fewer samples than this at small strain settle nothing."""
 
+MOST_SAMPLES = 400
+"""Samples of a run that are used by default: a search costs as much as it has samples, and more of
+them say little more of a law."""
+
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
 
@@ -54,6 +59,7 @@ def run_loop(
     max_effects: int = 3,
     strain: tuple[float, float] | None = None,
     noise: float | None = None,
+    most_samples: int = MOST_SAMPLES,
     progress: Callable[[str], None] | None = None,
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
@@ -86,6 +92,8 @@ def run_loop(
         Smallest and largest strain of the samples fitted and judged.
     noise
         Relative noise, where it is known; estimated from the residuals otherwise.
+    most_samples
+        Of a run with more samples only so many are used, evenly chosen, to fit and to judge.
     progress
         Called with a line of text now and then.
 
@@ -96,7 +104,7 @@ def run_loop(
     """
     started = time.perf_counter()
     say = progress or (lambda line: None)
-    fitted_runs, held_runs = _split(dataset, fit, held_out, strain)
+    fitted_runs, held_runs = _split(dataset, fit, held_out, strain, most_samples)
     candidates = _candidates(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
@@ -162,7 +170,7 @@ def run_loop(
     )
 
 
-def _split(dataset, fit, held_out, strain):
+def _split(dataset, fit, held_out, strain, most):
     overlap = [name for name in (fit or ()) if name in held_out]
     if overlap:
         raise InputError(f"The run {overlap[0]!r} is both fitted and held out; choose one.")
@@ -172,7 +180,14 @@ def _split(dataset, fit, held_out, strain):
     )
     if len(fitted) == 0:
         raise InputError("No run is left to fit. Take some out of held_out.")
-    return cut_to_strain(fitted.runs, strain), cut_to_strain(held.runs, strain)
+    if most < FEWEST_LINEAR_SAMPLES:
+        raise InputError(
+            f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "
+            "told from fewer samples."
+        )
+    return [
+        [thin_run(run, most) for run in cut_to_strain(part.runs, strain)] for part in (fitted, held)
+    ]
 
 
 def _candidates(effects: Sequence[str | AbstractEffect] | None) -> list[AbstractEffect]:

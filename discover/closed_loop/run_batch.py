@@ -9,10 +9,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import ShearRun
-from discover.simulate.grid import make_grid
+from discover.simulate.grid import COARSEST_STRAIN, make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)
+
+_GROWTH = 0.05
 
 PRE_SHEAR_LENGTH = 2.0
 """A steady flow before a run is computed over this multiple of the run's length."""
@@ -21,7 +23,7 @@ PRE_SHEAR_STRAIN = 1000.0
 """Strain after which any fluid is taken to be steady."""
 
 # The steady state is a fixed point of the scheme whatever its step, so steps need only be stable
-_PRE_SHEAR_STEP, _FEWEST_PRE_SHEAR_STEPS = 1.0, 100
+_FEWEST_PRE_SHEAR_STEPS = 100
 
 
 class RunBatch(eqx.Module):
@@ -43,6 +45,8 @@ class RunBatch(eqx.Module):
         Measured shear stress in Pa, shape (runs, n).
     clock_factor
         Shape (runs,).
+    strain_before
+        Total strain of the sample before each run, shape (runs,).
     """
 
     times: Float[Array, "runs m"]
@@ -51,6 +55,7 @@ class RunBatch(eqx.Module):
     weight: Float[Array, "runs n"]
     stress: Float[Array, "runs n"]
     clock_factor: Float[Array, " runs"]
+    strain_before: Float[Array, " runs"]
 
 
 def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
@@ -69,7 +74,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
         early = gap * _EARLY_STEPS
         anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
-        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
+        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
         grid = np.concatenate([_pre_shear(run), grid])
         grids.append((grid, np.searchsorted(grid, run.time)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
@@ -98,6 +103,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
                 np.pad(np.full(n, scale), pad),
                 np.pad(run.shear_stress, pad),
                 run.clock_factor,
+                run.strain_before,
             )
         )
     return RunBatch(*(jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)))
@@ -109,7 +115,7 @@ def _pre_shear(run: ShearRun) -> Float[np.ndarray, " p"]:
     if speed == 0.0:
         return np.zeros(0)
     length = min(PRE_SHEAR_LENGTH * run.time[-1], PRE_SHEAR_STRAIN / speed)
-    count = max(_FEWEST_PRE_SHEAR_STEPS, int(np.ceil(length * speed / _PRE_SHEAR_STEP)))
+    count = max(_FEWEST_PRE_SHEAR_STEPS, int(np.ceil(length * speed / COARSEST_STRAIN)))
     times = np.linspace(-length, 0.0, count + 1)
     # the rate jumps at 0: step to just before, so that no step straddles it
     times[-1] = -1e-12 * length

@@ -32,6 +32,7 @@ _RUN_QUANTITIES = (
     units.SECOND_NORMAL_STRESS_DIFFERENCE,
     units.STRAIN,
 )
+_BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
 
@@ -56,7 +57,7 @@ def check_folder(
         index = read_index(root)
     except InputError as error:
         return (Finding("error", "runs", INDEX_FILE, str(error)),)
-    findings = list(_clock(index, clock_factor))
+    findings = [*_clock(index, clock_factor), *_before(index)]
     runs: list[ShearRun] = []
     unused: dict[str, list[str]] = {}
     for row, name in enumerate(index.columns["file"]):
@@ -101,6 +102,19 @@ def _clock(index: Table, column: str | None) -> Iterator[Finding]:
         yield Finding(
             "note", "clock", INDEX_FILE, f"{column} is 1 in every run, so it changes nothing."
         )
+
+
+def _before(index: Table) -> Iterator[Finding]:
+    for name in index.columns:
+        if name.lower().startswith(_BEFORE_WORDS):
+            yield Finding(
+                "note",
+                "start",
+                INDEX_FILE,
+                f"{INDEX_FILE} has a column {name}. If each run starts from a steady flow at that "
+                f'rate, write rate_before = "{name}" in the study; without it every run starts '
+                "from rest.",
+            )
 
 
 def _unused_columns(root: Path, name: str, unused: dict[str, list[str]]) -> Iterator[Finding]:

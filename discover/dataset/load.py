@@ -10,6 +10,7 @@ from jaxtyping import Float
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
+from discover.dataset.sequence import in_sequence
 from discover.dataset.table import Table, read_bytes, read_table
 from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
@@ -87,6 +88,7 @@ def load_dataset(
     rate_is_measured: bool = False,
     rate_window: int = DEFAULT_WINDOW,
     rate_before: str | None = None,
+    sequence: str | None = None,
 ) -> ShearDataset:
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
@@ -109,6 +111,9 @@ def load_dataset(
     rate_before
         Column of ``runs.csv`` with the shear rate in 1/s of the steady flow before each run; by
         default every run starts from rest.
+    sequence
+        Column of ``runs.csv`` that orders the runs where they were made one after another on one
+        sample, such as start times; by default every run has a sample of its own.
 
     Raises
     ------
@@ -118,11 +123,15 @@ def load_dataset(
     root = resolve_folder(folder, base)
     index = read_index(root)
     factors = read_clock_factors(index, clock_factor)
-    before = read_rates_before(index, rate_before)
+    before = np.zeros(len(index))
+    if rate_before is not None:
+        before = read_column(index, "rate_before", rate_before)
     runs = tuple(
         read_run(root, index, row, factors[row], rate_is_measured, rate_window, before[row])
         for row in range(len(index))
     )
+    if sequence is not None:
+        runs = in_sequence(runs, read_column(index, "sequence", sequence))
     provenance = root / "PROVENANCE.md"
     return ShearDataset(
         name=root.resolve().name,
@@ -186,12 +195,7 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
     """
     if column is None:
         return np.ones(len(index))
-    if column not in index.columns:
-        raise InputError(
-            f"clock_factor names the column {column!r}, but {INDEX_FILE} has only "
-            f"{index.listed}. Correct the name, or leave clock_factor out."
-        )
-    factors = index.numbers(column)
+    factors = read_column(index, "clock_factor", column)
     if np.any(factors <= 0):
         row = int(np.argmax(factors <= 0))
         raise InputError(
@@ -201,20 +205,18 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
     return factors
 
 
-def read_rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
-    """Return the shear rate before every run, in 1/s; zeros, which is rest, if no column is named.
+def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs"]:
+    """Return the numbers in a column of ``runs.csv`` that a key of the study names.
 
     Raises
     ------
     InputError
         If the column is missing or holds something other than numbers.
     """
-    if column is None:
-        return np.zeros(len(index))
     if column not in index.columns:
         raise InputError(
-            f"rate_before names the column {column!r}, but {INDEX_FILE} has only {index.listed}. "
-            "Correct the name, or leave rate_before out if every run starts from rest."
+            f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}. "
+            f"Correct the name, or leave {key} out."
         )
     return index.numbers(column)
 

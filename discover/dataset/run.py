@@ -37,6 +37,8 @@ class ShearRun:
         Whether the shear rate was measured, or derived from measured strain, and not commanded.
     rate_before
         Shear rate in 1/s of the steady flow before t = 0; zero is rest.
+    strain_before
+        Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
     metadata
         What else the source says of the run.
     """
@@ -52,6 +54,7 @@ class ShearRun:
     clock_factor: float = 1.0
     rate_is_measured: bool = False
     rate_before: float = 0.0
+    strain_before: float = 0.0
     metadata: Mapping[str, float | str] = field(default_factory=dict)
 
     def __post_init__(self):

@@ -1,10 +1,18 @@
 """Fewer samples of a very long record, chosen so that what a law is judged on stays."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float
 
+from discover.dataset.run import ShearRun
+from discover.protocols.shear import measured_rate
+
 MOST_SAMPLES = 20_000
 """A record with more samples is thinned: they cost time and say nothing new about a law."""
+
+
+_FOLLOWED = 1e-3
 
 
 def thin(
@@ -54,6 +62,31 @@ def thin(
             "rate varies faster than the samples kept: give a shorter record"
         )
     return keep, note
+
+
+def thin_run(run: ShearRun, most: int) -> ShearRun:
+    """Return a run with at most so many of its samples, evenly chosen in their order.
+
+    A rate that was read sample by sample is followed through the samples kept where that changes
+    the strain by less than 0.1 % of its range, and through all of them otherwise.
+
+    Parameters
+    ----------
+    run
+        The run.
+    most
+        How many samples may stay, 2 or more.
+    """
+    n = len(run)
+    if n <= most:
+        return run
+    keep = np.zeros(n, dtype=bool)
+    keep[np.unique(np.round(np.linspace(0, n - 1, most)).astype(int))] = True
+    thinned = run.window(keep)
+    sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
+    if sampled and _strain_error(run.time, run.shear_rate, keep) < _FOLLOWED:
+        thinned = replace(thinned, protocol=measured_rate(thinned.time, thinned.shear_rate))
+    return thinned
 
 
 def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -185,12 +185,15 @@ class Record:
         Shear stress in Pa, shape (n,).
     clock_factor
         Time on the instrument's clock is ``times / clock_factor``.
+    strain_before
+        Strain, added up without regard to its sign, that the sample had seen in earlier runs.
     """
 
     times: Float[Array, " n"]
     shear_rate: Float[Array, " n"]
     stress: Float[Array, " n"]
     clock_factor: Float[Array, ""]
+    strain_before: Float[Array, ""] | float = 0.0
 
     @property
     def instrument_times(self) -> Float[Array, " n"]:
@@ -199,11 +202,14 @@ class Record:
 
     @property
     def total_strain(self) -> Float[Array, " n"]:
-        """Strain added up without regard to its sign since t = 0, at each time."""
+        """Strain of the sample, added up without regard to its sign, at each time.
+
+        From the start of its first run on; a steady flow before t = 0 does not count.
+        """
         size = jnp.abs(self.shear_rate)
         # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
         steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(jnp.maximum(self.times, 0.0))
-        return jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
+        return self.strain_before + jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])
 
 
 @dataclass(frozen=True)

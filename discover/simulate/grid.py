@@ -12,6 +12,12 @@ from discover.protocols.shear import ShearProtocol
 
 MAX_GRID_POINTS = 200_000
 
+COARSEST_STRAIN = 1.0
+"""Strain of one step beyond which the method may lose its stability in nonlinear flow."""
+
+# A rate is constant while it changes by less than this fraction from sample to sample
+_CHANGE = 0.05
+
 
 class IntegrationGrid(eqx.Module):
     """Where to step and where to sample, for one run or, with a leading axis, a batch of runs.
@@ -37,6 +43,7 @@ def make_grid(
     strain_step: float = 0.1,
     phase_step: float = 0.15,
     max_step: float = np.inf,
+    growth: float = 0.0,
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Return step times and the position of each sample among them.
 
@@ -54,6 +61,9 @@ def make_grid(
         Largest strain and phase per step.
     max_step
         Largest step in s.
+    growth
+        While the rate of a table does not change, steps may grow to this fraction of the time since
+        it last did, up to `COARSEST_STRAIN`: what follows a change happens ever more slowly.
 
     Raises
     ------
@@ -76,7 +86,10 @@ def make_grid(
         phase_step / np.max(np.abs(waves)) if waves.size and np.max(np.abs(waves)) > 0 else np.inf,
     )
     gaps = np.diff(anchors)
-    pieces = np.maximum(1, np.ceil(gaps / limit - 1e-9)) if gaps.size else np.zeros(0)
+    limits = np.full(gaps.shape, limit)
+    if growth > 0.0 and not np.any(np.asarray(protocol.amplitudes)) and np.isfinite(limit):
+        limits = np.maximum(limit, _grown(anchors, knots, rates, growth))
+    pieces = np.maximum(1, np.ceil(gaps / limits - 1e-9)) if gaps.size else np.zeros(0)
     if np.sum(pieces) > MAX_GRID_POINTS:
         raise InputError(
             f"A run of {end:g} s at shear rates up to {fastest:g} 1/s would need "
@@ -91,6 +104,26 @@ def make_grid(
         + [anchors[-1:]]
     )
     return grid, np.searchsorted(grid, times)
+
+
+def _grown(
+    anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray, growth: float
+) -> Float[np.ndarray, " gaps"]:
+    """Return the step that each gap between anchors allows, for the time since a change of rate."""
+    # at a jump, the rate after it
+    right = np.clip(np.searchsorted(knots, anchors, side="right"), 1, max(len(knots) - 1, 1))
+    if len(knots) == 1:
+        at = np.full(anchors.shape, rates[0])
+    else:
+        width = knots[right] - knots[right - 1]
+        share = (anchors - knots[right - 1]) / np.where(width > 0.0, width, 1.0)
+        at = rates[right - 1] + np.clip(share, 0.0, 1.0) * (rates[right] - rates[right - 1])
+    size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
+    changes = np.abs(np.diff(at)) > _CHANGE * size
+    ends = np.where(changes, anchors[1:], 0.0)
+    since = anchors[:-1] - np.concatenate([[0.0], np.maximum.accumulate(ends)[:-1]])
+    coarsest = COARSEST_STRAIN / np.maximum(size, 1e-300)
+    return np.where(changes, 0.0, np.minimum(growth * since, coarsest))
 
 
 def make_grids(

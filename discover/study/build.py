@@ -109,6 +109,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             base,
             rate_is_measured=data.rate == "measured",
             rate_before=data.rate_before,
+            sequence=data.sequence,
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out

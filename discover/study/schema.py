@@ -40,6 +40,7 @@ class Data(_Section):
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
     rate_before: str | None = None
+    sequence: str | None = None
 
     @model_validator(mode="after")
     def _one_source(self):
@@ -79,6 +80,7 @@ class Loop(_Section):
     strain: tuple[float, float] | None = None
     effects: tuple[str, ...] | None = None
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
+    most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
 
     @model_validator(mode="after")
     def _window(self):

@@ -11,7 +11,7 @@ from discover.dataset import ShearDataset, ShearRun
 from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
-from discover.protocols import start_up
+from discover.protocols import measured_rate, start_up
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)
@@ -109,3 +109,21 @@ def test_one_run_cannot_be_held_out_of_itself():
     dataset = start_ups(0.3, rates=(1.0,))
     with pytest.raises(InputError, match="at least 2 are needed; got 1"):
         run_loop_on_each(dataset, DeclaredModel.maxwell(100.0, 1.0))
+
+
+def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
+    times = np.geomspace(1e-3, 60.0, 60)
+    noise = 1.0 + 1e-4 * np.random.default_rng(0).standard_normal(60)
+    rates = np.where(times < 0.01, 5.0, 20.0) * noise
+    rates[times > 20.0] *= 0.01
+    flow = measured_rate(times, rates)
+    run = ShearRun("steps", times, flow, rates, np.ones(60))
+    batch = make_batch([run])
+    # as many steps as strain units in steady flow, and not four times as many
+    assert batch.times.shape[1] < 2 * 1000
+    declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, 0.5)
+    model = AugmentedModel(declared, [make_effect("stress_offset")])
+    predicted = model.predict(model.zero(), batch)[0]
+    fluid = Fluid(Giesekus(0.2), jnp.asarray(100.0), jnp.asarray(0.5))
+    exact = simulate(fluid, flow, times).shear_stress
+    np.testing.assert_allclose(predicted, exact, atol=2e-3 * np.max(exact))

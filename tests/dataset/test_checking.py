@@ -168,6 +168,17 @@ def test_the_clock_column_is_told_when_it_is_not_used(folder):
     assert "clock" in subjects(check_folder(root, "other"), "error")
 
 
+def test_the_column_of_rates_before_is_told(folder):
+    root = folder(start_up())
+    assert "rate_before" not in " ".join(finding.text for finding in check_folder(root))
+    index = (root / "runs.csv").read_text().splitlines()
+    lines = [index[0] + ",shear_rate_before_1_s", *(line + ",5" for line in index[1:])]
+    (root / "runs.csv").write_text("\n".join(lines))
+    notes = [finding.text for finding in check_folder(root) if finding.subject == "start"]
+    assert len(notes) == 1
+    assert 'rate_before = "shear_rate_before_1_s"' in notes[0]
+
+
 def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
     for samples, doubted in ((30, True), (300, False)):
         t = np.linspace(0, 20, samples)
@@ -192,6 +203,11 @@ def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
     wrong = check(folder(with_column(start_up(), stress_Pa=-start_up()["stress_Pa"])))
     assert wrong.exit_code == 2
     assert "opposite to the shear rate" in wrong.stderr
+
+
+def test_the_inertia_left_in_the_gel_sweep_is_told_with_the_frequencies_to_use(measured_data):
+    told = [f.text for f in check_folder(measured_data / "gel-laos") if "inertia" in f.text]
+    assert any("sweep_rad_s = [0.1, 15.85]" in text for text in told)
 
 
 def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measured_data):

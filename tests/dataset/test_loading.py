@@ -95,6 +95,15 @@ def test_the_steady_flow_before_a_run_is_read_from_the_column_that_is_named(fold
         load_dataset(bad, rate_before="before")
 
 
+def test_a_sample_remembers_the_strain_of_earlier_runs(folder):
+    index = "file,start\na.csv,20\nb.csv,10\n"
+    data = load_dataset(folder(runs__csv=index), sequence="start")
+    assert data["b.csv"].strain_before == 0.0
+    # a rate that rises from 0 to 2 in 2 s
+    assert data["a.csv"].strain_before == pytest.approx(2.0)
+    assert load_dataset(folder(runs__csv=index))["a.csv"].strain_before == 0.0
+
+
 def test_smoothing_reduces_noise_and_keeps_a_cubic_on_uneven_samples():
     generator = np.random.default_rng(0)
     time = np.cumsum(generator.uniform(0.5, 1.5, 200)) * 1e-2
