@@ -173,17 +173,21 @@ def fit_declared(model, dataset):
     }
     parameters = {**model.parameters, **{n: values[n] for n in model.parameters if n in values}}
     law = make_law(model.law_name, parameters) if model.law.linear_relaxation else model.law
-    # only a single mode can be left to be fitted
     return replace(
         model,
         law=law,
         parameters=parameters,
-        modulus=np.array([values["modulus_Pa"]]) if "modulus_Pa" in values else model.modulus,
-        relaxation_time=np.array([values["relaxation_time_s"]])
-        if "relaxation_time_s" in values
-        else model.relaxation_time,
+        modulus=_scaled(model.modulus, values, "modulus_Pa", "modulus_factor"),
+        relaxation_time=_scaled(
+            model.relaxation_time, values, "relaxation_time_s", "relaxation_time_factor"
+        ),
         free=(),
     )
+
+
+def _scaled(modes, values, name, factor):
+    """Return a constant of the modes as fitted: itself for one mode, a factor on several."""
+    return np.array([values[name]]) if name in values else modes * values.get(factor, 1.0)
 
 
 def declared_for_loop(model):

@@ -15,7 +15,7 @@ ALIAS_COSINE = 0.99
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
-_INNER_STRETCHES = (1.0 / 30.0, 1.0 / 6.0, 5.0)
+_INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
 
 
 @dataclass

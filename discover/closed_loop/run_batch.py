@@ -19,7 +19,7 @@ _GROWTH = 0.05
 PRE_SHEAR_LENGTH = 2.0
 """A steady flow before a run is computed over this multiple of the run's length."""
 
-PRE_SHEAR_STRAIN = 1000.0
+PRE_SHEAR_STRAIN = 300.0
 """Strain after which any fluid is taken to be steady."""
 
 # The steady state is a fixed point of the scheme whatever its step, so steps need only be stable

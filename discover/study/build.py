@@ -14,6 +14,9 @@ from discover.laws.registry import LAWS, make_law
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.schema import Study
 
+MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
+"""Constants of the modes that may be left to be fitted."""
+
 
 @dataclass(frozen=True)
 class StudyData:
@@ -159,6 +162,8 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
             )
         spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, model.sweep_rad_s))
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
+        # another loading, or an aged sample: one factor on all moduli, or on all times
+        free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     else:
         start = _linear_start(dataset)
         modulus, relaxation_time = (
@@ -168,7 +173,7 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
                 ("relaxation_time_s", model.relaxation_time_s),
             )
         )
-        free += [key for key in start if getattr(model, key) == "fit"]
+        free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     return DeclaredModel(
         law,
         name,
