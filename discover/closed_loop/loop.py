@@ -46,6 +46,9 @@ MOST_SAMPLES = 400
 """Samples of a run that are used by default: a search costs as much as it has samples, and more of
 them say little more of a law."""
 
+FEWEST_SAMPLES = 5
+"""Samples beyond the constants to be fitted, below which any law fits."""
+
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
 
@@ -108,6 +111,7 @@ def run_loop(
     candidates = _candidates(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
+    _require_samples(fitted_runs, declared)
     model = AugmentedModel(declared, candidates, data_scales(fitted_runs))
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
@@ -188,6 +192,17 @@ def _split(dataset, fit, held_out, strain, most):
     return [
         [thin_run(run, most) for run in cut_to_strain(part.runs, strain)] for part in (fitted, held)
     ]
+
+
+def _require_samples(runs: Sequence[ShearRun], declared: DeclaredModel) -> None:
+    """Refuse what any law would fit."""
+    count, constants = sum(len(run) for run in runs), len(declared.free_positions)
+    if count < FEWEST_SAMPLES + constants:
+        raise InputError(
+            f"The fitted runs hold {count} samples in all, for {constants} constants to be fitted; "
+            f"at least {FEWEST_SAMPLES + constants} are needed to tell a law from another. Sample "
+            "more often, or declare the constants."
+        )
 
 
 def _candidates(effects: Sequence[str | AbstractEffect] | None) -> list[AbstractEffect]:
