@@ -46,6 +46,9 @@ MOST_SAMPLES = 400
 """Samples of a run that are used by default: a search costs as much as it has samples, and more of
 them say little more of a law."""
 
+ONLY_NOISE = 0.9
+"""A model that misses a record by more of it than this says nothing of it."""
+
 FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
 
@@ -337,15 +340,21 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | No
 
 def _describe(error: float, expected: float, structured: bool, linear: bool, worst) -> str:
     causes = "noise and the error of the linear data explain" if linear else "noise explains"
-    missed = f"The fitted runs are missed by {100 * error:.2g} %"
+    missed, explained = f"The fitted runs are missed by {_percent(error)}", _percent(expected)
+    if not structured and error > ONLY_NOISE:
+        return f"{missed}, and {causes} that: the records hold hardly anything else."
     if not structured:
-        return f"{missed}, as {causes} ({100 * expected:.2g} %)."
+        return f"{missed}, as {causes} ({explained})."
     if error > STRUCTURE * expected:
         return (
-            f"{missed}, more than {causes} ({100 * expected:.2g} %); the worst run is "
-            f"{worst.name}. Some effect is still missing."
+            f"{missed}, more than {causes} ({explained}); the worst run is {worst.name}. Some "
+            "effect is still missing."
         )
     return (
-        f"{missed}, hardly more than {causes} ({100 * expected:.2g} %), but what is left has a "
-        f"pattern that noise has not; the worst run is {worst.name}. Some effect is still missing."
+        f"{missed}, hardly more than {causes} ({explained}), but what is left has a pattern that "
+        f"noise has not; the worst run is {worst.name}. Some effect is still missing."
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from discover.closed_loop.loop import ONLY_NOISE
 from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
@@ -34,6 +35,8 @@ def loop_verdict(result: LoopResult) -> list[str]:
     """Return the verdict on a closed loop, a few sentences."""
     before, after = result.error_before, result.error_after
     sentences = [_VERDICTS[result.verdict] + "."]
+    if result.verdict == "no_effect_needed" and after.fit > ONLY_NOISE:
+        sentences = ["The records hold hardly anything but noise, so they say nothing of any law."]
     for stage in result.stages:
         values = ", ".join(
             f"{name} = {significant(p.value, 3)} {p.unit}".rstrip() + f" ({interval(p.ci95)})"

@@ -8,10 +8,13 @@ from discover.closed_loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
+from discover.dataset.sequence import in_sequence
+from discover.dataset.thinning import thin_run
 from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate, start_up
+from discover.report.loop_report import loop_verdict
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)
@@ -119,11 +122,56 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     flow = measured_rate(times, rates)
     run = ShearRun("steps", times, flow, rates, np.ones(60))
     batch = make_batch([run])
-    # as many steps as strain units in steady flow, and not four times as many
-    assert batch.times.shape[1] < 2 * 1000
+    # steps of 1/80 s, which the turn from 5 to 20 1/s wants, would be 4800; middles count too
+    assert batch.times.shape[1] < 2 * 4800 / 3
     declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, 0.5)
     model = AugmentedModel(declared, [make_effect("stress_offset")])
     predicted = model.predict(model.zero(), batch)[0]
     fluid = Fluid(Giesekus(0.2), jnp.asarray(100.0), jnp.asarray(0.5))
     exact = simulate(fluid, flow, times).shear_stress
     np.testing.assert_allclose(predicted, exact, atol=2e-3 * np.max(exact))
+
+
+def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
+    generator = np.random.default_rng(0)
+    runs = [
+        ShearRun(str(r), TIMES, start_up(r), np.full(80, r), generator.standard_normal(80))
+        for r in (0.5, 1.0, 2.0)
+    ]
+    declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
+    result = run_loop(ShearDataset("noise", tuple(runs)), declared, effects=EFFECTS)
+    assert result.verdict == "no_effect_needed"
+    assert result.stages == ()
+    assert "hardly anything else" in result.remaining["description"]
+    assert "hardly anything but noise" in loop_verdict(result)[0]
+
+
+def test_as_many_constants_as_samples_are_refused():
+    run = start_ups(0.3, rates=(1.0,)).runs[0].window(np.arange(80) < 6)
+    declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
+    with pytest.raises(InputError, match="6 samples in all, for 2 constants"):
+        run_loop(ShearDataset("short", (run,)), declared, effects=EFFECTS)
+
+
+def test_what_was_lost_in_earlier_runs_stays_lost():
+    runs = start_ups(0.0, rates=(1.0, 2.0), noise=0.0).runs
+    model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect("edge_fracture")])
+    theta = model.zero()
+    theta[model.positions("edge_fracture")] = [0.05, 0.0]
+    fresh = model.predict(theta, make_batch([runs[1]]))[0]
+    later = in_sequence(runs, np.array([1.0, 2.0]))[1]
+    # the first run strained the sample by 8
+    used = model.predict(theta, make_batch([later]))[0]
+    np.testing.assert_allclose(used, np.exp(-0.05 * 8.0) * fresh, rtol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [400, 100])
+def test_thinned_runs_hold_the_same_flow(samples):
+    times = np.linspace(0.01, 20.0, 2000)
+    rates = np.cos(times)
+    run = ShearRun("wave", times, measured_rate(times, rates), rates, np.sin(times))
+    thinned = thin_run(run, samples)
+    assert len(thinned) == samples
+    assert thinned.time[-1] == times[-1]
+    strain = np.array([float(thinned.protocol.strain(jnp.asarray(t))) for t in (5.0, 20.0)])
+    np.testing.assert_allclose(strain, np.sin([5.0, 20.0]), atol=2e-3)
