@@ -7,6 +7,7 @@ import typer
 from discover import __version__
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
+from discover.cli.export_command import export
 from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
@@ -41,6 +42,7 @@ app.command("compare")(compare)
 app.command("close-loop")(close_loop)
 app.command("batch")(batch)
 app.command("distil")(distil)
+app.command("export")(export)
 app.add_typer(data_app, name="data")
 
 

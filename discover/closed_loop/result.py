@@ -10,6 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.equations import Equation, equation_to_json
+from discover.errors import InputError
 from discover.laws import Fluid
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained"]
@@ -140,6 +142,18 @@ class LoopResult:
     fluid: Fluid | None = field(repr=False, default=None)
     seconds: float = 0.0
 
+    def equation(self) -> Equation:
+        """Return the augmented fluid as an equation; see `discover.closed_loop.equation`."""
+        from discover.closed_loop.equation import loop_equation
+
+        return loop_equation(self)
+
+    def _law(self) -> dict[str, Any]:
+        try:
+            return {"law": equation_to_json(self.equation())}
+        except InputError as error:
+            return {"law": None, "law_missing": str(error)}
+
     def to_json(self) -> dict[str, Any]:
         """Return the contents of ``loop.json``."""
         contents = {
@@ -171,6 +185,7 @@ class LoopResult:
                 for record in self.records
             },
             "seconds": self.seconds,
+            **self._law(),
         }
         return _plain(contents)
 

@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from discover.comparison.equations import outcome_equation
 from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival, Statement
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
+from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
 
 
@@ -73,6 +75,8 @@ class Comparison:
     structure
         What the training flows can determine of the library, before any fit; None without the
         sparse learner.
+    known
+        The known part as an equation; None where it is not wanted.
     """
 
     name: str
@@ -90,6 +94,7 @@ class Comparison:
     next_measurement: NextMeasurement = field(default_factory=NextMeasurement)
     seed: int = 0
     structure: Structure | None = None
+    known: Equation | None = None
 
     @property
     def physics(self) -> dict[str, Mapping[str, Any] | None]:
@@ -115,6 +120,12 @@ class Comparison:
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
 
+    def equation(self, learner: str) -> Equation:
+        """Return the law that a learner found, with its modes and the box where it was tested."""
+        if self.known is None:
+            raise ValueError("This comparison does not say what its known part is.")
+        return outcome_equation(self.known, self.outcomes[learner], self.flows, self.name)
+
     def to_json(self) -> dict[str, Any]:
         """Return the comparison as ``comparison.json`` holds it."""
         learners = {}
@@ -136,6 +147,7 @@ class Comparison:
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "train_seconds": outcome.train_seconds,
                 "message": outcome.message,
+                "law": None if self.known is None else equation_to_json(self.equation(name)),
                 "details": outcome.details,
             }
         content = {

@@ -11,10 +11,10 @@ from discover.closed_loop import CandidateScore
 from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.comparison import compare
 from discover.comparison.outcome import LearnerOutcome
+from discover.equations.mathml import law_element, term_element
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import comparison_pictures, safe_name, write_comparison
 from discover.report.loop_report import write_loop
-from discover.report.mathml import law_element, term_element
 from discover.report.mathtext import formula
 from discover.report.plots.flows import curves
 from discover.report.plots.selection import selection_picture
