@@ -237,9 +237,11 @@ def rheotool_shear(text, times):
 
 def by_stress_rate(fluid):
     """The same flow by a fluid of this package, one compiled right-hand side."""
-    rate = jax.jit(fluid.state_rate)
-    states = runge_kutta(lambda s: np.asarray(rate(s, RATE)), np.zeros((fluid.n_modes, 4)), TIMES)
-    total = np.asarray(jax.vmap(fluid.stress, in_axes=(0, None))(jnp.asarray(states), RATE))
+    shear_rate = jnp.asarray(RATE)
+    rate = jax.jit(lambda state: fluid.state_rate(state, shear_rate))
+    start = np.zeros((fluid.n_modes, 4))
+    states = runge_kutta(lambda state: np.asarray(rate(state)), start, TIMES)
+    total = np.array([fluid.stress(jnp.asarray(state), shear_rate) for state in states])
     return np.array([total[:, 3], total[:, 0] - total[:, 1], total[:, 1] - total[:, 2]])
 
 
