@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
 from discover.comparison.equations import outcome_equation
 from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival, Statement
@@ -119,6 +121,34 @@ class Comparison:
         """Return the errors of a learner, or of ``"before"``, in a flow."""
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
+
+    def terms_table(self) -> pd.DataFrame:
+        """Return the terms that each learner found, and the true ones where the law is known."""
+        columns: dict[str, dict[str, float]] = {}
+        if self.truth is not None:
+            columns["truth"] = {t.term: t.coefficient for t in self.truth}
+        for name, outcome in self.outcomes.items():
+            columns[name] = {t.term: t.coefficient for t in outcome.terms}
+        return pd.DataFrame(columns).rename_axis("term")
+
+    def errors_table(self) -> pd.DataFrame:
+        """Return relative errors in flows that no fit saw, one line for each flow and quantity."""
+        lines = {}
+        for flow in self.judged:
+            for who in ("before", *self.outcomes):
+                for quantity, error in self.errors(who, flow).items():
+                    lines.setdefault((flow.name, quantity), {})[who] = error
+        table = pd.DataFrame.from_dict(lines, orient="index", dtype=float)
+        table.index = pd.MultiIndex.from_tuples(lines, names=["flow", "quantity"])
+        return table
+
+    def _repr_html_(self) -> str:
+        tables = (self.terms_table(), self.errors_table())
+        return "".join(
+            table.to_html(escape=True, float_format="{:.4g}".format, na_rep="–")
+            for table in tables
+            if len(table)
+        )
 
     def equation(self, learner: str) -> Equation:
         """Return the law that a learner found, with its modes and the box where it was tested."""

@@ -243,3 +243,24 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
     )  # fmt: skip
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
     assert "no effect earned its place" in page
+
+
+def test_a_comparison_shows_itself_as_tables(comparison):
+    terms, errors = comparison.terms_table(), comparison.errors_table()
+    assert terms.loc["sigma.sigma", ["truth", "tensor_sindy"]].tolist() == [0.2, 0.2]
+    flow = comparison.judged[0].name
+    wanted = comparison.errors("before", comparison.judged[0])["N1"]
+    assert errors.loc[(flow, "N1"), "before"] == wanted
+    assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
+    assert "<table" in comparison._repr_html_()
+
+
+def test_a_loop_shows_itself_as_tables():
+    result = loop_result()
+    line = result.table().iloc[0]
+    assert (line["effect"], line["value"], line["low"], line["high"]) == (
+        "stress_gain", 0.7, 0.69, 0.71,
+    )  # fmt: skip
+    assert result.ranking_table(1)["score"].tolist() == [0.9]
+    assert "stress_gain" in result._repr_html_()
+    assert "effects_added" in replace(result, stages=())._repr_html_()
