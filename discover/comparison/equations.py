@@ -9,6 +9,7 @@ from discover.comparison.flows import QUANTITIES, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, EquationTerm, Tested, combined, law_terms
 from discover.equations.box import box_of, flow_numbers
+from discover.errors import InputError
 from discover.study.build import DeclaredModel
 
 TITLES = {"tensor_sindy": "sparse regression", "tbnn_ude": "the neural network"}
@@ -19,10 +20,14 @@ _PROJECTION = (
 )
 
 
-def known_equation(model: DeclaredModel) -> Equation:
-    """Return the known part of a study as an equation."""
+def known_equation(model: DeclaredModel) -> Equation | None:
+    """Return the known part of a study as an equation; None where it is no sum of terms."""
+    try:
+        terms = law_terms(model.law)
+    except InputError:
+        return None
     return Equation(
-        law_terms(model.law),
+        terms,
         tuple(float(g) for g in model.modulus),
         tuple(float(time) for time in model.relaxation_time),
         model.law.linear_relaxation,
