@@ -130,6 +130,16 @@ class Equation:
         Where the law comes from, and what its user has to know.
     tested
         Where it was learned and judged; None where unknown.
+
+    Examples
+    --------
+    A Giesekus fluid with a mobility of 0.2, 100 Pa and 2 s:
+
+    >>> fluid = Equation((EquationTerm("sigma.sigma", 0.2),), (100.0,), (2.0,))
+    >>> fluid.sympy()
+    0.2*sigma**2
+    >>> fluid.mean_relaxation_time
+    2.0
     """
 
     terms: tuple[EquationTerm, ...]

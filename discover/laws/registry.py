@@ -7,8 +7,8 @@ to be edited.
 import importlib
 import math
 import pkgutil
+import sys
 from collections.abc import Mapping
-from pathlib import Path
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
@@ -19,7 +19,8 @@ _CLASSICAL = ("maxwell", "johnson_segalman", "giesekus", "phan_thien_tanner", "f
 
 
 def _named_laws() -> dict[str, NamedLaw]:
-    files = [module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])]
+    package = sys.modules[__name__.rpartition(".")[0]]
+    files = [module.name for module in pkgutil.iter_modules(package.__path__)]
     laws: dict[str, NamedLaw] = {}
     for file in dict.fromkeys([*_CLASSICAL, *files]):
         if file != "registry":
