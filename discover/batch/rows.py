@@ -18,18 +18,22 @@ class LearnerRow:
     Attributes
     ----------
     terms
-        Term and coefficient.
+        Term, coefficient and inner parameters.
     errors
         Largest relative error of each quantity in flows that no fit saw.
     """
 
-    terms: tuple[tuple[str, float], ...]
+    terms: tuple[tuple[str, float, Mapping[str, float]], ...]
     errors: Mapping[str, float]
 
     @property
     def text(self) -> str:
         """The terms as plain text."""
-        return " + ".join(f"{value:.4g} {term}" for term, value in self.terms) or "no term"
+        parts = []
+        for term, value, inner in self.terms:
+            values = ", ".join(f"{name} = {number:.4g}" for name, number in inner.items())
+            parts.append(f"{value:.4g} {term}" + (f" [{values}]" if values else ""))
+        return " + ".join(parts) or "no term"
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ def read_row(folder: Path) -> StudyRow:
 def _comparison(content: Mapping[str, Any]) -> StudyRow:
     learners = {
         str(name): LearnerRow(
-            tuple((str(t["term"]), float(t["coefficient"])) for t in learner["terms"]),
+            tuple(_term(t) for t in learner["terms"]),
             _worst(learner["errors"]),
         )
         for name, learner in content["learners"].items()
@@ -96,6 +100,11 @@ def _comparison(content: Mapping[str, Any]) -> StudyRow:
         tuple(map(str, content["undetermined"])),
         {str(rule): tuple(map(str, terms)) for rule, terms in chosen.items()},
     )
+
+
+def _term(content: Mapping[str, Any]) -> tuple[str, float, dict[str, float]]:
+    inner = {str(name): float(value) for name, value in content.get("inner", {}).items()}
+    return str(content["term"]), float(content["coefficient"]), inner
 
 
 def _worst(errors: Mapping[str, Mapping[str, float | None]]) -> dict[str, float]:

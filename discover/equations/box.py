@@ -25,13 +25,14 @@ def flow_numbers(
     relaxation_time
         λ̄ in s.
     frequency
-        ω in rad/s where known; otherwise from the changes of sign of the rate, at least three.
+        ω in rad/s where known; otherwise from the time between changes of sign of the rate.
     """
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:
-        signs = np.sign(shear_rate[np.abs(shear_rate) > 0])
-        changes = int(np.count_nonzero(np.diff(signs)))
-        frequency = np.pi * changes / length if changes >= 3 else 1.0 / length
+        flowing = np.abs(shear_rate) > 0
+        turned = np.flatnonzero(np.diff(np.sign(shear_rate[flowing])))
+        at = times[flowing][turned]
+        frequency = 1.0 / length if at.size < 2 else np.pi * (at.size - 1) / (at[-1] - at[0])
     return relaxation_time * float(np.max(np.abs(shear_rate))), relaxation_time * float(frequency)
 
 

@@ -59,7 +59,9 @@ def _cells(row: Any, learners: Sequence[str]) -> list[dict[str, Any]]:
     cells = []
     for name in learners:
         found = row.learners.get(name)
-        terms: Sequence[tuple[str, float]] = () if found is None else found.terms
+        terms: Sequence[tuple[str, float, Mapping[str, float]]] = (
+            () if found is None else found.terms
+        )
         errors: Mapping[str, float] = {} if found is None else found.errors
         cells.append(
             {
@@ -71,11 +73,11 @@ def _cells(row: Any, learners: Sequence[str]) -> list[dict[str, Any]]:
     return cells
 
 
-def _law(terms: Sequence[tuple[str, float]]) -> str:
+def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
     parts = []
-    for i, (term, value) in enumerate(terms):
+    for i, (term, value, inner) in enumerate(terms):
         sign = "<mo>−</mo>" if value < 0 else "<mo>+</mo>" if i else ""
-        parts.append(f"{sign}{number(value)}<mspace width='0.15em'/>{_term(term)}")
+        parts.append(f"{sign}{number(value)}<mspace width='0.15em'/>{_term(term, inner)}")
     return f"<math><mrow>{''.join(parts)}</mrow></math>" if parts else "no term"
 
 
@@ -85,8 +87,8 @@ def _support(terms: Sequence[str] | None) -> str:
     return "<br>".join(f"<math>{_term(term)}</math>" for term in terms) or "no term"
 
 
-def _term(name: str) -> str:
+def _term(name: str, inner: Mapping[str, float] | None = None) -> str:
     try:
-        return term_mathml(name)
+        return term_mathml(name, dict(inner or {}))
     except ValueError:  # a file that somebody edited
         return f"<mtext>{html.escape(name[:200])}</mtext>"

@@ -20,7 +20,17 @@ GOOD = {
             },
             "details": {"selectors": {"chosen": {"bic": ["sigma.sigma"], "pysindy": ["sigma"]}}},
         },
-        "tbnn_ude": {"terms": [], "errors": {}, "details": {}},
+        "tbnn_ude": {
+            "terms": [
+                {
+                    "term": "(exp(epsilon*tr(sigma))-1)*sigma",
+                    "coefficient": 1.0,
+                    "inner": {"epsilon": 0.375},
+                }
+            ],
+            "errors": {},
+            "details": {},
+        },
     },
     "rivals": [{}, {}],
     "undetermined": ["N2"],
@@ -53,7 +63,8 @@ def rows(tmp_path):
 def test_rows_hold_the_worst_error_and_what_each_rule_chose(rows):
     good, loop, *_ = rows
     assert good.learners["tensor_sindy"].errors == {"sigma12": 0.03, "N1": 0.02}
-    assert good.learners["tbnn_ude"].text == "no term"
+    assert good.learners["tbnn_ude"].text.endswith("*sigma [epsilon = 0.375]")
+    assert LearnerRow((), {}).text == "no term"
     assert good.chosen == {"bic": ("sigma.sigma",), "pysindy": ("sigma",)}
     assert not good.agree
     assert (good.rivals, good.undetermined) == (2, ("N2",))
@@ -69,6 +80,7 @@ def test_the_page_says_what_failed_and_puts_selectors_side_by_side(rows):
     assert "script%3E" not in page  # a failed study has no link
     for text in ("BIC", "pysindy at its default", "3 %", "rate_gain".replace("_", " ")):
         assert text in page or text.replace(" ", "_") in page
+    assert "0.375" in page.split('id="found"')[1].split("</table>")[0]
     selection = page.split('id="selection"')[1].split("</table>")[0]
     assert selection.count("<math>") == 2
     assert ">no</td>" in selection
@@ -119,7 +131,7 @@ def test_the_page_is_there_while_studies_still_run(tmp_path):
 
 
 def test_a_term_that_nobody_knows_is_shown_as_text():
-    row = StudyRow({"tensor_sindy": LearnerRow((("<img src=x>", 1.0),), {})}, 0)
+    row = StudyRow({"tensor_sindy": LearnerRow((("<img src=x>", 1.0, {}),), {})}, 0)
     page = batch_page((StudyStatus("a", "compare", "done", ""),), (row,))
     assert "<img" not in page
     assert "&lt;img src=x&gt;" in page
