@@ -32,8 +32,10 @@ def flow_numbers(
         flowing = np.abs(shear_rate) > 0
         turned = np.flatnonzero(np.diff(np.sign(shear_rate[flowing])))
         at = times[flowing][turned]
-        frequency = 1.0 / length if at.size < 2 else np.pi * (at.size - 1) / (at[-1] - at[0])
-    return relaxation_time * float(np.max(np.abs(shear_rate))), relaxation_time * float(frequency)
+        frequency = 1.0 / length
+        if at.size >= 2:
+            frequency = np.pi * (at.size - 1) / float(at[-1] - at[0])
+    return relaxation_time * float(np.max(np.abs(shear_rate))), relaxation_time * frequency
 
 
 def box_of(numbers: Iterable[tuple[float, float]]) -> Box | None:
