@@ -135,6 +135,14 @@ def parse_term(name: str) -> CandidateTerm:
     ------
     ValueError
         If the text is not a canonical spelling. The text is matched, never evaluated.
+
+    Examples
+    --------
+    >>> term = parse_term("tr(sigma)*sigma")
+    >>> term.degree, term.complexity
+    (1, 3)
+    >>> parse_term(term.name) == term
+    True
     """
     rest = name.replace(" ", "")
     closed_form = None

@@ -1,77 +1,17 @@
 """Many studies, one after the other or on a dask cluster."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
+from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.summary import Summary
 from discover.batch.tasks import Progress, run_close_loop, run_compare
 from discover.errors import InputError
-from discover.study.atomic import make_folder, write_text
+from discover.study.atomic import make_folder
 from discover.study.read import read_study
 
 _TASKS = {"compare": run_compare, "close-loop": run_close_loop}
-
-
-@dataclass(frozen=True)
-class StudyStatus:
-    """How one study ended.
-
-    Attributes
-    ----------
-    name, task
-        Folder under the batch's, and ``compare`` or ``close-loop``.
-    status
-        ``done``, ``complete`` (was there already) or ``failed``.
-    text
-        The verdict, or the reason of the failure.
-    input_error
-        Whether the failure is the user's to mend.
-    seconds
-        Time taken now.
-    """
-
-    name: str
-    task: str
-    status: str
-    text: str
-    input_error: bool = False
-    seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class BatchResult:
-    """How every study of a batch ended.
-
-    Attributes
-    ----------
-    studies
-        In the order given.
-    index
-        The summary page.
-    """
-
-    studies: tuple[StudyStatus, ...]
-    index: Path
-
-    @property
-    def failed(self) -> list[StudyStatus]:
-        """Studies without a result."""
-        return [study for study in self.studies if study.status == "failed"]
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the contents of ``batch.json``."""
-        return {"studies": [asdict(study) for study in self.studies]}
-
-    def text(self) -> str:
-        """Return a summary for a terminal."""
-        lines = []
-        for study in self.studies:
-            first = (study.text.splitlines() or [""])[0]
-            lines.append(f"{study.status:<9}{study.name} ({study.task}): {first}")
-        lines.append(f"Summary: {self.index.resolve()}")
-        return "\n".join(lines)
 
 
 def run_batch(
@@ -109,24 +49,17 @@ def run_batch(
         for path, name in zip(paths, folder_names(paths), strict=True)
         for name, task in _tasks_of(path, name)
     ]
-    statuses: dict[int, StudyStatus] = {}
+    summary = Summary(out, [(job[1], job[2]) for job in jobs])
     if workers == 1 and scheduler is None:
         for i, job in enumerate(jobs):
 
             def inner(label: str, fraction: float, i: int = i, job=job) -> None:
                 progress(f"{job[1]}: {label}", (i + fraction) / len(jobs))
 
-            statuses[i] = run_one(*job, progress=inner)
+            summary.add(i, run_one(*job, progress=inner))
     else:
-        _run_on_cluster(jobs, workers, scheduler, statuses, progress)
-    result = BatchResult(tuple(statuses[i] for i in range(len(jobs))), out / "index.html")
-    import json
-
-    from discover.report.page import render
-
-    write_text(out / "batch.json", json.dumps(result.to_json(), indent=2) + "\n")
-    write_text(result.index, render("batch.html", studies=result.studies))
-    return result
+        _run_on_cluster(jobs, workers, scheduler, summary, progress)
+    return summary.write()
 
 
 def folder_names(paths: Sequence[Path]) -> list[str]:
@@ -189,7 +122,7 @@ def _run_on_cluster(
     jobs: list,
     workers: int,
     scheduler: str | None,
-    statuses: dict[int, StudyStatus],
+    summary: Summary,
     progress: Callable[[str, float], None],
 ) -> None:
     try:
@@ -215,15 +148,29 @@ def _run_on_cluster(
             arguments = (str(Path(path).resolve()), name, task, str(Path(out).resolve()))
             future = client.submit(run_one, *arguments, seed, overwrite, pure=False)
             futures[future] = i
-        for future in as_completed(futures):
+        for done, future in enumerate(as_completed(futures), 1):
             i = futures[future]
-            error = future.exception()
-            if error is None:
-                statuses[i] = future.result()
-            else:
-                statuses[i] = StudyStatus(jobs[i][1], jobs[i][2], "failed", str(error))
-            progress(f"{jobs[i][1]}: {statuses[i].status}", len(statuses) / len(jobs))
+            status = _status_of(future, jobs[i])
+            summary.add(i, status)
+            progress(f"{jobs[i][1]}: {status.status}", done / len(jobs))
     finally:
         client.close()
         if cluster is not None:
             cluster.close()
+
+
+def _status_of(future, job: tuple) -> StudyStatus:
+    _, name, task, out, *_ = job
+    error = future.exception()
+    if error is not None:
+        reason = (str(error).splitlines() or [""])[0]
+        text = f"{type(error).__name__}: {reason}. What was finished is kept; run again to go on."
+        return StudyStatus(name, task, "failed", text)
+    status: StudyStatus = future.result()
+    if status.status != "failed" and not (Path(out) / "report.html").is_file():
+        text = (
+            f"The worker wrote its results, but {out} is empty here. Workers and this machine need "
+            "one file system with the same paths."
+        )
+        return StudyStatus(name, task, "failed", text, True, status.seconds)
+    return status

@@ -7,6 +7,8 @@ import typer
 from discover import __version__
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
+from discover.cli.export_command import export
+from discover.cli.fetch_command import fetch_data
 from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
@@ -41,6 +43,8 @@ app.command("compare")(compare)
 app.command("close-loop")(close_loop)
 app.command("batch")(batch)
 app.command("distil")(distil)
+app.command("export")(export)
+data_app.command("fetch")(fetch_data)
 app.add_typer(data_app, name="data")
 
 

@@ -1,4 +1,4 @@
-"""Commands on data folders: list, show, check."""
+"""Commands on data folders: list, show, check, import."""
 
 import json
 import os

@@ -2,9 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect
+from discover.equations import EquationTerm, combined, effect_terms, law_terms
 from discover.laws import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
 
@@ -35,3 +37,11 @@ class AugmentedLaw(AbstractConstitutiveLaw):
         for effect, values in zip(self.effects, self.values, strict=True):
             extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
         return extra
+
+
+@law_terms.register
+def _(law: AugmentedLaw) -> tuple[EquationTerm, ...]:
+    terms = law_terms(law.base)
+    for effect, values in zip(law.effects, law.values, strict=True):
+        terms += effect_terms(effect, np.asarray(values))
+    return combined(terms)

@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.equations import Equation, equation_to_json
+from discover.errors import InputError
 from discover.laws import Fluid
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained"]
@@ -166,6 +169,56 @@ class LoopResult:
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
 
+    def equation(self) -> Equation:
+        """Return the augmented fluid as an equation; see `discover.closed_loop.equation`."""
+        from discover.closed_loop.equation import loop_equation
+
+        return loop_equation(self)
+
+    def table(self) -> pd.DataFrame:
+        """Return the effects that were added, one line for each of their parameters."""
+        lines = []
+        for number, stage in enumerate(self.stages, 1):
+            for name, p in stage.parameters.items():
+                line = {"stage": number, "effect": stage.effect, "kind": stage.kind}
+                line |= {"parameter": name, "value": p.value, "unit": p.unit}
+                line |= {"low": p.ci95[0], "high": p.ci95[1]}
+                line |= {"error_fit": stage.error.fit, "error_held_out": stage.error.held_out}
+                lines.append({**line, "aliases": ", ".join(stage.aliases)})
+        columns = ["stage", "effect", "kind", "parameter", "value", "unit", "low", "high"]
+        return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
+
+    def ranking_table(self, stage: int = 0) -> pd.DataFrame:
+        """Return the candidates at one stage, counted from 0, the best first.
+
+        Parameters
+        ----------
+        stage
+            From 0; the last one holds those that earned nothing.
+        """
+        names = ("effect", "kind", "score", "reduction", "evidence", "error", "left_out_error")
+        lines = [
+            {**{name: getattr(c, name) for name in names}, "aliases": ", ".join(c.aliases)}
+            for c in self.rankings[stage]
+        ]
+        return pd.DataFrame(lines, columns=[*names, "aliases"])
+
+    def _repr_html_(self) -> str:
+        errors = pd.DataFrame(
+            {"before": asdict(self.error_before), "after": asdict(self.error_after)}
+        ).T
+        tables = "".join(
+            table.to_html(escape=True, float_format="{:.4g}".format, na_rep="–", index=index)
+            for table, index in ((errors, True), (self.table(), False))
+        )
+        return f"<p><b>{self.verdict}</b>, noise {self.noise_floor:.2g}</p>{tables}"
+
+    def _law(self) -> dict[str, Any]:
+        try:
+            return {"law": equation_to_json(self.equation())}
+        except InputError as error:
+            return {"law": None, "law_missing": str(error)}
+
     def to_json(self) -> dict[str, Any]:
         """Return the contents of ``loop.json``."""
         contents = {
@@ -198,6 +251,7 @@ class LoopResult:
             },
             "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,
+            **self._law(),
         }
         return _plain(contents)
 

@@ -4,11 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
+from discover.comparison.equations import outcome_equation
 from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival, Statement
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
+from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
 
 
@@ -73,6 +77,8 @@ class Comparison:
     structure
         What the training flows can determine of the library, before any fit; None without the
         sparse learner.
+    known
+        The known part as an equation; None where it is not wanted.
     """
 
     name: str
@@ -90,6 +96,7 @@ class Comparison:
     next_measurement: NextMeasurement = field(default_factory=NextMeasurement)
     seed: int = 0
     structure: Structure | None = None
+    known: Equation | None = None
 
     @property
     def physics(self) -> dict[str, Mapping[str, Any] | None]:
@@ -115,6 +122,40 @@ class Comparison:
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
 
+    def terms_table(self) -> pd.DataFrame:
+        """Return the terms that each learner found, and the true ones where the law is known."""
+        columns: dict[str, dict[str, float]] = {}
+        if self.truth is not None:
+            columns["truth"] = {t.term: t.coefficient for t in self.truth}
+        for name, outcome in self.outcomes.items():
+            columns[name] = {t.term: t.coefficient for t in outcome.terms}
+        return pd.DataFrame(columns).rename_axis("term")
+
+    def errors_table(self) -> pd.DataFrame:
+        """Return relative errors in flows that no fit saw, one line for each flow and quantity."""
+        lines = {}
+        for flow in self.judged:
+            for who in ("before", *self.outcomes):
+                for quantity, error in self.errors(who, flow).items():
+                    lines.setdefault((flow.name, quantity), {})[who] = error
+        table = pd.DataFrame.from_dict(lines, orient="index", dtype=float)
+        table.index = pd.MultiIndex.from_tuples(lines, names=["flow", "quantity"])
+        return table
+
+    def _repr_html_(self) -> str:
+        tables = (self.terms_table(), self.errors_table())
+        return "".join(
+            table.to_html(escape=True, float_format="{:.4g}".format, na_rep="–")
+            for table in tables
+            if len(table)
+        )
+
+    def equation(self, learner: str) -> Equation:
+        """Return the law that a learner found, with its modes and the box where it was tested."""
+        if self.known is None:
+            raise ValueError("This comparison does not say what its known part is.")
+        return outcome_equation(self.known, self.outcomes[learner], self.flows, self.name)
+
     def to_json(self) -> dict[str, Any]:
         """Return the comparison as ``comparison.json`` holds it."""
         learners = {}
@@ -136,6 +177,7 @@ class Comparison:
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "train_seconds": outcome.train_seconds,
                 "message": outcome.message,
+                "law": None if self.known is None else equation_to_json(self.equation(name)),
                 "details": outcome.details,
             }
         content = {

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
-from discover.comparison.outcome import law_of_terms
 from discover.dataset.run import ShearRun
 from discover.identify import (
     LawStructure,
@@ -24,6 +23,7 @@ from discover.identify import (
     find_twins,
 )
 from discover.identify.physics import mean_relaxation_time
+from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners.result import RecoveredTerm
 from discover.protocols.shear import stack_protocols

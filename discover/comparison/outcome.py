@@ -4,17 +4,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Real
 
 from discover.comparison.flows import Flow, Stresses, predict
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
 
 
 @dataclass(frozen=True)
@@ -107,41 +102,6 @@ class LearnerOutcome:
             predictions,
             state.get("physics"),
         )
-
-
-def law_of_terms(
-    names: list[str],
-    coefficients: list[float],
-    inner: Mapping[str, float],
-    linear_relaxation: bool,
-    base: AbstractConstitutiveLaw | None = None,
-) -> LibraryExpansion:
-    """Return the law h = Σ c term from the canonical spelling of its terms.
-
-    Parameters
-    ----------
-    names, coefficients
-        The terms; none means h = 0.
-    inner
-        Inner parameters by name.
-    linear_relaxation
-        Whether −σ is part of the known law.
-    base
-        A known law whose extra term is added.
-    """
-    pairs = list(zip(names, coefficients, strict=True)) or [("sigma", 0.0)]
-    library = TermLibrary(tuple(parse_term(name) for name, _ in pairs))
-    values = [
-        inner.get(name, default)
-        for name, default in zip(library.inner_names, library.inner_default, strict=True)
-    ]
-    return LibraryExpansion(
-        coefficients=jnp.asarray([c for _, c in pairs], float),
-        inner=jnp.asarray(values, float),
-        library=library,
-        linear_relaxation=linear_relaxation,
-        base=base,
-    )
 
 
 def plain(value: Any) -> Any:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.equations import known_equation
 from discover.comparison.flows import Flow, comparison_flows, predict
 from discover.comparison.identifiability import (
     find_rivals,
@@ -122,6 +123,7 @@ def compare(
         distillations=distillations,
         next_measurement=following,
         seed=learner_seed,
+        known=known_equation(model),
     )
 
 

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from discover.equations.equation import mean_relaxation_time as mean_of_modes
 from discover.identify.physics_flows import Trajectories, cycles, trajectories
 from discover.identify.steady_states import (
     is_stable,
@@ -142,7 +143,7 @@ def check_physics(
 def mean_relaxation_time(fluid: Fluid) -> float:
     """Return Σ G λ² / Σ G λ, in s: the time scale of the fluid's slow flows."""
     modulus, time = np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time)
-    return float(np.sum(modulus * time**2) / np.sum(modulus * time))
+    return mean_of_modes(modulus.tolist(), time.tolist())
 
 
 def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:

@@ -7,8 +7,9 @@ from discover.laws.giesekus import Giesekus
 from discover.laws.johnson_segalman import JohnsonSegalman
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.laws.named import NamedLaw
 from discover.laws.phan_thien_tanner import ExponentialPhanThienTanner, LinearPhanThienTanner
-from discover.laws.registry import LAWS, NamedLaw, make_law
+from discover.laws.registry import LAWS, make_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 
 __all__ = [

@@ -1,5 +1,7 @@
 """A law as a sum of library terms: what sparse regression finds."""
 
+from collections.abc import Mapping, Sequence
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -7,6 +9,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
 from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
 
 
 class LibraryExpansion(AbstractConstitutiveLaw):
@@ -35,3 +38,43 @@ class LibraryExpansion(AbstractConstitutiveLaw):
         terms = self.library.evaluate(stress, rate, self.inner)
         extra = jnp.tensordot(self.coefficients, terms, axes=1)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
+
+
+def law_of_terms(
+    names: Sequence[str],
+    coefficients: Sequence[float],
+    inner: Mapping[str, float],
+    linear_relaxation: bool,
+    base: AbstractConstitutiveLaw | None = None,
+) -> LibraryExpansion:
+    """Return the law h = Σ c term from the canonical spelling of its terms.
+
+    Parameters
+    ----------
+    names, coefficients
+        The terms; none means h = 0.
+    inner
+        Inner parameters by name.
+    linear_relaxation
+        Whether −σ is part of the known law.
+    base
+        A known law whose extra term is added.
+
+    Raises
+    ------
+    ValueError
+        If a spelling is not canonical.
+    """
+    pairs = list(zip(names, coefficients, strict=True)) or [("sigma", 0.0)]
+    library = TermLibrary(tuple(parse_term(name) for name, _ in pairs))
+    values = [
+        inner.get(name, default)
+        for name, default in zip(library.inner_names, library.inner_default, strict=True)
+    ]
+    return LibraryExpansion(
+        coefficients=jnp.asarray([c for _, c in pairs], float),
+        inner=jnp.asarray(values, float),
+        library=library,
+        linear_relaxation=linear_relaxation,
+        base=base,
+    )

@@ -4,6 +4,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
 
 
@@ -31,3 +32,6 @@ class FenePeterlin(AbstractConstitutiveLaw):
             limit - trace_of_conformation
         )
         return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
+
+
+NAMED = {"fene_p": NamedLaw("FENE-P", FenePeterlin, {"L2": (3.0 + 1e-6, 1e6)})}

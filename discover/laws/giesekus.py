@@ -4,6 +4,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, square
 
 
@@ -17,3 +18,6 @@ class Giesekus(AbstractConstitutiveLaw):
         """Return h = α σ·σ."""
         del rate  # this law has no explicit rate dependence
         return self.mobility * square(stress)
+
+
+NAMED = {"giesekus": NamedLaw("Giesekus", Giesekus, {"alpha": (0.0, 1.0)})}

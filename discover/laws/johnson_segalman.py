@@ -4,6 +4,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, anticommutator
 
 
@@ -16,3 +17,6 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
+
+
+NAMED = {"johnson_segalman": NamedLaw("Johnson–Segalman", JohnsonSegalman, {"xi": (0.0, 2.0)})}

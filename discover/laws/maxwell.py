@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric
 
 
@@ -16,3 +17,6 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
         """Return h = 0."""
         del rate
         return jnp.zeros_like(stress)
+
+
+NAMED = {"ucm": NamedLaw("upper convected Maxwell", UpperConvectedMaxwell, {})}

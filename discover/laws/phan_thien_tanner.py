@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, trace
 
 
@@ -30,3 +31,11 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
         """Return h = (exp(ε tr σ) − 1) σ."""
         del rate
         return jnp.expm1(self.extensibility * trace(stress)) * stress
+
+
+NAMED = {
+    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, {"epsilon": (0.0, 10.0)}),
+    "ptt_exponential": NamedLaw(
+        "exponential PTT", ExponentialPhanThienTanner, {"epsilon": (0.0, 10.0)}
+    ),
+}

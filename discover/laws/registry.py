@@ -1,47 +1,35 @@
-"""Named laws, as study files and the command line spell them."""
+"""Named laws, as study files and the command line spell them.
 
+A file in this folder that says ``NAMED = {...}`` is a law that can be asked for; nothing else has
+to be edited.
+"""
+
+import importlib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import pkgutil
+import sys
+from collections.abc import Mapping
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.fene_p import FenePeterlin
-from discover.laws.giesekus import Giesekus
-from discover.laws.johnson_segalman import JohnsonSegalman
-from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.laws.phan_thien_tanner import ExponentialPhanThienTanner, LinearPhanThienTanner
+from discover.laws.named import NamedLaw
+
+_CLASSICAL = ("maxwell", "johnson_segalman", "giesekus", "phan_thien_tanner", "fene_p")
+"""Files whose laws come first in lists, in the order of textbooks."""
 
 
-@dataclass(frozen=True)
-class NamedLaw:
-    """A law that can be asked for by name.
-
-    Attributes
-    ----------
-    title
-        Name as a rheologist writes it.
-    build
-        Makes the law from its parameters, in the order of `parameters`.
-    parameters
-        Name and admissible range of each parameter.
-    """
-
-    title: str
-    build: Callable[..., AbstractConstitutiveLaw]
-    parameters: Mapping[str, tuple[float, float]]
+def _named_laws() -> dict[str, NamedLaw]:
+    package = sys.modules[__name__.rpartition(".")[0]]
+    files = [module.name for module in pkgutil.iter_modules(package.__path__)]
+    laws: dict[str, NamedLaw] = {}
+    for file in dict.fromkeys([*_CLASSICAL, *files]):
+        if file != "registry":
+            laws |= getattr(importlib.import_module(f"discover.laws.{file}"), "NAMED", {})
+    return laws
 
 
-LAWS: Mapping[str, NamedLaw] = {
-    "ucm": NamedLaw("upper convected Maxwell", UpperConvectedMaxwell, {}),
-    "johnson_segalman": NamedLaw("Johnson–Segalman", JohnsonSegalman, {"xi": (0.0, 2.0)}),
-    "giesekus": NamedLaw("Giesekus", Giesekus, {"alpha": (0.0, 1.0)}),
-    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, {"epsilon": (0.0, 10.0)}),
-    "ptt_exponential": NamedLaw(
-        "exponential PTT", ExponentialPhanThienTanner, {"epsilon": (0.0, 10.0)}
-    ),
-    "fene_p": NamedLaw("FENE-P", FenePeterlin, {"L2": (3.0 + 1e-6, 1e6)}),
-}
+LAWS: Mapping[str, NamedLaw] = _named_laws()
+"""Named laws by the name in study files."""
 
 
 def make_law(name: str, parameters: Mapping[str, float] | None = None) -> AbstractConstitutiveLaw:

@@ -2,12 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float, Num
 
+from discover.equations import Equation, EquationTerm, combined, law_terms
 from discover.laws.base import AbstractConstitutiveLaw
+
+if TYPE_CHECKING:
+    import sympy
 
 
 @dataclass(frozen=True)
@@ -70,3 +75,46 @@ class LearnerResult:
     loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
+
+    def equation(self) -> Equation:
+        """Return the law term by term, a known law below it included, dimensionless.
+
+        Of a network this is its projection on the library.
+        """
+        base = getattr(self.law, "base", None)
+        found = tuple(
+            EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in self.terms
+        )
+        known = () if base is None else law_terms(base)
+        return Equation(
+            combined(known + found) if known else found,
+            linear_relaxation=self.law.linear_relaxation,
+        )
+
+    def sympy(self) -> "sympy.Expr":
+        """Return the extra term h as a SymPy expression over non-commuting tensors."""
+        return self.equation().sympy()
+
+    def latex(self) -> str:
+        """Return the dimensionless law as one LaTeX equation."""
+        return self.equation().latex()
+
+    def table(self) -> pd.DataFrame:
+        """Return the terms with their coefficients and 95 % intervals, one line each."""
+        columns = ["term", "coefficient", "low", "high", "penalised", "inner"]
+        lines = []
+        for t in self.terms:
+            low, high = (None, None) if t.ci95 is None else t.ci95
+            inner = ", ".join(f"{name} = {value:.6g}" for name, value in t.inner.items())
+            lines.append((t.term, t.coefficient, low, high, t.coefficient_penalised, inner))
+        return pd.DataFrame(lines, columns=columns)
+
+    def _repr_html_(self) -> str:
+        import html
+
+        table = self.table().dropna(axis="columns", how="all")
+        return (
+            f"<p><b>{html.escape(self.learner)}</b>: {html.escape(self.message)}</p>"
+            f"{self.equation()._repr_html_()}"
+            f"{table.to_html(index=False, escape=True, float_format='{:.4g}'.format)}"
+        )

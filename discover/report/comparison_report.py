@@ -6,9 +6,9 @@ from typing import Any
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
+from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.learners.result import RecoveredTerm
 from discover.report.equations import equations_tex
-from discover.report.mathml import law_element, term_element, term_mathml
 from discover.report.page import render
 from discover.report.plots.flows import SYMBOLS, flow_picture, start_up_picture, training_picture
 from discover.report.plots.next_experiment import next_picture

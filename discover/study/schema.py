@@ -3,14 +3,23 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 
-SyntheticLaw = Literal[
-    "ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential", "fene_p"
-]
-LawName = Literal[
-    "ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential", "fene_p", "learned"
-]
+from discover.laws.registry import LAWS
+
+
+def _known_law(name: str) -> str:
+    if name not in LAWS:
+        raise ValueError(f"unknown law {name[:60]!r}; write one of {', '.join(LAWS)}")
+    return name
+
+
+def _known_or_learned(name: str) -> str:
+    return name if name == "learned" else _known_law(name)
+
+
+SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
+LawName = Annotated[str, AfterValidator(_known_or_learned)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 

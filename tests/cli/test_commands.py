@@ -66,7 +66,7 @@ def test_help_imports_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    for command in ("demo", "compare", "close-loop", "batch", "data", "distil"):
+    for command in ("demo", "compare", "close-loop", "batch", "data", "distil", "export"):
         assert command in done.stdout
 
 
@@ -82,6 +82,13 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained):
     assert again.exit_code == 0
     assert "complete; use --overwrite" in again.output
     assert trained == ["tensor_sindy", "tbnn_ude"]
+    law = json.loads(invoke("export", out, "--format", "json", "--law", "tbnn_ude").stdout)
+    assert law["terms"][0]["term"] == "sigma.sigma"
+    assert "projection" in law["notes"][0]
+    # the paper's training and test flows, in 20 and 40 relaxation times
+    assert law["tested"]["learned_in"] == {"Wi": [1.0, 2.0], "De": [0.25, 1.0]}
+    assert law["tested"]["judged_in"]["Wi"] == [2.0, 3.0]
+    assert law["tested"]["judged_in"]["De"][1] == 1.5
     before = (out / "comparison.json").read_bytes()
     fresh = invoke("compare", study, "--out", out, "--overwrite", "--json")
     assert len(trained) == 4

@@ -10,10 +10,10 @@ from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import comparison_flows
 from discover.comparison.identifiability import find_rivals, undetermined_quantities
-from discover.comparison.outcome import law_of_terms
 from discover.comparison.truth import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
+from discover.laws.expansion import law_of_terms
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.study import RunFolder, parse_study
 from discover.study.build import declared_model, load_study_data

@@ -19,10 +19,10 @@ from discover.closed_loop.result import (
 )
 from discover.comparison import compare
 from discover.comparison.outcome import LearnerOutcome
+from discover.equations.mathml import law_element, term_element
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import comparison_pictures, safe_name, write_comparison
 from discover.report.loop_report import write_loop
-from discover.report.mathml import law_element, term_element
 from discover.report.mathtext import formula
 from discover.report.plots.flows import curves
 from discover.report.plots.selection import selection_picture
@@ -268,3 +268,24 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tm
     contents = json.loads((tmp_path / "loop.json").read_text())
     assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
     assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
+
+
+def test_a_comparison_shows_itself_as_tables(comparison):
+    terms, errors = comparison.terms_table(), comparison.errors_table()
+    assert terms.loc["sigma.sigma", ["truth", "tensor_sindy"]].tolist() == [0.2, 0.2]
+    flow = comparison.judged[0].name
+    wanted = comparison.errors("before", comparison.judged[0])["N1"]
+    assert errors.loc[(flow, "N1"), "before"] == wanted
+    assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
+    assert "<table" in comparison._repr_html_()
+
+
+def test_a_loop_shows_itself_as_tables():
+    result = loop_result()
+    line = result.table().iloc[0]
+    assert (line["effect"], line["value"], line["low"], line["high"]) == (
+        "stress_gain", 0.7, 0.69, 0.71,
+    )  # fmt: skip
+    assert result.ranking_table(1)["score"].tolist() == [0.9]
+    assert "stress_gain" in result._repr_html_()
+    assert "effects_added" in replace(result, stages=())._repr_html_()

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from discover.learners.result import RecoveredTerm
+from discover.equations.equation import TermLike
 from tensor_library.terms import CandidateTerm, parse_term
 
 _SIGMA = '<mi mathvariant="normal" style="font-weight:bold">σ</mi>'
@@ -91,7 +91,7 @@ def term_element(name: str, inner: dict[str, float] | None = None) -> str:
     return f"<math>{term_mathml(name, inner)}</math>"
 
 
-def law_element(terms: Sequence[RecoveredTerm], linear_relaxation: bool) -> str:
+def law_element(terms: Sequence[TermLike], linear_relaxation: bool) -> str:
     """Return the whole dimensionless law as a displayed `math` element."""
     convected = f"<mover><mrow>{_SIGMA}</mrow><mo style='font-size:70%'>▽</mo></mover>"
     right = f"<mo>=</mo>{_RATE}"

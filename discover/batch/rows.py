@@ -1,0 +1,156 @@
+"""What the studies of a batch found, one row each, from their result files."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+QUANTITIES = ("sigma12", "N1", "N2")
+
+
+@dataclass(frozen=True)
+class LearnerRow:
+    """What one learner found in one study.
+
+    Attributes
+    ----------
+    terms
+        Term, coefficient and inner parameters.
+    errors
+        Largest relative error of each quantity in flows that no fit saw.
+    """
+
+    terms: tuple[tuple[str, float, Mapping[str, float]], ...]
+    errors: Mapping[str, float]
+
+    @property
+    def text(self) -> str:
+        """The terms as plain text."""
+        parts = []
+        for term, value, inner in self.terms:
+            values = ", ".join(f"{name} = {number:.4g}" for name, number in inner.items())
+            parts.append(f"{value:.4g} {term}" + (f" [{values}]" if values else ""))
+        return " + ".join(parts) or "no term"
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """One study as the tables of a batch show it; everything empty where it failed.
+
+    Attributes
+    ----------
+    learners
+        By name.
+    rivals
+        Number of laws that its data do not tell from the one found.
+    undetermined
+        Quantities that they do not decide.
+    chosen
+        Terms that each rule for choosing a law takes, by rule.
+    effects
+        Effects that a closed loop added.
+    verdict
+        Of the closed loop.
+    error_before, error_after
+        On its held-out runs, or on the fitted ones where none were held out.
+    """
+
+    learners: Mapping[str, LearnerRow] = field(default_factory=dict)
+    rivals: int | None = None
+    undetermined: tuple[str, ...] = ()
+    chosen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    effects: tuple[str, ...] = ()
+    verdict: str = ""
+    error_before: float | None = None
+    error_after: float | None = None
+
+    @property
+    def agree(self) -> bool:
+        """Whether all rules choose the same terms."""
+        return len({tuple(sorted(terms)) for terms in self.chosen.values()}) <= 1
+
+
+def read_row(folder: Path) -> StudyRow:
+    """Return the row of a folder of results; an empty one where they are missing or damaged."""
+    try:
+        for name, reader in (("comparison.json", _comparison), ("loop.json", _loop)):
+            if (folder / name).is_file():
+                return reader(json.loads((folder / name).read_text("utf-8")))
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        pass  # a table over thousands of studies does not fall over one of them
+    return StudyRow()
+
+
+def _comparison(content: Mapping[str, Any]) -> StudyRow:
+    learners = {
+        str(name): LearnerRow(
+            tuple(_term(t) for t in learner["terms"]),
+            _worst(learner["errors"]),
+        )
+        for name, learner in content["learners"].items()
+    }
+    details = content["learners"].get("tensor_sindy", {}).get("details") or {}
+    chosen = (details.get("selectors") or {}).get("chosen") or {}
+    return StudyRow(
+        learners,
+        len(content["rivals"]),
+        tuple(map(str, content["undetermined"])),
+        {str(rule): tuple(map(str, terms)) for rule, terms in chosen.items()},
+    )
+
+
+def _term(content: Mapping[str, Any]) -> tuple[str, float, dict[str, float]]:
+    inner = {str(name): float(value) for name, value in content.get("inner", {}).items()}
+    return str(content["term"]), float(content["coefficient"]), inner
+
+
+def _worst(errors: Mapping[str, Mapping[str, float | None]]) -> dict[str, float]:
+    worst = {}
+    for quantity in QUANTITIES:
+        values = [v for row in errors.values() if (v := row.get(quantity)) is not None]
+        if values:
+            worst[quantity] = float(max(values))
+    return worst
+
+
+def _loop(content: Mapping[str, Any]) -> StudyRow:
+    errors = []
+    for key in ("error_before", "error_after"):
+        pair = content[key]
+        value = pair["fit"] if pair["held_out"] is None else pair["held_out"]
+        errors.append(None if value is None else float(value))
+    return StudyRow(
+        effects=tuple(str(stage["effect"]) for stage in content["stages"]),
+        verdict=str(content["verdict"]),
+        error_before=errors[0],
+        error_after=errors[1],
+    )
+
+
+def results_table(names: Sequence[str], rows: Sequence[StudyRow]) -> pd.DataFrame:
+    """Return what the studies found as a table, one line each.
+
+    Nothing in it depends on when or how often a study was run.
+
+    Parameters
+    ----------
+    names
+        Names of the studies.
+    rows
+        Their rows.
+    """
+    lines = []
+    for name, row in zip(names, rows, strict=True):
+        line: dict[str, Any] = {"study": name}
+        for learner, found in row.learners.items():
+            line[f"{learner}_terms"] = found.text
+            line |= {f"{learner}_{quantity}": error for quantity, error in found.errors.items()}
+        line |= {f"chosen_by_{rule}": ", ".join(terms) for rule, terms in row.chosen.items()}
+        line |= {"rivals": row.rivals, "undetermined": ", ".join(row.undetermined)}
+        line |= {"effects": ", ".join(row.effects), "verdict": row.verdict}
+        line |= {"error_before": row.error_before, "error_after": row.error_after}
+        lines.append(line)
+    return pd.DataFrame(lines).dropna(axis="columns", how="all")

@@ -1,0 +1,60 @@
+"""The command that writes a law out in a form that other programs take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discover.cli.guard import guarded
+
+
+@guarded
+def export(
+    results: Annotated[
+        Path,
+        typer.Argument(help="Folder that compare or close-loop has finished.", show_default=False),
+    ],
+    form: Annotated[
+        str, typer.Option("--format", "-f", help="python, sympy, latex, json or rheotool.")
+    ] = "python",
+    law: Annotated[
+        str | None,
+        typer.Option("--law", help="tensor_sindy or tbnn_ude; by default the sparse one."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; else standard output.")
+    ] = None,
+    density: Annotated[
+        float | None, typer.Option("--density", min=0.0, help="In kg/m3, for rheotool: 1000.")
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            min=0.0,
+            max=0.5,
+            help="For rheotool: deviation from a law it knows that may be passed over, 0.01.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+) -> None:
+    """Write a law that was found as Python, SymPy, LaTeX, JSON or a rheoTool dictionary."""
+    from discover.equations.read import choose_law, read_result_laws
+    from discover.equations.write import write_equation
+    from discover.errors import InputError
+    from discover.precision import enable_x64
+    from discover.study.atomic import make_folder, write_text
+
+    enable_x64()
+    equation = choose_law(read_result_laws(results), law)
+    text = write_equation(equation, form, density, tolerance)
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    if out.is_dir():
+        raise InputError(f"{out} is a folder; give the name of a file.")
+    if out.exists() and not overwrite:
+        raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
+    make_folder(out.parent)
+    write_text(out, text)
+    typer.echo(f"{out} written.")

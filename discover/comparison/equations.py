@@ -1,0 +1,86 @@
+"""What the learners of a comparison found, as equations with the box in which they were tested."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.comparison.flows import QUANTITIES, Flow, relative_errors
+from discover.comparison.outcome import LearnerOutcome
+from discover.equations import Equation, EquationTerm, Tested, combined, law_terms
+from discover.equations.box import box_of, flow_numbers
+from discover.errors import InputError
+from discover.study.build import DeclaredModel
+
+TITLES = {"tensor_sindy": "sparse regression", "tbnn_ude": "the neural network"}
+
+_PROJECTION = (
+    "This is the network put into words (its projection on the library). The network itself has no "
+    "closed form, and the errors are its own."
+)
+
+
+def known_equation(model: DeclaredModel) -> Equation | None:
+    """Return the known part of a study as an equation; None where it is no sum of terms."""
+    try:
+        terms = law_terms(model.law)
+    except InputError:
+        return None
+    return Equation(
+        terms,
+        tuple(float(g) for g in model.modulus),
+        tuple(float(time) for time in model.relaxation_time),
+        model.law.linear_relaxation,
+        float(model.solvent_viscosity),
+    )
+
+
+def outcome_equation(
+    known: Equation, outcome: LearnerOutcome, flows: Sequence[Flow], study: str
+) -> Equation:
+    """Return the known part with what a learner found.
+
+    Parameters
+    ----------
+    known
+        From `known_equation`.
+    outcome
+        What the learner found.
+    flows
+        Every flow of the comparison.
+    study
+        Name of the study.
+    """
+    found = tuple(EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in outcome.terms)
+    time = known.mean_relaxation_time
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    learned_in = box_of(_numbers(flow, time) for flow in flows if flow.kind == "training")
+    tested = None
+    if learned_in is not None:
+        judged_in = box_of(_numbers(flow, time) for flow in judged)
+        tested = Tested(learned_in, judged_in, _worst(outcome, judged))
+    return replace(
+        known,
+        # without a known part in the way, the terms keep their intervals
+        terms=combined(known.terms + found) if known.terms else found,
+        title=f"Law found by {TITLES.get(outcome.learner, outcome.learner)} in the study {study}.",
+        notes=(_PROJECTION,) if outcome.learner == "tbnn_ude" else (),
+        tested=tested,
+    )
+
+
+def _numbers(flow: Flow, time: float) -> tuple[float, float]:
+    amplitudes = np.abs(np.asarray(flow.protocol.amplitudes))
+    frequencies = np.asarray(flow.protocol.frequencies)[amplitudes > 0]
+    known = float(np.max(frequencies)) if frequencies.size else None
+    return flow_numbers(flow.times, flow.shear_rate, time, known)
+
+
+def _worst(outcome: LearnerOutcome, judged: Sequence[Flow]) -> dict[str, float]:
+    rows = [relative_errors(outcome.predictions[flow.key], flow.reference) for flow in judged]
+    worst = {}
+    for quantity in QUANTITIES:
+        values = [value for row in rows if (value := row[quantity]) is not None]
+        if values:
+            worst[quantity] = max(values)
+    return worst

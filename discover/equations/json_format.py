@@ -1,0 +1,131 @@
+"""Laws as JSON: the form in which result files hold them, and from which all others are made."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from discover.equations.equation import Box, Equation, EquationTerm, Tested
+from discover.errors import InputError
+
+FORMAT = "discover law 1"
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class _Term(_Section):
+    term: str = Field(max_length=500)
+    coefficient: float
+    inner: dict[str, float] = {}
+    ci95: tuple[float, float] | None = None
+
+
+class _Mode(_Section):
+    modulus_Pa: float = Field(gt=0)
+    relaxation_time_s: float = Field(gt=0)
+
+
+class _Box(_Section):
+    Wi: tuple[float, float]
+    De: tuple[float, float]
+
+    def box(self) -> Box:
+        return Box(self.Wi, self.De)
+
+
+class _Tested(_Section):
+    learned_in: _Box
+    judged_in: _Box | None = None
+    worst_errors: dict[str, float] = {}
+
+
+class _Law(_Section):
+    format: Literal["discover law 1"]
+    title: str = ""
+    notes: tuple[str, ...] = ()
+    terms: tuple[_Term, ...] = Field(max_length=1000)
+    linear_relaxation: bool = True
+    modes: tuple[_Mode, ...] = Field(min_length=1, max_length=1000)
+    solvent_viscosity_Pa_s: float = Field(default=0.0, ge=0)
+    tested: _Tested | None = None
+
+
+def equation_to_json(equation: Equation) -> dict[str, Any]:
+    """Return an equation as JSON-able values; `equation_from_json` undoes it exactly."""
+    tested = equation.tested
+    return {
+        "format": FORMAT,
+        "title": equation.title,
+        "notes": list(equation.notes),
+        "terms": [
+            {
+                "term": t.term,
+                "coefficient": t.coefficient,
+                "inner": dict(t.inner),
+                "ci95": None if t.ci95 is None else list(t.ci95),
+            }
+            for t in equation.terms
+        ],
+        "linear_relaxation": equation.linear_relaxation,
+        "modes": [
+            {"modulus_Pa": g, "relaxation_time_s": time}
+            for g, time in zip(equation.modulus, equation.relaxation_time, strict=True)
+        ],
+        "solvent_viscosity_Pa_s": equation.solvent_viscosity,
+        "tested": None
+        if tested is None
+        else {
+            "learned_in": _box(tested.learned_in),
+            "judged_in": None if tested.judged_in is None else _box(tested.judged_in),
+            "worst_errors": dict(tested.worst_errors),
+        },
+    }
+
+
+def equation_from_json(content: object, where: str = "the law") -> Equation:
+    """Return the equation that JSON holds.
+
+    Parameters
+    ----------
+    content
+        What `equation_to_json` returned, after a way through a file.
+    where
+        Its place, for messages.
+
+    Raises
+    ------
+    InputError
+        If something in it is missing, unknown or no number; names the key.
+    """
+    try:
+        law = _Law.model_validate(content)
+        tested = law.tested
+        return Equation(
+            terms=tuple(EquationTerm(t.term, t.coefficient, t.inner, t.ci95) for t in law.terms),
+            modulus=tuple(mode.modulus_Pa for mode in law.modes),
+            relaxation_time=tuple(mode.relaxation_time_s for mode in law.modes),
+            linear_relaxation=law.linear_relaxation,
+            solvent_viscosity=law.solvent_viscosity_Pa_s,
+            title=law.title,
+            notes=law.notes,
+            tested=None
+            if tested is None
+            else Tested(
+                tested.learned_in.box(),
+                None if tested.judged_in is None else tested.judged_in.box(),
+                tested.worst_errors,
+            ),
+        )
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        key = ".".join(str(part) for part in first["loc"]) or "the law"
+        raise InputError(
+            f"{where}: {key[:120]}: {first['msg']}. Write the results again with --overwrite."
+        ) from None
+    except ValueError as error:
+        raise InputError(f"{where}: {error} Write the results again with --overwrite.") from None
+
+
+def _box(box: Box) -> dict[str, list[float]]:
+    return {"Wi": list(box.weissenberg), "De": list(box.deborah)}

@@ -1,0 +1,92 @@
+"""The laws that a folder of results holds."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from discover.dataset.table import read_bytes
+from discover.equations.equation import Equation
+from discover.equations.json_format import equation_from_json
+from discover.errors import InputError
+
+COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"
+AUGMENTED = "augmented"
+"""Name of the law of a closed loop."""
+
+
+def read_result_laws(folder: str | Path) -> dict[str, Equation]:
+    """Return the laws in a folder of results by name: those of the learners, or the augmented one.
+
+    Parameters
+    ----------
+    folder
+        What ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
+
+    Raises
+    ------
+    InputError
+        If there is no result, it is damaged, or its law cannot be written out.
+    """
+    path = Path(folder)
+    if path.suffix == ".json":
+        return _laws(_read_json(path), path.name)
+    for name in (COMPARISON, LOOP):
+        if (path / name).is_file():
+            return _laws(_read_json(path / name), name)
+    if (path / BATCH).is_file():
+        raise InputError(
+            f"{path} holds a batch. Give the folder of one study in it, such as {path / 'STUDY'}."
+        )
+    raise InputError(
+        f"{path} holds neither {COMPARISON} nor {LOOP}. Give a folder that discover compare or "
+        "discover close-loop has finished."
+    )
+
+
+def choose_law(laws: dict[str, Equation], name: str | None = None) -> Equation:
+    """Return the law of this name; without one the sparse learner's, or the only one.
+
+    Raises
+    ------
+    InputError
+        If there is no such law.
+    """
+    if name is None:
+        return laws.get("tensor_sindy") or next(iter(laws.values()))
+    if name not in laws:
+        raise InputError(f"There is no law {name!r} in these results; write {' or '.join(laws)}.")
+    return laws[name]
+
+
+def _laws(content: Any, where: str) -> dict[str, Equation]:
+    old = f"{where} holds no law: it was written before laws were kept. Run again with --overwrite."
+    if not isinstance(content, dict):
+        raise InputError(f"{where} is no result of discover. Run again with --overwrite.")
+    if "law" in content or "law_missing" in content:
+        if content.get("law") is None:
+            raise InputError(" ".join(str(content.get("law_missing") or old).split())[:500])
+        return {AUGMENTED: equation_from_json(content["law"], f"{where}: law")}
+    learners = content.get("learners")
+    if not isinstance(learners, dict):
+        raise InputError(old)
+    laws = {
+        str(name): equation_from_json(learner["law"], f"{where}: learners.{name}.law")
+        for name, learner in learners.items()
+        if isinstance(learner, dict) and learner.get("law") is not None
+    }
+    if not laws:
+        raise InputError(old)
+    return laws
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(read_bytes(path, path.name))
+    except RecursionError:
+        raise InputError(f"{path.name} is nested too deeply to be a result.") from None
+    except (ValueError, UnicodeDecodeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{path.name} is not valid JSON ({error}). Run again with --overwrite."
+        ) from None

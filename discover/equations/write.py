@@ -1,0 +1,59 @@
+"""One equation in any of the forms in which it can leave."""
+
+import json
+from collections.abc import Callable, Mapping
+
+from discover.equations.code import numpy_code, sympy_code
+from discover.equations.equation import Equation
+from discover.equations.json_format import equation_to_json
+from discover.equations.latex import equation_latex
+from discover.equations.rheotool import rheotool_text
+from discover.errors import InputError
+
+
+def _json_text(equation: Equation) -> str:
+    content = equation_to_json(equation)
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+FORMATS: Mapping[str, Callable[[Equation], str]] = {
+    "python": numpy_code,
+    "sympy": sympy_code,
+    "latex": equation_latex,
+    "json": _json_text,
+    "rheotool": rheotool_text,
+}
+"""Functions that write an equation, by the name of the format."""
+
+
+def write_equation(
+    equation: Equation,
+    form: str,
+    density_kg_m3: float | None = None,
+    tolerance: float | None = None,
+) -> str:
+    """Return an equation as text.
+
+    Parameters
+    ----------
+    equation
+        The equation.
+    form
+        Key of `FORMATS`.
+    density_kg_m3, tolerance
+        For ``rheotool`` only; see `discover.equations.rheotool.rheotool_text`.
+
+    Raises
+    ------
+    InputError
+        If there is no such format, an option does not belong to it, or it has not this law.
+    """
+    if form not in FORMATS:
+        raise InputError(f"Unknown format {form!r}; write one of {', '.join(FORMATS)}.")
+    options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
+    given = {name: value for name, value in options.items() if value is not None}
+    if form == "rheotool":
+        return rheotool_text(equation, **given)
+    if given:
+        raise InputError(f"Density and tolerance are for --format rheotool; got --format {form}.")
+    return FORMATS[form](equation)

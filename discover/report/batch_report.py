@@ -1,0 +1,94 @@
+"""The page over a batch of studies: what each found, side by side."""
+
+import html
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from discover.equations.mathml import number, term_mathml
+from discover.report.page import render
+from discover.report.plots.style import LEARNER_TITLES
+from discover.report.wording import RULES, spoken
+
+_SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
+
+
+def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
+    """Return the page over a batch.
+
+    Parameters
+    ----------
+    studies
+        How each study ended, `discover.batch.status.StudyStatus`.
+    rows
+        What each found, `discover.batch.rows.StudyRow`, in the same order.
+    """
+    learners = list(dict.fromkeys(name for row in rows for name in row.learners))
+    rules = list(dict.fromkeys(rule for row in rows for rule in row.chosen))
+    pairs = list(zip(studies, rows, strict=True))
+    return render(
+        "batch.html",
+        studies=studies,
+        failed=[study for study in studies if study.status == "failed"],
+        waiting=sum(study.status == "waiting" for study in studies),
+        learners=[LEARNER_TITLES.get(name, name) for name in learners],
+        symbols=list(_SYMBOLS.values()),
+        comparisons=[
+            {"study": study, "cells": _cells(row, learners), "row": row}
+            for study, row in pairs
+            if row.learners
+        ],
+        rules=[RULES.get(rule, rule) for rule in rules],
+        selections=[
+            {
+                "study": study,
+                "cells": [_support(row.chosen.get(rule)) for rule in rules],
+                "agree": row.agree,
+            }
+            for study, row in pairs
+            if row.chosen
+        ],
+        loops=[
+            {"study": study, "effects": ", ".join(map(spoken, row.effects)), "row": row}
+            for study, row in pairs
+            if row.verdict
+        ],
+    )
+
+
+def _cells(row: Any, learners: Sequence[str]) -> list[dict[str, Any]]:
+    cells = []
+    for name in learners:
+        found = row.learners.get(name)
+        terms: Sequence[tuple[str, float, Mapping[str, float]]] = (
+            () if found is None else found.terms
+        )
+        errors: Mapping[str, float] = {} if found is None else found.errors
+        cells.append(
+            {
+                "law": "–" if found is None else _law(terms),
+                "size": len(terms),
+                "errors": [errors.get(quantity) for quantity in _SYMBOLS],
+            }
+        )
+    return cells
+
+
+def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
+    parts = []
+    for i, (term, value, inner) in enumerate(terms):
+        sign = "<mo>−</mo>" if value < 0 else "<mo>+</mo>" if i else ""
+        parts.append(f"{sign}{number(value)}<mspace width='0.15em'/>{_term(term, inner)}")
+    return f"<math><mrow>{''.join(parts)}</mrow></math>" if parts else "no term"
+
+
+def _support(terms: Sequence[str] | None) -> str:
+    if terms is None:
+        return "–"
+    return "<br>".join(f"<math>{_term(term)}</math>" for term in terms) or "no term"
+
+
+def _term(name: str, inner: Mapping[str, float] | None = None) -> str:
+    try:
+        return term_mathml(name, dict(inner or {}))
+    except ValueError:  # a file that somebody edited
+        return f"<mtext>{html.escape(name[:200])}</mtext>"

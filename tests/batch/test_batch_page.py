@@ -1,0 +1,137 @@
+"""The page, the table and the rows over a batch."""
+
+import json
+import re
+
+import pytest
+
+from discover.batch.rows import LearnerRow, StudyRow, read_row, results_table
+from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.summary import Summary
+from discover.report.batch_report import batch_page
+
+GOOD = {
+    "learners": {
+        "tensor_sindy": {
+            "terms": [{"term": "sigma.sigma", "coefficient": 0.2}],
+            "errors": {
+                "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
+                "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
+            },
+            "details": {"selectors": {"chosen": {"bic": ["sigma.sigma"], "pysindy": ["sigma"]}}},
+        },
+        "tbnn_ude": {
+            "terms": [
+                {
+                    "term": "(exp(epsilon*tr(sigma))-1)*sigma",
+                    "coefficient": 1.0,
+                    "inner": {"epsilon": 0.375},
+                }
+            ],
+            "errors": {},
+            "details": {},
+        },
+    },
+    "rivals": [{}, {}],
+    "undetermined": ["N2"],
+}
+LOOP = {
+    "verdict": "effects_added",
+    "error_before": {"fit": 0.4, "held_out": 0.5},
+    "error_after": {"fit": 0.01, "held_out": None},
+    "stages": [{"effect": "rate_gain"}],
+}
+
+
+def statuses():
+    return (
+        StudyStatus("good", "compare", "done", "Found.", False, 2.0),
+        StudyStatus("loop", "close-loop", "complete", "Added.", False, 0.1),
+        StudyStatus("<script>x", "compare", "failed", "a <b>reason</b>", True, 0.0),
+        StudyStatus("later", "compare", "waiting", ""),
+    )
+
+
+@pytest.fixture
+def rows(tmp_path):
+    for name, file, content in (("good", "comparison", GOOD), ("loop", "loop", LOOP)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{file}.json").write_text(json.dumps(content))
+    return (read_row(tmp_path / "good"), read_row(tmp_path / "loop"), StudyRow(), StudyRow())
+
+
+def test_rows_hold_the_worst_error_and_what_each_rule_chose(rows):
+    good, loop, *_ = rows
+    assert good.learners["tensor_sindy"].errors == {"sigma12": 0.03, "N1": 0.02}
+    assert good.learners["tbnn_ude"].text.endswith("*sigma [epsilon = 0.375]")
+    assert LearnerRow((), {}).text == "no term"
+    assert good.chosen == {"bic": ("sigma.sigma",), "pysindy": ("sigma",)}
+    assert not good.agree
+    assert (good.rivals, good.undetermined) == (2, ("N2",))
+    assert (loop.effects, loop.error_before, loop.error_after) == (("rate_gain",), 0.5, 0.01)
+
+
+def test_the_page_says_what_failed_and_puts_selectors_side_by_side(rows):
+    page = batch_page(statuses(), rows)
+    assert "<script>x" not in page
+    assert "a &lt;b&gt;reason&lt;/b&gt;" in page
+    assert "2 with a result, 1 failed, 1 not run yet" in page
+    assert 'href="good/report.html"' in page
+    assert "script%3E" not in page  # a failed study has no link
+    for text in ("BIC", "pysindy at its default", "3 %", "rate_gain".replace("_", " ")):
+        assert text in page or text.replace(" ", "_") in page
+    assert "0.375" in page.split('id="found"')[1].split("</table>")[0]
+    selection = page.split('id="selection"')[1].split("</table>")[0]
+    assert selection.count("<math>") == 2
+    assert ">no</td>" in selection
+
+
+def test_the_page_needs_no_network_and_its_rows_no_script(rows):
+    page = batch_page(statuses(), rows)
+    assert not re.findall(r"""(?:src|href)\s*=\s*["'](?:https?:)?//""", page)
+    assert page.count("<script>") == 1
+    assert "fetch(" not in page
+    assert "import(" not in page
+    tables = page.split("<script>")[0]
+    for study in statuses():
+        assert study.text.split("<")[0] in tables
+    # every column of errors can be sorted by its number, not by its text
+    assert 'data-value="0.03"' in tables
+
+
+def test_the_table_does_not_depend_on_times(rows):
+    table = results_table([s.name for s in statuses()], rows)
+    assert table.loc[0, "tensor_sindy_terms"] == "0.2 sigma.sigma"
+    assert table.loc[0, "tensor_sindy_sigma12"] == 0.03
+    assert table.loc[1, "effects"] == "rate_gain"
+    assert not {"seconds", "status"} & set(table.columns)
+
+
+def test_a_batch_shows_itself_in_a_notebook(rows, tmp_path):
+    shown = BatchResult(statuses(), tmp_path / "index.html", rows)._repr_html_()
+    assert "sigma.sigma" in shown
+    assert "<script>x" not in shown
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"learners": 3}', '{"learners": {"a": {"terms": [{}]}}}', "[" * 9999]
+)
+def test_a_damaged_result_is_an_empty_row(tmp_path, text):
+    (tmp_path / "comparison.json").write_text(text)
+    assert read_row(tmp_path) == StudyRow()
+
+
+def test_the_page_is_there_while_studies_still_run(tmp_path):
+    summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
+    summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    page = (tmp_path / "index.html").read_text("utf-8")
+    assert "the reason" in page
+    assert "1 not run yet" in page
+    assert json.loads((tmp_path / "batch.json").read_text())["studies"][1]["status"] == "waiting"
+
+
+def test_a_term_that_nobody_knows_is_shown_as_text():
+    row = StudyRow({"tensor_sindy": LearnerRow((("<img src=x>", 1.0, {}),), {})}, 0)
+    page = batch_page((StudyStatus("a", "compare", "done", ""),), (row,))
+    assert "<img" not in page
+    assert "&lt;img src=x&gt;" in page

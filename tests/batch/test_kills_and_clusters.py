@@ -1,0 +1,205 @@
+"""Batches that are killed, and batches on a real dask cluster on the loopback interface.
+
+The studies run a stand-in that writes real parts into real result folders, so that what is tested
+is the machinery of the batch and not the learners. ``benchmarks/batch_kills.py`` does the same with
+real studies and ten kills.
+"""
+
+import contextlib
+import json
+import os
+import random
+import runpy
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+
+import pytest
+
+from discover.batch import run as batch
+from discover.errors import InputError
+from discover.study.lock import LOCK_FILE
+
+STAND_IN = """
+import json, os, time
+import numpy as np
+from discover.batch import run as batch
+from discover.batch.tasks import TaskResult
+from discover.study.read import fingerprint, read_study
+from discover.study.run_folder import RunFolder
+
+def compare(path, out, seed, overwrite, progress):
+    study = read_study(path)
+    folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
+    page, data = folder.path / "report.html", folder.path / "comparison.json"
+    if folder.complete and page.is_file() and data.is_file():
+        return TaskResult(page, data, "there", True)
+    noise = study.data.synthetic.noise
+    if noise > 1:
+        raise RuntimeError("no law fits <b>this</b>")
+    numbers = []
+    for i in range(6):
+        part = folder.load(f"part{i}")
+        if part is None:
+            time.sleep(0.08)
+            part = {"x": np.random.default_rng([i, int(1000 * noise)]).normal(size=500).tolist()}
+            folder.save(f"part{i}", part)
+            with open(os.environ["COUNTS"], "a") as counts:
+                counts.write(f"{folder.path.name} {i}\\n")
+        numbers.append(part["x"])
+    term = {"term": "sigma.sigma", "coefficient": noise}
+    errors = {"f": {"sigma12": noise, "N1": None, "N2": None}}
+    details = {"selectors": {"chosen": {"bic": ["sigma.sigma"], "stability": []}}}
+    learner = {"terms": [term], "errors": errors, "details": details}
+    content = {"learners": {"tensor_sindy": learner}, "rivals": [], "undetermined": ["N2"]}
+    folder.write("comparison.json", json.dumps({**content, "numbers": numbers}))
+    folder.write("report.html", "<p>")
+    folder.finish()
+    return TaskResult(page, data, "found", False)
+
+batch._TASKS["compare"] = compare
+"""
+STUDY = '[data]\nsynthetic = {{ law = "giesekus", parameters = {{ alpha = 0.2 }}, noise = {} }}\n'
+
+
+@pytest.fixture
+def studies(tmp_path, monkeypatch):
+    """Three studies that work, one that fails; and a stand-in for the learners."""
+    paths = [tmp_path / f"{name}.toml" for name in ("one", "two", "three", "fails")]
+    for path, noise in zip(paths, (0.01, 0.02, 0.03, 2.0), strict=True):
+        path.write_text(STUDY.format(noise))
+    (tmp_path / "stand_in.py").write_text(STAND_IN)
+    monkeypatch.setenv("COUNTS", str(tmp_path / "counts.txt"))
+    (tmp_path / "counts.txt").touch()
+    monkeypatch.setattr(batch, "_TASKS", dict(batch._TASKS))
+    runpy.run_path(str(tmp_path / "stand_in.py"))
+    return paths
+
+
+def computed(folder):
+    """How often each part of each study was computed."""
+    return Counter((folder / "counts.txt").read_text().splitlines())
+
+
+def results(out):
+    return {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in sorted(out.rglob("*"))
+        if path.name in ("comparison.json", "table.csv") and path.is_file()
+    }
+
+
+@pytest.fixture
+def calm(studies, tmp_path):
+    """What the batch gives when nobody disturbs it."""
+    batch.run_batch(studies, tmp_path / "calm")
+    kept = results(tmp_path / "calm")
+    assert len(kept) == 4  # three studies and the table
+    (tmp_path / "counts.txt").write_text("")
+    return kept
+
+
+def wait_for(condition, seconds=120.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.01)
+
+
+def test_a_batch_killed_at_random_ends_with_the_same_bytes(studies, calm, tmp_path):
+    generator = random.Random(1)
+    code = f"import runpy; runpy.run_path({str(tmp_path / 'stand_in.py')!r})\n"
+    code += "from discover.cli import main; main()"
+    out = tmp_path / "out"
+    arguments = ["batch", *map(str, studies), "--out", str(out), "--quiet"]
+    for _ in range(2):
+        process = subprocess.Popen([sys.executable, "-c", code, *arguments])
+        wanted = computed(tmp_path).total() + generator.randint(1, 8)
+        while computed(tmp_path).total() < wanted:
+            assert process.poll() is None
+            time.sleep(0.01)
+        time.sleep(generator.uniform(0.0, 0.05))
+        process.kill()
+        assert process.wait() == -signal.SIGKILL
+    result = batch.run_batch(studies, out)
+    assert results(out) == calm
+    assert [study.status for study in result.studies][-1] == "failed"
+    assert max(computed(tmp_path).values()) == 1  # what was finished is never done again
+
+
+def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path):
+    dask = pytest.importorskip("dask")
+    pytest.importorskip("distributed")
+    out, killed = tmp_path / "out", []
+
+    def kill_one():
+        wait_for(lambda: computed(tmp_path).total() >= 1)
+        while not killed:
+            for lock in out.glob(f"*/{LOCK_FILE}"):
+                with contextlib.suppress(OSError, ValueError):
+                    pid = json.loads(lock.read_text())["pid"]
+                    if pid != os.getpid() and not killed:
+                        os.kill(pid, signal.SIGKILL)
+                        killed.append(pid)
+            time.sleep(0.005)
+
+    said = []
+    thread = threading.Thread(target=kill_one, daemon=True)
+    with dask.config.set({"distributed.worker.preload": [str(tmp_path / "stand_in.py")]}):
+        thread.start()
+        result = batch.run_batch(
+            studies, out, workers=2, progress=lambda text, fraction: said.append(fraction)
+        )
+    thread.join(10)
+    assert killed
+    assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
+    assert results(out) == calm
+    assert max(computed(tmp_path).values()) == 1
+    assert said == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=2,
+        processes=False,
+        host="127.0.0.1",
+        protocol="tcp://",
+        dashboard_address=None,
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert address.startswith("tcp://127.0.0.1")
+        result = batch.run_batch(studies, tmp_path / "out", scheduler=address)
+    assert len(result.failed) == 1
+    assert "no law fits" in result.failed[0].text
+    assert results(tmp_path / "out") == calm
+
+
+def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_path):
+    class Future:
+        def exception(self):
+            return None
+
+        def result(self):
+            return batch.StudyStatus("a", "compare", "done", "found")
+
+    status = batch._status_of(
+        Future(), ("a.toml", "a", "compare", str(tmp_path / "a"), None, False)
+    )
+    assert status.status == "failed"
+    assert "one file system" in status.text
+
+
+def test_a_scheduler_that_does_not_answer_is_the_users_mistake(studies, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+
+    def no_answer(address, timeout):
+        raise OSError(f"Timed out trying to connect to {address}")
+
+    monkeypatch.setattr(distributed, "Client", no_answer)
+    with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9"):
+        batch.run_batch(studies, tmp_path / "out", scheduler="tcp://127.0.0.1:9")

@@ -1,0 +1,163 @@
+"""``discover export``: from a folder of results to a law that other programs take."""
+
+import importlib.util
+import json
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.closed_loop.augmented_law import AugmentedLaw
+from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.effects import make_effect
+from discover.equations import Box, Equation, EquationTerm, equation_to_json
+from discover.equations import Tested as Where
+from discover.laws import Fluid, make_law
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture
+def results(tmp_path):
+    """The part of comparison.json that an export reads; a whole one is read in test_commands.py."""
+    tested = Where(Box((1.0, 2.0), (0.25, 1.0)), Box((2.0, 3.0), (0.1, 1.5)), {"sigma12": 0.01})
+    laws = {
+        name: Equation((EquationTerm("sigma.sigma", value),), tested=tested)
+        for name, value in (("tensor_sindy", 0.2), ("tbnn_ude", 0.25))
+    }
+    content = {name: {"law": equation_to_json(law)} for name, law in laws.items()}
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "comparison.json").write_text(json.dumps({"learners": content}))
+    return tmp_path / "out"
+
+
+def test_a_comparison_becomes_a_function_that_says_where_it_was_tested(results, tmp_path):
+    done = invoke("export", results, "--out", tmp_path / "law.py")
+    assert done.exit_code == 0, done.output
+    spec = importlib.util.spec_from_file_location("law", tmp_path / "law.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.TESTED["judged_in"] == {"Wi": [2.0, 3.0], "De": [0.1, 1.5]}
+    stress, _, _ = module.simulate_shear(lambda t: 0.01, np.array([0.0, 20.0]))
+    assert stress[-1] == pytest.approx(0.01, rel=1e-3)  # slow flow: the viscosity Gλ = 1
+    again = invoke("export", results, "--out", tmp_path / "law.py")
+    assert again.exit_code == 2
+    assert "--overwrite" in again.stderr
+
+
+def test_every_form_and_either_learner_can_be_asked_for(results):
+    for form in ("python", "sympy", "latex", "json", "rheotool"):
+        done = invoke("export", results, "--format", form)
+        assert done.exit_code == 0, done.output
+        assert "0.2" in done.stdout
+    network = invoke("export", results, "--format", "json", "--law", "tbnn_ude")
+    content = json.loads(network.stdout)
+    assert content["terms"][0]["coefficient"] == 0.25
+    held = json.loads((results / "comparison.json").read_text())
+    assert held["learners"]["tbnn_ude"]["law"] == content
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["--format", "fortran"], "python, sympy, latex, json, rheotool"),
+        (["--law", "nobody"], "tensor_sindy or tbnn_ude"),
+        (["--density", "900"], "rheotool"),
+        (["--out", "."], "is a folder"),
+    ],
+)
+def test_a_wrong_request_is_one_line_and_exit_code_2(results, arguments, word):
+    done = invoke("export", results, *arguments)
+    assert done.exit_code == 2
+    assert done.stderr.strip().count("\n") == 0
+    assert word in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "word"),
+    [
+        ("comparison.json", "{", "not valid JSON"),
+        ("comparison.json", "[" * 100_000, "comparison.json"),
+        ("comparison.json", "{}", "--overwrite"),
+        ("comparison.json", '{"learners": {"tensor_sindy": {"law": {}}}}', "format"),
+        ("loop.json", '{"law": null, "law_missing": "thixotropy has a state"}', "thixotropy"),
+        ("batch.json", "{}", "one study"),
+        ("nothing.txt", "", "neither comparison.json nor loop.json"),
+    ],
+)
+def test_results_that_hold_no_law_say_so(tmp_path, name, text, word):
+    (tmp_path / name).write_text(text)
+    done = invoke("export", tmp_path)
+    assert done.exit_code == 2
+    assert word in done.stderr
+    assert "Traceback" not in done.output
+
+
+def loop_result(*added):
+    """A closed loop that added effects, given as (name, parameters...)."""
+    effects = tuple(make_effect(name) for name, *_ in added)
+    stages = tuple(
+        Stage(
+            effect.name,
+            effect.kind,
+            {effect.parameters[0].name: StageParameter(values[0], (0.0, 1.0), "")},
+            (),
+            ErrorPair(0.1, 0.1),
+            10.0,
+            effect.equation,
+            effect.source,
+            effect.check,
+        )
+        for effect, (_, *values) in zip(effects, added, strict=True)
+    )
+    inside = [
+        (e, jnp.asarray(v)) for e, (_, *v) in zip(effects, added, strict=True)
+        if e.kind == "constitutive"
+    ]  # fmt: skip
+    law = AugmentedLaw(
+        make_law("giesekus", {"alpha": 0.1}),
+        tuple(v for _, v in inside),
+        tuple(e for e, _ in inside),
+    )
+    t = np.linspace(0.0, 10.0, 5)
+    records = tuple(
+        RunRecord(f"{held}", held, t, t, t, np.full(5, rate), t, np.stack([t]), np.zeros(1))
+        for held, rate in ((False, 1.0), (False, 0.5), (True, 4.0))
+    )
+    return LoopResult(
+        "effects_added", ErrorPair(0.4, 0.4), ErrorPair(0.01, 0.02), 0.005, stages, {},
+        records=records, fluid=Fluid(law, [10.0, 20.0], [0.5, 2.0], 1.0),
+    )  # fmt: skip
+
+
+def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
+    result = loop_result(("ptt_linear", 0.3), ("giesekus_mobility", 0.05), ("rate_gain", 0.1))
+    result.write_json(tmp_path / "loop.json")
+    done = invoke("export", tmp_path, "--format", "json")
+    assert done.exit_code == 0, done.output
+    content = json.loads(done.stdout)
+    found = {t["term"]: t["coefficient"] for t in content["terms"]}
+    assert found == pytest.approx({"sigma.sigma": 0.15, "tr(sigma)*sigma": 0.3})
+    assert [m["modulus_Pa"] for m in content["modes"]] == [10.0, 20.0]
+    assert "rate_gain" in " ".join(content["notes"])
+    time = (10 * 0.5**2 + 20 * 2.0**2) / (10 * 0.5 + 20 * 2.0)
+    assert content["tested"]["judged_in"] == {
+        "Wi": pytest.approx([4 * time] * 2),
+        "De": pytest.approx([time / 10] * 2),
+    }
+
+
+@pytest.mark.parametrize("case", ["yield", "state"])
+def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, case):
+    result = loop_result(("yield_stress", 0.1))
+    if case == "state":
+        result = replace(loop_result(("thixotropy", 0.1, 2.0)), fluid=None)
+    result.write_json(tmp_path / "loop.json")
+    done = invoke("export", tmp_path)
+    assert done.exit_code == 2
+    assert ("yield_stress" if case == "yield" else "thixotropy") in done.stderr

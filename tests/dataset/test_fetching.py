@@ -1,0 +1,132 @@
+"""Public data sets: fetched by the user's installer, checked by hash, never part of the project."""
+
+import hashlib
+import subprocess
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import load_dataset
+from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
+from discover.dataset.fetching import catalogue as catalogue_module
+from discover.errors import InputError
+
+HEADER = "gdot={rate};Mw=94;T=-35;label=made up;WeR={wi_r};WeD={wi_d};\r\n"
+NAMES = "time\tIt(t)\tN1\tRate\tTemp\r\ns\tPa\tPa\ts-1\tC\r\n"
+
+
+def made_up(rate, measured):
+    time = np.linspace(0.0, 2.0, 12)
+    rows = (
+        f" {t:.15E}  {rate * t:.15E}  {t**2:.15E}  {measured:.15E}  {-10 + 0.01 * i:.15E}\t\r\n"
+        for i, t in enumerate(time)
+    )
+    head = HEADER.format(rate=rate, wi_r=rate / 10, wi_d=rate * 10)
+    return (head + NAMES + "".join(rows)).encode()
+
+
+FILES = {
+    "data/PI/shear/slow.shear": made_up(0.5, 1.0),
+    "data/PI/shear/fast.shear": made_up(2.0, 4.0),
+    "data/PI/sweep.tts": b"C1=8;T=-35;\r\n 2 20 30 -9\r\n 1 10 15 -8\r\n 4 40 60 1\r\n",
+}
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package with made-up files, and a catalogue that knows their hashes."""
+    path = tmp_path / "made_up-1.0-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in FILES.items():
+            archive.writestr(f"made_up-1.0.data/data/{name}", content)
+        archive.writestr("made_up-1.0.dist-info/LICENSE", "the licence")
+    hashes = {name: hashlib.sha256(content).hexdigest() for name, content in FILES.items()}
+    entry = replace(CATALOGUE["polyisoprene"], files=hashes, package="made-up", version="1.0")
+    monkeypatch.setitem(catalogue_module.CATALOGUE, "polyisoprene", entry)
+    return path
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["data", "fetch", *(str(a) for a in arguments)])
+
+
+def test_a_set_is_fetched_by_the_installer_and_loads(package, tmp_path, monkeypatch):
+    def pip(command, **options):
+        assert command[1:4] == ["-m", "pip", "download"]
+        assert command[-1] == "made-up==1.0"
+        folder = command[command.index("--dest") + 1]
+        package.rename(f"{folder}/{package.name}")
+        return subprocess.CompletedProcess(command, 0, "", "")
+
+    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    done = invoke("polyisoprene", "--accept-licence", "--out", tmp_path / "pi")
+    assert done.exit_code == 0, done.output
+    dataset = load_dataset(tmp_path / "pi", clock_factor="time_factor")
+    assert dataset.names == ("pi_Tm10_rate1.csv", "pi_Tm10_rate4.csv")
+    fast = dataset.runs[1]
+    np.testing.assert_allclose(fast.shear_rate, 2.0)
+    np.testing.assert_allclose(fast.shear_stress[-1], 4.0)
+    sweep = dataset.linear_sweep
+    np.testing.assert_array_equal(sweep.angular_frequency, [1.0, 2.0, 4.0])
+    assert (tmp_path / "pi" / "LICENSE").read_text() == "the licence"
+    assert "Auhl" in (tmp_path / "pi" / "PROVENANCE.md").read_text()
+    again = invoke("polyisoprene", "--accept-licence", "--out", tmp_path / "pi")
+    assert again.exit_code == 2
+    assert "--overwrite" in again.stderr
+
+
+def test_nothing_is_fetched_before_the_licence_is_accepted(tmp_path, monkeypatch):
+    def pip(*_, **__):
+        raise AssertionError("asked for")
+
+    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    done = invoke("polyisoprene", "--out", tmp_path / "pi")
+    assert done.exit_code == 2
+    assert "GNU General Public License" in done.stdout
+    assert "--accept-licence" in done.stderr
+    assert not (tmp_path / "pi").exists()
+
+
+def test_a_file_that_is_not_the_known_one_is_refused_and_nothing_written(package, tmp_path):
+    other = tmp_path / "other.whl"
+    with zipfile.ZipFile(other, "w") as archive:
+        for name, content in FILES.items():
+            archive.writestr(name, content + (b" " if "fast" in name else b""))
+    done = invoke("polyisoprene", "--accept-licence", "--from", other, "--out", tmp_path / "pi")
+    assert done.exit_code == 2
+    assert "fast.shear" in done.stderr
+    assert "SHA-256" in done.stderr
+    assert list((tmp_path / "pi").iterdir()) == []
+
+
+@pytest.mark.parametrize("case", ["no_zip", "missing", "twice", "absent"])
+def test_a_package_that_does_not_hold_the_set_is_the_users_mistake(package, tmp_path, case):
+    other = tmp_path / "other.whl"
+    if case == "no_zip":
+        other.write_text("no archive")
+    elif case != "absent":
+        with zipfile.ZipFile(other, "w") as archive:
+            for name, content in list(FILES.items())[: 3 if case == "twice" else 1]:
+                archive.writestr(name, content)
+                if case == "twice":
+                    archive.writestr(f"again/{name}", content)
+    with pytest.raises(InputError):
+        fetch(CATALOGUE["polyisoprene"], other)
+
+
+def test_an_installer_that_fails_says_what_it_said_last(tmp_path, monkeypatch):
+    def pip(command, **options):
+        return subprocess.CompletedProcess(command, 1, "", "first\nERROR: no such package\n")
+
+    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    with pytest.raises(OSError, match=r"no such package.*--from"):
+        download_with_pip("made-up", "1.0", tmp_path)
+    assert invoke("polyisoprene", "--accept-licence", "--out", tmp_path / "pi").exit_code == 1
+
+
+def test_an_unknown_set_is_refused(tmp_path):
+    assert "write polyisoprene" in invoke("nobody", "--out", tmp_path / "x").stderr

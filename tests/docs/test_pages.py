@@ -1,0 +1,151 @@
+"""The pages do what they say: recipes followed literally, links and commands that exist."""
+
+import ast
+import doctest
+import importlib
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import typer.main
+
+import discover.laws
+from discover.cli import app
+from discover.dataset import load_dataset
+from discover.equations import law_terms
+from discover.errors import InputError
+from discover.laws import registry
+from discover.study import read_study
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(page, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.S | re.M)
+
+
+def test_the_page_on_laws_adds_a_law(tmp_path, monkeypatch):
+    (tmp_path / "quickened_maxwell.py").write_text(blocks("docs/adding-a-law.md", "python")[0])
+    monkeypatch.setattr(discover.laws, "__path__", [*discover.laws.__path__, str(tmp_path)])
+    try:
+        found = registry._named_laws()
+        assert set(found) - set(registry.LAWS) == {"quickened_maxwell"}
+        monkeypatch.setitem(registry.LAWS, "quickened_maxwell", found["quickened_maxwell"])
+        (tmp_path / "study.toml").write_text(blocks("docs/adding-a-law.md", "toml")[0])
+        study = read_study(tmp_path / "study.toml")
+        law = registry.make_law(study.data.synthetic.law, study.data.synthetic.parameters)
+        # steady shear: sigma12 = rate/(1 + k rate), sigma11 = 2 rate sigma12/(1 + k rate)
+        rate, slow = 2.0, 1.0 + 0.3 * 2.0
+        steady = jnp.asarray([2 * rate**2 / slow**2, 0.0, 0.0, rate / slow])
+        np.testing.assert_allclose(law.stress_rate(steady, jnp.asarray(rate)), 0.0, atol=1e-12)
+        with pytest.raises(InputError, match="no sum of library terms"):
+            law_terms(law)
+    finally:
+        sys.modules.pop("discover.laws.quickened_maxwell", None)
+
+
+def test_the_page_on_loaders_makes_a_folder_that_loads(tmp_path):
+    script = tmp_path / "load_binary.py"
+    script.write_text(blocks("docs/adding-a-loader.md", "python")[0])
+    time = np.linspace(0.0, 2.0, 30)
+    torque = 1e-4 * (1.0 - np.exp(-time))
+    np.savez(tmp_path / "run1.npz", milliseconds=1e3 * time, rate=np.full(30, 2.0), torque=torque)
+    spec = importlib.util.spec_from_file_location("load_binary", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    findings = module.load([tmp_path / "run1.npz"], tmp_path / "melt")
+    assert not [finding for finding in findings if finding.severity == "error"]
+    run = load_dataset(str(tmp_path / "melt")).runs[0]
+    np.testing.assert_allclose(run.time, time)
+    np.testing.assert_allclose(run.shear_stress[-1], 3 * torque[-1] / (2 * np.pi * 0.0125**3))
+
+
+def test_the_page_on_effects_names_neighbours_that_exist():
+    text = (ROOT / "docs" / "adding-an-effect.md").read_text("utf-8")
+    for name in re.findall(r"`(\w+\.py)`", text):
+        assert list((ROOT / "discover" / "effects").rglob(name)), name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([\w./:-]+)(?:#[\w-]+)?\)", page.read_text("utf-8")):
+        if not target.startswith(("http:", "https:")):
+            assert (page.parent / target).exists(), target
+
+
+def known_options():
+    """The options of every command, by its words."""
+    known = {}
+
+    def walk(command, words):
+        for name, inner in getattr(command, "commands", {}).items():
+            walk(inner, (*words, name))
+        known[words] = {option for p in command.params for option in p.opts}
+
+    walk(typer.main.get_command(app), ())
+    return known
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_and_options_on_the_pages_exist(page):
+    known = known_options()
+    text = re.sub(r"\\\n", " ", page.read_text("utf-8"))
+    lines = re.findall(r"^(?:.*&& )?(?:\.venv/bin/)?discover (\S.*)$", text, re.M)
+    lines += re.findall(r"`discover ([^`\n]+)`", text)
+    for line in lines:
+        words = line.split("#")[0].split()
+        command = tuple(words[: 2 if words[0] == "data" else 1])
+        if not command[0].islower():
+            continue  # a sentence that begins with the name
+        assert command in known, line
+        options = {w.split("=")[0] for w in words if w.startswith("-") and len(w) > 1}
+        assert options <= known[command] | {"--help"}, line
+
+
+def test_a_command_that_does_not_exist_would_be_found():
+    # negative control of the check above
+    assert ("fly",) not in known_options()
+    assert "--wings" not in known_options()[("compare",)]
+
+
+def test_examples_in_docstrings_run():
+    """Every module with an example in a docstring, found by its prompt."""
+    ran = 0
+    for package in ("discover", "tensor_library"):
+        for file in (ROOT / package).rglob("*.py"):
+            if ">>> " in file.read_text("utf-8"):
+                name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+                result = doctest.testmod(importlib.import_module(name))
+                assert result.failed == 0, name
+                ran += result.attempted
+    assert ran >= 5
+
+
+def test_the_citation_file_names_this_version():
+    import discover as package
+
+    text = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {package.__version__}\n" in text
+    assert "\ncff-version: 1.2.0\n" in f"\n{text}"
+    assert "license: MIT" in text
+
+
+@pytest.mark.parametrize("package", ["discover", "tensor_library"])
+def test_packages_say_that_they_are_typed(package):
+    assert (ROOT / package / "py.typed").is_file()
+
+
+def test_a_study_file_of_the_tutorial_is_a_study(tmp_path):
+    for i, text in enumerate(blocks("docs/tutorial.md", "toml")):
+        (tmp_path / f"{i}.toml").write_text(text)
+        read_study(tmp_path / f"{i}.toml")
+
+
+def test_the_batch_script_for_a_cluster_is_python():
+    for text in blocks("docs/batches.md", "python"):
+        ast.parse(text)
