@@ -1,8 +1,10 @@
 """What an effect is: something that a model may lack, with an amplitude that switches it on."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from types import MappingProxyType
+from typing import ClassVar, Literal, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -88,6 +90,14 @@ class AbstractEffect(ABC):
     kind: ClassVar[Kind]
 
 
+class TermShare(NamedTuple):
+    """A library term with the coefficient that an effect gives it."""
+
+    term: str
+    coefficient: float
+    inner: Mapping[str, float] = MappingProxyType({})
+
+
 @dataclass(frozen=True)
 class ConstitutiveEffect(AbstractEffect):
     """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes.
@@ -115,6 +125,15 @@ class ConstitutiveEffect(AbstractEffect):
         """
         del values, rate
         return jnp.zeros_like(stress)
+
+    def as_terms(self, values: Sequence[float]) -> tuple[TermShare, ...] | None:
+        """Return `extra_term` as a sum of library terms, so that the law can be written out.
+
+        None if it is no such sum, which is also what an effect that does not say is taken to be.
+        """
+        del values
+        adds = type(self).extra_term is not ConstitutiveEffect.extra_term
+        return None if adds else ()
 
     def instantaneous_stress(
         self, values: Float[Array, " p"], shear_rate: Float[Array, " n"]

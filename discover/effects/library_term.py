@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.library import build_library
 from tensor_library.terms import CandidateTerm
 
@@ -25,6 +25,10 @@ class LibraryTerm(ConstitutiveEffect):
     def extra_term(self, values, stress, rate):
         """Return c · term."""
         return values[0] * self.term.evaluate(stress, rate)
+
+    def as_terms(self, values):
+        """Return c · term."""
+        return (TermShare(self.name, values[0]),)
 
 
 def library_term(term: CandidateTerm) -> LibraryTerm:

@@ -4,8 +4,8 @@ from functools import singledispatch
 
 import numpy as np
 
-from discover.effects.base import AbstractEffect, ConstitutiveEffect, ModeEffect
-from discover.effects.library_term import LibraryTerm
+from discover.effects.base import ConstitutiveEffect
+from discover.effects.constitutive.finite_extensibility import shares_of_fene_p
 from discover.equations.equation import EquationTerm
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
@@ -95,23 +95,11 @@ def _(law: TensorBasisNetwork):
 
 
 def finitely_extensible_terms(inverse: float) -> tuple[EquationTerm, ...]:
-    """Return the six terms of FENE-P with q = 1/L².
-
-    h = q tr(σ) σ − k [tr(σ·γ̇) − (1 + q tr σ) tr σ](σ + I) with k = q/(1 − 3q), multiplied out; see
-    `discover.laws.FenePeterlin`.
-    """
-    growth = inverse / (1.0 - 3.0 * inverse)
-    return (
-        EquationTerm("tr(sigma)*sigma", inverse + growth),
-        EquationTerm("tr(sigma)^2*sigma", growth * inverse),
-        EquationTerm("tr(sigma.gammadot)*sigma", -growth),
-        EquationTerm("tr(sigma)*I", growth),
-        EquationTerm("tr(sigma)^2*I", growth * inverse),
-        EquationTerm("tr(sigma.gammadot)*I", -growth),
-    )
+    """Return the six terms of FENE-P with q = 1/L²."""
+    return tuple(EquationTerm(*share) for share in shares_of_fene_p(inverse))
 
 
-def effect_terms(effect: AbstractEffect, values: np.ndarray) -> tuple[EquationTerm, ...]:
+def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[EquationTerm, ...]:
     """Return what a constitutive effect adds to h as a sum of terms.
 
     Parameters
@@ -126,35 +114,13 @@ def effect_terms(effect: AbstractEffect, values: np.ndarray) -> tuple[EquationTe
     InputError
         If what it adds is no such sum.
     """
-    first = float(values[0])
-    if isinstance(effect, LibraryTerm):
-        return (EquationTerm(effect.name, first),)
-    if isinstance(effect, ModeEffect) or not _has_extra_term(effect):
-        return ()  # modes and solvents stand beside h
-    if effect.name == "giesekus_mobility":
-        return (EquationTerm("sigma.sigma", first),)
-    if effect.name == "non_affine_motion":
-        return (EquationTerm("sigma.gammadot+gammadot.sigma", 0.5 * first),)
-    if effect.name == "ptt_linear":
-        return (EquationTerm("tr(sigma)*sigma", first),)
-    if effect.name == "ptt_exponential":
-        return (EquationTerm(EXPONENTIAL, 1.0, {"epsilon": first}),)
-    if effect.name == "finite_extensibility":
-        return finitely_extensible_terms(first)
-    if effect.name == "convective_constraint_release":
-        return (
-            EquationTerm("tr(sigma.gammadot)*sigma", first * (1.0 + float(values[1]))),
-            EquationTerm("tr(sigma.gammadot)*I", first),
+    shares = effect.as_terms([float(value) for value in values])
+    if shares is None:
+        raise InputError(
+            f"What the effect {effect.name!r} adds is no sum of library terms, so the law cannot "
+            "be written out. Its equation and parameters are in loop.json and equations.tex."
         )
-    raise InputError(
-        f"What the effect {effect.name!r} adds is no sum of library terms, so the law cannot be "
-        "written out. Its equation and parameters are in loop.json and equations.tex."
-    )
-
-
-def _has_extra_term(effect: AbstractEffect) -> bool:
-    own = getattr(type(effect), "extra_term", ConstitutiveEffect.extra_term)
-    return own is not ConstitutiveEffect.extra_term
+    return tuple(EquationTerm(*share) for share in shares)
 
 
 def combined(terms: tuple[EquationTerm, ...]) -> tuple[EquationTerm, ...]:

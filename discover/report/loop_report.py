@@ -6,6 +6,9 @@ from typing import Any
 
 from discover.closed_loop.loop import ONLY_NOISE
 from discover.closed_loop.result import Fold, LoopResult, Stage
+from discover.equations import law_terms
+from discover.equations.mathml import law_element
+from discover.errors import InputError
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import render
@@ -101,6 +104,7 @@ def write_loop(
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         rankings=[_ranking(ranking) for ranking in result.rankings],
         folds=[_fold(fold) for fold in result.folds],
+        law=_law(result),
         remaining=_flatten(result.remaining),
         pictures=drawn,
         study_text=study_text,
@@ -137,6 +141,16 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "check": stage.check,
         "error": stage.error,
     }
+
+
+def _law(result: LoopResult) -> str:
+    """Return the augmented law typeset; empty where it is no sum of library terms."""
+    if result.fluid is None:
+        return ""
+    try:
+        return law_element(law_terms(result.fluid.law), result.fluid.law.linear_relaxation)
+    except InputError:
+        return ""
 
 
 def _fold(fold: Fold) -> dict[str, Any]:

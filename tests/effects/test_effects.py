@@ -22,6 +22,7 @@ from discover.effects.reference import reference_page
 from discover.errors import InputError
 from discover.laws import LAWS, FenePeterlin
 from tensor_library.algebra import from_shear
+from tensor_library.terms import parse_term
 
 NAMED = list(named_effects().values())
 STRESS = jnp.array([1.3, -0.2, 0.1, 0.7])
@@ -206,3 +207,24 @@ def test_no_library_term_repeats_a_named_effect():
 def test_reference_page_in_docs_is_what_the_dictionary_writes():
     page = Path(__file__).parents[2] / "docs" / "effects.md"
     assert page.read_text(encoding="utf-8") == reference_page()
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [e for e in NAMED if isinstance(e, ConstitutiveEffect)] + [make_effect("tr(sigma)*gammadot")],
+    ids=lambda effect: effect.name,
+)
+def test_an_effect_written_out_in_library_terms_is_what_it_adds(effect):
+    values = [0.17, 0.4][: len(effect.parameters)]
+    shares = effect.as_terms(values)
+    if shares is None:
+        pytest.skip("no sum of library terms")
+    total = jnp.zeros(4)
+    for name, coefficient, inner in shares:
+        term = parse_term(name)
+        chosen = {key: jnp.asarray(value) for key, value in inner.items()}
+        total = total + coefficient * term.evaluate(STRESS, RATE, chosen)
+    # the same sums in another order: rounding only
+    np.testing.assert_allclose(
+        total, effect.extra_term(jnp.array(values), STRESS, RATE), atol=1e-14
+    )

@@ -1,6 +1,6 @@
 """Release of entanglements by the flow."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.algebra import identity_like, inner
 
 
@@ -14,6 +14,14 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
         """Return c tr(σ·γ̇)[(1 + β)σ + I]."""
         release = (1.0 + values[1]) * stress + identity_like(stress)
         return values[0] * inner(stress, rate) * release
+
+    def as_terms(self, values):
+        """Return both parts."""
+        c, beta = values
+        return (
+            TermShare("tr(sigma.gammadot)*sigma", c * (1.0 + beta)),
+            TermShare("tr(sigma.gammadot)*I", c),
+        )
 
 
 EFFECT = ConvectiveConstraintRelease(

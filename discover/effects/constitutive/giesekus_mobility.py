@@ -1,6 +1,6 @@
 """Anisotropic mobility of the chains."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.algebra import square
 
 
@@ -11,6 +11,10 @@ class GiesekusMobility(ConstitutiveEffect):
         """Return α σ·σ."""
         del rate
         return values[0] * square(stress)
+
+    def as_terms(self, values):
+        """Return α σ·σ."""
+        return (TermShare("sigma.sigma", values[0]),)
 
 
 EFFECT = GiesekusMobility(

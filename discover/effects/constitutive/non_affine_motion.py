@@ -1,6 +1,6 @@
 """Slip of the network against the flow."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.algebra import anticommutator
 
 
@@ -10,6 +10,10 @@ class NonAffineMotion(ConstitutiveEffect):
     def extra_term(self, values, stress, rate):
         """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * values[0] * anticommutator(stress, rate)
+
+    def as_terms(self, values):
+        """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
+        return (TermShare("sigma.gammadot+gammadot.sigma", 0.5 * values[0]),)
 
 
 EFFECT = NonAffineMotion(

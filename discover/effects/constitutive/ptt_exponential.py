@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.algebra import trace
 
 
@@ -14,6 +14,10 @@ class ExponentialNetworkLoss(ConstitutiveEffect):
         del rate
         # beyond exp(60) a trial is absurd; the cap keeps it finite, to be rejected for its misfit
         return jnp.expm1(jnp.minimum(values[0] * trace(stress), 60.0)) * stress
+
+    def as_terms(self, values):
+        """Return (exp(ε tr σ) − 1) σ."""
+        return (TermShare("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": values[0]}),)
 
 
 EFFECT = ExponentialNetworkLoss(

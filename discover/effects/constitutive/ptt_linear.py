@@ -1,6 +1,6 @@
 """Loss of network junctions in proportion to their stretch."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
 from tensor_library.algebra import trace
 
 
@@ -11,6 +11,10 @@ class LinearNetworkLoss(ConstitutiveEffect):
         """Return ε tr(σ) σ."""
         del rate
         return values[0] * trace(stress) * stress
+
+    def as_terms(self, values):
+        """Return ε tr(σ) σ."""
+        return (TermShare("tr(sigma)*sigma", values[0]),)
 
 
 EFFECT = LinearNetworkLoss(
