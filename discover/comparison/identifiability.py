@@ -30,6 +30,7 @@ from discover.protocols.shear import stack_protocols
 from discover.simulate.grid import make_grids
 from discover.study.build import DeclaredModel
 from tensor_library.library import TermLibrary, build_library
+from tensor_library.terms import parse_term
 
 EXACT = 1e-5
 """Relative difference of σ12 below which two laws count as one: integration error, generously."""
@@ -123,10 +124,12 @@ def find_rivals(
     flows
         Training flows, which the rivals have to fit, and tests, which may separate them.
     library
-        Terms among which twins are sought; by default the basis with up to one invariant.
+        Terms that the search had. Twins are sought beyond them too, in the basis with up to one
+        invariant: the fluid need not keep to the library that somebody chose.
     """
     chosen = law_terms(terms)
-    library = build_library(degree=1) if library is None else library
+    searched = () if library is None else library.terms
+    library = TermLibrary(tuple(dict.fromkeys([*searched, *build_library(degree=1).terms])))
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
     reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
@@ -134,7 +137,8 @@ def find_rivals(
     for twin in find_twins(library, chosen, model.law):
         if not _concerns_shear(twin, len(chosen.coefficients)):
             continue
-        rival = _judge(_rival_of(twin), reference, model, seen, unseen)
+        beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
+        rival = _judge(_rival_of(twin, beyond if searched else []), reference, model, seen, unseen)
         if rival is not None and (rival.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
             candidates.setdefault(frozenset(twin.law.coefficients), rival)
     for row in met:
@@ -162,12 +166,15 @@ def _concerns_shear(twin: Twin, size: int) -> bool:
     return no_larger or max(twin.difference.N1, twin.difference.N2) > EXACT
 
 
-def _rival_of(twin: Twin) -> Rival:
+def _rival_of(twin: Twin, beyond: Sequence[str]) -> Rival:
     place = None
     if twin.separated_by:
         best = max(twin.separated_by, key=lambda s: s.difference)
         place = {"protocol": best.flow, "quantity": best.quantity}
-    return Rival(twin.law.coefficients, twin.law.inner, twin.text, separated_by=place)
+    reason = twin.text
+    if beyond:
+        reason += f" (The library that was searched does not hold {', '.join(beyond)}.)"
+    return Rival(twin.law.coefficients, twin.law.inner, reason, separated_by=place)
 
 
 def _simulate(terms, inner, model: DeclaredModel, flows) -> dict[str, Stresses | None]:

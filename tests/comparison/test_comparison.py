@@ -17,6 +17,7 @@ from discover.laws.expansion import law_of_terms
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.study import RunFolder, parse_study
 from discover.study.build import declared_model, load_study_data
+from tensor_library.library import build_library
 
 
 def fake_study(**compare_options):
@@ -133,8 +134,10 @@ def slip_case():
 def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     model, flows = slip_case
     chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
-    rivals = find_rivals(chosen, [], model, flows)
+    # even where the library that was searched does not hold the twin
+    rivals = find_rivals(chosen, [], model, flows, build_library(degree=0))
     twin = next(r for r in rivals if set(r.terms) == {"tr(sigma)*gammadot"})
+    assert "does not hold tr(sigma)*gammadot" in twin.reason
     assert twin.terms["tr(sigma)*gammadot"] == pytest.approx(0.32)  # ξ(1 − ξ/2) at ξ = 0.4
     assert twin.errors_to_chosen["sigma12"] < 1e-6
     assert twin.errors_to_chosen["N1"] < 1e-6
