@@ -7,14 +7,15 @@ from pathlib import Path
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """Let JAX keep what it compiled, so that a second start does not compile again.
 
-    Called by the command line and by the tests' ``conftest``; importing the library alone changes
+    Called by every command and by the tests' ``conftest``; importing the library alone changes
     no global setting.
 
     Parameters
     ----------
     folder
-        Where to keep it; by default ``discover/compiled`` in the user's cache folder. Set
-        ``DISCOVER_NO_CACHE`` to any value to keep nothing.
+        Where to keep it; by default the folder that JAX was told to use, or else
+        ``discover/compiled`` in the user's cache folder. Set ``DISCOVER_NO_CACHE`` to any value to
+        keep nothing.
 
     Returns
     -------
@@ -24,6 +25,8 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
 
     if os.environ.get("DISCOVER_NO_CACHE"):
         return None
+    if folder is None and (chosen := jax.config.jax_compilation_cache_dir):
+        return Path(chosen)  # by the user, or by an earlier call
     if folder is None:
         root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(root) / "discover" / "compiled"

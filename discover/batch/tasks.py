@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -57,6 +58,7 @@ def run_compare(
         If the study, its data or the folder is wrong.
     """
     enable_x64()
+    enable_compilation_cache()
     study = read_study(path)
     folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "comparison.json"
@@ -83,6 +85,7 @@ def run_close_loop(
     Parameters and errors as in `run_compare`; a seed only changes synthetic noise.
     """
     enable_x64()
+    enable_compilation_cache()
     study = read_study(path)
     folder = RunFolder(out, fingerprint(study, "close-loop", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "loop.json"

@@ -41,9 +41,11 @@ def distil(
     """Teach one law to another by shear stress alone; without options, the paper's pairs."""
     if (teacher is None) != (student is None):
         raise InputError("Give --teacher and --student together, or neither for the paper's pairs.")
+    from discover.compilation_cache import enable_compilation_cache
     from discover.precision import enable_x64
 
     enable_x64()
+    enable_compilation_cache()
     from discover.laws.registry import make_law
     from discover.learners.distillation import distil as teach
 

@@ -1,6 +1,7 @@
 """The command line: exit codes, one clear message, resuming, JSON."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -255,3 +256,15 @@ def test_a_batch_refuses_two_studies_for_one_folder(tmp_path):
     (tmp_path / "a.toml").write_text(STUDY)
     twice = (tmp_path / "a.toml", tmp_path / "a.toml")
     assert invoke("batch", *twice, "--out", tmp_path / "b").exit_code == 2
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_commands_keep_compiled_programs_in_the_users_cache_unless_told_not_to(tmp_path, kept):
+    code = "from discover.cli import main; main()"
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+    environment |= {} if kept else {"DISCOVER_NO_CACHE": "1"}
+    command = [sys.executable, "-c", code, "compare", str(tmp_path / "none.toml"), "--out", "x"]
+    done = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, timeout=120)
+    assert done.returncode == 2  # no such study; the cache is made ready before it is read
+    assert (tmp_path / "cache" / "discover" / "compiled").is_dir() == kept
