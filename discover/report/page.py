@@ -6,7 +6,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from discover import __version__
-from discover.report.wording import interval, percent, significant
+from discover.report.wording import interval, percent, significant, spoken
 
 
 def render(template: str, **content: Any) -> str:
@@ -29,6 +29,10 @@ def render(template: str, **content: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters.update(
-        percent=percent, significant=significant, interval=interval, safe_svg=Markup
+        percent=percent,
+        significant=significant,
+        interval=interval,
+        spoken=spoken,
+        safe_svg=Markup,
     )
     return environment.get_template(template).render(version=__version__, **content)

@@ -1,5 +1,6 @@
 """Numbers and conclusions in words."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from discover.comparison.comparison import Comparison
@@ -26,10 +27,22 @@ def significant(value: float | None, digits: int = 4) -> str:
     return "0" if abs(value) < 1e-12 else f"{value:.{digits}g}".replace("-", "−")
 
 
+_LETTERS = (
+    ("gammadot", "γ̇"),
+    ("sigma", "σ"),
+    ("epsilon", "ε"),
+    ("kappa", "κ"),
+    ("*", " "),
+)
+
+
 def spoken(term: str) -> str:
-    """Return the canonical spelling of a term with the field's letters."""
-    text = term.replace("gammadot", "γ̇").replace("sigma", "σ").replace("epsilon", "ε")
-    return text.replace("kappa", "κ").replace(".", "·").replace("*", " ")
+    """Return a term in canonical spelling, or words with such terms, with the field's letters."""
+    # a full stop between tensors is a product; elsewhere it ends a sentence or is a decimal point
+    text = re.sub(r"(?<=sigma|madot)\.(?=sigma|gammadot)", "·", term)
+    for spelled, letter in _LETTERS:
+        text = text.replace(spelled, letter)
+    return text
 
 
 def interval(bounds: Sequence[float] | None) -> str:

@@ -33,6 +33,7 @@ from discover.report.wording import (
     percent,
     selection_sentence,
     significant,
+    spoken,
 )
 from discover.study import RunFolder, parse_study
 from tensor_library.library import build_library
@@ -289,3 +290,8 @@ def test_a_loop_shows_itself_as_tables():
     assert result.ranking_table(1)["score"].tolist() == [0.9]
     assert "stress_gain" in result._repr_html_()
     assert "effects_added" in replace(result, stages=())._repr_html_()
+
+
+def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
+    said = spoken("0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.")
+    assert said == "0.5 tr(σ·γ̇) I + σ·σ, whatever the law."
