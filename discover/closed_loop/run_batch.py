@@ -14,7 +14,9 @@ from discover.simulate.grid import COARSEST_STRAIN, make_grid
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)
 
-_GROWTH = 0.05
+# Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
+# a run is steady. Shorter ones keep the accuracy of small steps throughout
+_LONG, _GROWTH = 2000, 0.05
 
 PRE_SHEAR_LENGTH = 2.0
 """A steady flow before a run is computed over this multiple of the run's length."""
@@ -74,7 +76,9 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
         early = gap * _EARLY_STEPS
         anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
-        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
+        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
+        if len(grid) > max(_LONG, 2 * len(anchors)):
+            grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
         grid = np.concatenate([_pre_shear(run), grid])
         grids.append((grid, np.searchsorted(grid, run.time)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
