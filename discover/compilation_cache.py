@@ -25,7 +25,8 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
 
     if os.environ.get("DISCOVER_NO_CACHE"):
         return None
-    if folder is None and (chosen := jax.config.jax_compilation_cache_dir):
+    chosen = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+    if folder is None and chosen:
         return Path(chosen)  # by the user, or by an earlier call
     if folder is None:
         root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
