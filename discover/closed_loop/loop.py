@@ -18,7 +18,7 @@ from discover.closed_loop.before_after import (
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.residual import STRUCTURE, Expectation, summarise
-from discover.closed_loop.result import LoopResult, Stage, StageParameter, Verdict
+from discover.closed_loop.result import ErrorPair, LoopResult, Stage, StageParameter, Verdict
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
@@ -48,6 +48,11 @@ them say little more of a law."""
 
 ONLY_NOISE = 0.9
 """A model that misses a record by more of it than this says nothing of it."""
+
+CARRIED = 3.0
+"""A model that misses the held-out runs by more than so many times what it misses the fitted ones
+does not carry over to them. The fitted error is an optimistic guess of the other, by the freedom of
+a few constants; three times leaves room for that, and for flows that weigh them otherwise."""
 
 FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
@@ -146,7 +151,8 @@ def run_loop(
     weight = np.asarray(batch.weight)
     floor = expectation.floor(current.residual, weight)
     expected = expectation.size(current.residual, weight)
-    structured = not expectation.explains(current.residual, weight)
+    carries_over = after.held_out is None or after.held_out <= CARRIED * max(after.fit, expected)
+    structured = not (expectation.explains(current.residual, weight) and carries_over)
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if stages and not structured:
         verdict = "effects_added"
@@ -166,7 +172,7 @@ def run_loop(
             "worst_run": worst.name,
             "worst_run_error": float(worst.errors[-1]),
             "description": _describe(
-                after.fit, expected, structured, declared.linear_error > 0.0, worst
+                after, expected, structured, carries_over, declared.linear_error > 0.0, worst
             ),
         },
         rankings=tuple(search.rankings),
@@ -338,13 +344,23 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | No
     )
 
 
-def _describe(error: float, expected: float, structured: bool, linear: bool, worst) -> str:
+def _describe(
+    after: ErrorPair, expected: float, structured: bool, carries_over: bool, linear: bool, worst
+) -> str:
+    error = after.fit
     causes = "noise and the error of the linear data explain" if linear else "noise explains"
     missed, explained = f"The fitted runs are missed by {_percent(error)}", _percent(expected)
     if not structured and error > ONLY_NOISE:
         return f"{missed}, and {causes} that: the records hold hardly anything else."
     if not structured:
         return f"{missed}, as {causes} ({explained})."
+    if not carries_over:
+        assert after.held_out is not None  # without held-out runs nothing has to carry over
+        return (
+            f"{missed} ({explained} of it is what {causes}), but the runs held out by "
+            f"{_percent(after.held_out)}: what was found does not carry over to them, most of all "
+            f"not to {worst.name}. Some effect is still missing, or has another form."
+        )
     if error > STRUCTURE * expected:
         return (
             f"{missed}, more than {causes} ({explained}); the worst run is {worst.name}. Some "

@@ -145,6 +145,9 @@ def test_held_out_stresses_do_not_enter_the_fit(planted_mobility):
     other = loop(ShearDataset("made", (*dataset.runs[:3], changed)))
     assert other.stages[0].parameters == planted_mobility.stages[0].parameters
     assert other.error_after.held_out > 10 * planted_mobility.error_after.held_out
+    # but they judge: what does not carry over to them is not explained
+    assert (planted_mobility.verdict, other.verdict) == ("effects_added", "unexplained")
+    assert "does not carry over" in other.remaining["description"]
 
 
 @pytest.mark.parametrize(
