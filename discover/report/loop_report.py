@@ -136,7 +136,7 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
             {"name": name, "value": p.value, "ci95": p.ci95, "unit": p.unit}
             for name, p in stage.parameters.items()
         ],
-        "aliases": ", ".join(stage.aliases),
+        "aliases": ", ".join(map(spoken, stage.aliases)),
         "source": stage.source,
         "check": stage.check,
         "error": stage.error,
@@ -165,13 +165,13 @@ def _fold(fold: Fold) -> dict[str, Any]:
 def _ranking(ranking, shown: int = 12) -> list[dict[str, Any]]:
     return [
         {
-            "effect": c.effect,
+            "effect": spoken(c.effect),
             "kind": _KINDS[c.kind],
             "score": c.score,
             "reduction": c.reduction,
             "error": c.error,
             "left_out_error": c.left_out_error,
-            "aliases": ", ".join(c.aliases),
+            "aliases": ", ".join(map(spoken, c.aliases)),
         }
         for c in ranking[:shown]
     ]

@@ -15,7 +15,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import percent
+from discover.report.wording import percent, spoken
 
 _FIT, _HELD = NETWORK, SPARSE
 
@@ -113,7 +113,7 @@ def residual_picture(result: LoopResult) -> Picture:
 
 def waterfall_picture(result: LoopResult) -> Picture:
     """Return the errors after each stage."""
-    labels = ["declared", *(f"+ {stage.effect}" for stage in result.stages)]
+    labels = ["declared", *(f"+ {spoken(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
@@ -131,6 +131,8 @@ def waterfall_picture(result: LoopResult) -> Picture:
         heights = [100.0 * value for _, _, values, _ in series for value in values]
         panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
         panel.set_xticks(positions, labels)
+        if len(labels) > 4:  # long names side by side would run into one another
+            panel.tick_params(axis="x", labelsize=8, labelrotation=15)
         panel.set_ylabel("relative error (%)")
         legend_above(drawing, axes)
         return picture(
@@ -146,12 +148,16 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
     rankings = [ranking for ranking in result.rankings if ranking]
     if not rankings:
         return None
-    with figure(1, len(rankings), width=10.0, height=3.0) as (drawing, axes):
-        for number, (panel, ranking) in enumerate(zip(axes[0], rankings, strict=True)):
+    columns = min(3, len(rankings))
+    rows = -(-len(rankings) // columns)
+    with figure(rows, columns, width=10.0, height=3.0) as (drawing, axes):
+        for panel in axes.ravel()[len(rankings) :]:
+            panel.set_visible(False)
+        for number, (panel, ranking) in enumerate(zip(axes.ravel(), rankings, strict=False)):
             best = ranking[:shown][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(
-                [c.effect for c in best],
+                [spoken(c.effect) for c in best],
                 [100.0 * max(c.reduction, 0.0) for c in best],
                 color=[GREEN if c.effect == chosen else BEFORE for c in best],
             )
@@ -164,7 +170,8 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
             "ranking",
             "What each candidate, tried alone, would remove of the squared residual of the fitted "
             "runs; in green the one that was added. It is chosen by evidence and by runs left out, "
-            "so it need not be the longest bar.",
+            "so it need not be the longest bar; at the end the effects are examined again, and "
+            "another may take the place of one.",
         )
 
 
