@@ -87,6 +87,10 @@ class TermLibrary:
         """Return the library of some of the terms, in the order given."""
         return TermLibrary(tuple(self.terms[int(i)] for i in indices))
 
+    def extended(self, terms: Iterable[CandidateTerm]) -> "TermLibrary":
+        """Return the library with further terms behind its own, each once."""
+        return TermLibrary(tuple(dict.fromkeys([*self.terms, *terms])))
+
     @cached_property
     def _layout(self):
         """Index arrays that turn many small products into a few gathers.

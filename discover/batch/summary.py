@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 
-from discover.batch.rows import StudyRow, read_row, results_table
+from discover.batch.rows import StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
 from discover.study.atomic import write_text
 
@@ -44,8 +44,8 @@ class Summary:
 
         result = BatchResult(tuple(self._statuses), self.out / "index.html", tuple(self._rows))
         write_text(self.out / "batch.json", json.dumps(result.to_json(), indent=2) + "\n")
-        table = results_table([s.name for s in self._statuses], self._rows)
-        write_text(self.out / "table.csv", table.to_csv(index=False, lineterminator="\n"))
+        table = result.table().to_csv(index=False, lineterminator="\n")
+        write_text(self.out / "table.csv", table)
         write_text(result.index, batch_page(result.studies, result.rows))
         self._written = perf_counter()
         return result

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from discover.comparison.flows import QUANTITIES, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, EquationTerm, Tested, combined, law_terms
@@ -70,10 +68,7 @@ def outcome_equation(
 
 
 def _numbers(flow: Flow, time: float) -> tuple[float, float]:
-    amplitudes = np.abs(np.asarray(flow.protocol.amplitudes))
-    frequencies = np.asarray(flow.protocol.frequencies)[amplitudes > 0]
-    known = float(np.max(frequencies)) if frequencies.size else None
-    return flow_numbers(flow.times, flow.shear_rate, time, known)
+    return flow_numbers(flow.times, flow.shear_rate, time, flow.frequency)
 
 
 def _worst(outcome: LearnerOutcome, judged: Sequence[Flow]) -> dict[str, float]:

@@ -75,6 +75,13 @@ class Flow:
         return self.name if self.kind == "test" else f"{self.kind}/{self.name}"
 
     @property
+    def frequency(self) -> float | None:
+        """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
+        amplitudes = np.asarray(self.protocol.amplitudes)
+        frequencies = np.abs(np.asarray(self.protocol.frequencies)[amplitudes != 0.0])
+        return float(np.max(frequencies)) if frequencies.size else None
+
+    @property
     def title(self) -> str:
         """The flow in the field's notation."""
         amplitudes = np.asarray(self.protocol.amplitudes)

@@ -129,7 +129,8 @@ def find_rivals(
     """
     chosen = law_terms(terms)
     searched = () if library is None else library.terms
-    library = TermLibrary(tuple(dict.fromkeys([*searched, *build_library(degree=1).terms])))
+    basis = build_library(degree=1)
+    library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
     reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
@@ -346,10 +347,8 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
 def _frequency(flow: Flow) -> float:
     """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
-    amplitudes = np.asarray(flow.protocol.amplitudes)
-    frequencies = np.asarray(flow.protocol.frequencies)[amplitudes != 0.0]
     whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
-    return float(max(whole, *np.abs(frequencies))) if frequencies.size else whole
+    return max(whole, flow.frequency or 0.0)
 
 
 def _thinned(times: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ def total_strain(run: ShearRun) -> float:
     size = np.abs(run.shear_rate)
     # before its first sample a run flows at the rate of that sample
     early = float(size[0] * run.time[0])
-    return early + float(np.sum(0.5 * (size[1:] + size[:-1]) * np.diff(run.time)))
+    return early + float(np.trapezoid(size, run.time))
 
 
 def in_sequence(

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.integrate import cumulative_trapezoid
 
 from discover.dataset.run import ShearRun
 from discover.protocols.shear import measured_rate
@@ -13,6 +14,7 @@ MOST_SAMPLES = 20_000
 
 
 _FOLLOWED = 1e-3
+"""Error of the strain, over its range, up to which the samples kept follow the rate."""
 
 
 def thin(
@@ -56,7 +58,7 @@ def thin(
         f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half "
         "evenly in time, and the extremes of stress and rate"
     )
-    if lost > 1e-3:
+    if lost > _FOLLOWED:
         note += (
             f"; the strain between them is then off by {100 * lost:.2g} % of its range, so the "
             "rate varies faster than the samples kept: give a shorter record"
@@ -96,7 +98,6 @@ def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float:
     """Return the largest error of the integrated rate at the samples kept, over its range."""
-    whole = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))])
-    t, r = time[keep], rate[keep]
-    part = np.concatenate([[0.0], np.cumsum(0.5 * (r[1:] + r[:-1]) * np.diff(t))])
+    whole = cumulative_trapezoid(rate, time, initial=0.0)
+    part = cumulative_trapezoid(rate[keep], time[keep], initial=0.0)
     return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from discover.equations.equation import Equation, TermLike
 from tensor_library.terms import parse_term
 
-_PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
+PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
 % The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
 """
+"""First lines of a file with laws."""
 
 
 def latex_number(value: float, digits: int = 5) -> str:
@@ -48,7 +49,7 @@ def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 
 
 def equation_latex(equation: Equation, digits: int = 9) -> str:
     """Return an equation with its modes, solvent and tested box as a piece of a LaTeX document."""
-    lines = [_PREAMBLE + "".join(f"% {line}\n" for line in header_lines(equation))]
+    lines = [PREAMBLE + "".join(f"% {line}\n" for line in header_lines(equation))]
     law = law_latex(equation.terms, equation.linear_relaxation, digits)
     lines.append(f"\\begin{{equation}}\n  {law}\n\\end{{equation}}\n")
     lines.append("% modes: modulus in Pa, relaxation time in s\n\\begin{align}")

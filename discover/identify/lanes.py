@@ -52,7 +52,7 @@ def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary
         terms = [parse_term(name) for name in names]
     except ValueError as error:
         raise InputError(str(error)) from error
-    return TermLibrary(tuple(dict.fromkeys([*library.terms, *terms])))
+    return library.extended(terms)
 
 
 def dense(library: TermLibrary, law: LawTerms) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from discover.identify.lanes import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.protocols.shear import ShearProtocol, stack_protocols
@@ -57,16 +58,8 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
     """
     names = sorted({name for c in contenders for name in c.terms}) or ["sigma"]
     library = TermLibrary(tuple(parse_term(name) for name in names))
-    coefficients = np.array([[c.terms.get(n, 0.0) for n in names] for c in contenders])
-    inner = np.array(
-        [
-            [
-                c.inner.get(n, default)
-                for n, default in zip(library.inner_names, library.inner_default, strict=True)
-            ]
-            for c in contenders
-        ]
-    ).reshape(len(contenders), len(library.inner_names))
+    rows = [dense(library, LawTerms(c.terms, c.inner)) for c in contenders]
+    coefficients, inner = (np.stack(part) for part in zip(*rows, strict=True))
 
     def make(coefficients, inner):
         law = LibraryExpansion(

@@ -1,17 +1,13 @@
 """Learned laws as a LaTeX file."""
 
 from discover.comparison.comparison import Comparison
-from discover.equations.latex import law_latex
+from discover.equations.latex import PREAMBLE, law_latex
 from discover.report.plots.style import LEARNER_TITLES
-
-_HEADER = r"""% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
-% The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
-"""
 
 
 def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     """Return ``equations.tex``: the law that each learner found."""
-    parts = [_HEADER]
+    parts = [PREAMBLE]
     for name, outcome in comparison.outcomes.items():
         equation = law_latex(outcome.terms, linear_relaxation)
         parts.append(

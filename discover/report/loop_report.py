@@ -6,7 +6,6 @@ from typing import Any
 
 from discover.closed_loop.loop import ONLY_NOISE
 from discover.closed_loop.result import Fold, LoopResult, Stage
-from discover.equations import law_terms
 from discover.equations.mathml import law_element
 from discover.errors import InputError
 from discover.report.comparison_report import safe_name
@@ -145,12 +144,11 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
 
 def _law(result: LoopResult) -> str:
     """Return the augmented law typeset; empty where it is no sum of library terms."""
-    if result.fluid is None:
-        return ""
     try:
-        return law_element(law_terms(result.fluid.law), result.fluid.law.linear_relaxation)
+        equation = result.equation()
     except InputError:
         return ""
+    return law_element(equation.terms, equation.linear_relaxation)
 
 
 def _fold(fold: Fold) -> dict[str, Any]:

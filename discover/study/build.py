@@ -162,8 +162,6 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
             )
         spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, model.sweep_rad_s))
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
-        # another loading, or an aged sample: one factor on all moduli, or on all times
-        free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     else:
         start = _linear_start(dataset)
         modulus, relaxation_time = (
@@ -173,7 +171,8 @@ def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
                 ("relaxation_time_s", model.relaxation_time_s),
             )
         )
-        free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
+    # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
+    free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     return DeclaredModel(
         law,
         name,
