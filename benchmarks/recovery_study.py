@@ -82,23 +82,30 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("recovery.jsonl"))
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--ptt-seeds", type=int, default=10)
+    parser.add_argument("--part", default="1/1", help="this share of the fits: 1/2, then 2/2")
     options = parser.parse_args()
     enable_x64()
     enable_compilation_cache()
-    done = {}
-    if options.out.exists():
-        for line in options.out.read_text("utf-8").splitlines():
-            row = json.loads(line)
-            done[row["key"]] = row
+    done = read(options.out)
     wanted = [(json.dumps(case), case) for case in cases(options.seeds, options.ptt_seeds)]
+    part, parts = (int(text) for text in options.part.split("/"))
     for i, (key, case) in enumerate(wanted):
-        if key not in done:
+        if key not in done and i % parts == part - 1:
             done[key] = {"key": key, **fit(*case)}
             with options.out.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(done[key]) + "\n")
             print(f"{i + 1}/{len(wanted)} {key} {done[key]['terms']}", flush=True)
+    done = read(options.out)
     for study in ("laws", "ptt"):
-        table(study, [(case, done[key]) for key, case in wanted if case[0] == study])
+        rows = [(case, done[key]) for key, case in wanted if case[0] == study and key in done]
+        if rows:
+            table(study, rows)
+
+
+def read(path: Path) -> dict[str, dict]:
+    """Return the fits that are done, by case."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    return {row["key"]: row for row in map(json.loads, lines)}
 
 
 def table(study: str, rows: list) -> None:

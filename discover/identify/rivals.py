@@ -20,15 +20,15 @@ import numpy as np
 from discover.identify.evidence import LEVEL, Evidence, compare_residuals
 from discover.identify.lanes import LawTerms
 from discover.identify.relations import spell
-from discover.learners.tensor_sindy.refit import LANES, POLISHING, Fit, refit
-from discover.learners.tensor_sindy.search import SupportSearch
+from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
+from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
 
 MOST_RIVALS = 8
 
 _PROMISING = 1.25
 """A screened misfit over the chosen one's beyond which a polished refit is not tried."""
 
-_MOST_POLISHED = 2 * LANES
+_MOST_POLISHED = 2 * BREADTH
 
 
 @dataclass(frozen=True)

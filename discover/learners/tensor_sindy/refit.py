@@ -1,6 +1,8 @@
 """Refit of given supports without penalty: nonlinear least squares on integrated trajectories."""
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,8 +16,9 @@ from jaxtyping import Array, Bool, Float
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.sensitivities import observe
 
-LANES = 8
-"""Supports refitted side by side: one compiled program serves any number of batches."""
+# One support to a program, and programs side by side in threads: a batch of supports by `vmap`
+# would take as many steps as its slowest member, and was measured to cost four times as much.
+_WORKERS = min(os.cpu_count() or 1, 4)
 
 _MAX_STEPS = 40
 SCREENING = 1e-3
@@ -60,7 +63,7 @@ class Fit:
         return full
 
 
-class _Lane(eqx.Module):
+class _Layout(eqx.Module):
     """One support, laid out with as many slots as the largest one."""
 
     active: Array  # (q,)
@@ -86,13 +89,13 @@ def free_from_inner(problem: TrajectoryProblem, inner: Float[np.ndarray, " m"]) 
     return np.log(fraction / (1.0 - fraction))
 
 
-def _residual_and_jacobian(parameters, problem: TrajectoryProblem, lane: _Lane):
-    q = lane.active.shape[0]
+def _residual_and_jacobian(parameters, problem: TrajectoryProblem, layout: _Layout):
+    q = layout.active.shape[0]
     scaled, free = parameters[:q], parameters[q:]
     inner, slope = jax.jvp(lambda u: inner_from_free(problem, u), (free,), (jnp.ones_like(free),))
-    scale = jnp.where(lane.occupied, lane.scale, 0.0)
-    predicted, sensitivity = observe(problem, lane.active, scale * scaled, inner)
-    weight = _AMPLIFICATION * jnp.where(lane.keep[..., None], problem.weight, 0.0)
+    scale = jnp.where(layout.occupied, layout.scale, 0.0)
+    predicted, sensitivity = observe(problem, layout.active, scale * scaled, inner)
+    weight = _AMPLIFICATION * jnp.where(layout.keep[..., None], problem.weight, 0.0)
     seen = weight > 0
     residual = jnp.where(seen, weight * (predicted - problem.target), 0.0)
     columns = sensitivity * jnp.concatenate([scale, slope])
@@ -108,8 +111,8 @@ def _residual_and_jacobian(parameters, problem: TrajectoryProblem, lane: _Lane):
 
 
 @eqx.filter_custom_jvp
-def _residual(parameters, problem, lane):
-    residual, _, everywhere = _residual_and_jacobian(parameters, problem, lane)
+def _residual(parameters, problem, layout):
+    residual, _, everywhere = _residual_and_jacobian(parameters, problem, layout)
     return residual, everywhere
 
 
@@ -121,29 +124,24 @@ def _residual_jvp(primals, tangents):
 
 
 @eqx.filter_jit
-def _refit_lanes(
+def _descend(
     problem: TrajectoryProblem,
-    lanes: _Lane,
-    start: Float[Array, "lanes parameters"],
+    layout: _Layout,
+    start: Float[Array, " parameters"],
     tolerance: Float[Array, ""],
 ):
     # a traced tolerance, so that screening and polishing share one program
     traced: Any = tolerance
-    solver = optx.LevenbergMarquardt(rtol=traced, atol=traced)
-
-    def one(lane, parameters):
-        solution = optx.least_squares(
-            lambda p, args: _residual(p, *args),
-            solver,
-            parameters,
-            args=(problem, lane),
-            has_aux=True,
-            max_steps=_MAX_STEPS,
-            throw=False,
-        )
-        return solution.value, solution.aux
-
-    return jax.vmap(one)(lanes, start)
+    solution = optx.least_squares(
+        lambda parameters, args: _residual(parameters, *args),
+        optx.LevenbergMarquardt(rtol=traced, atol=traced),
+        start,
+        args=(problem, layout),
+        has_aux=True,
+        max_steps=_MAX_STEPS,
+        throw=False,
+    )
+    return solution.value, solution.aux
 
 
 def refit(
@@ -179,47 +177,44 @@ def refit(
     One `Fit` each. A support whose start has no finite trajectory comes back with a misfit of
     about 1000, which no search accepts.
     """
-    fits: list[Fit] = []
     target = np.asarray(problem.weight * problem.target).reshape(-1)
-    everything = np.ones(problem.target.shape[:2], dtype=bool)
+    observed = np.asarray(problem.weight).reshape(-1) > 0
     n_inner = len(problem.library.inner_names)
-    for first in range(0, len(supports), LANES):
-        batch = range(first, min(first + LANES, len(supports)))
-        active = np.zeros((LANES, slots), dtype=int)
-        occupied = np.zeros((LANES, slots), dtype=bool)
-        keep = np.stack([everything] * LANES)
-        start = np.zeros((LANES, slots + n_inner))
-        for lane, i in enumerate(batch):
-            support = list(supports[i])
-            if len(support) > slots:
-                raise ValueError(f"A support of {len(support)} terms does not fit {slots} slots.")
-            coefficients, inner = starts[i]
-            active[lane, : len(support)] = support
-            occupied[lane, : len(support)] = True
-            start[lane, : len(support)] = coefficients[support] / scale[support]
-            start[lane, slots:] = free_from_inner(problem, inner)
-            if keeps is not None:
-                keep[lane] = keeps[i]
-        lanes = _Lane(*(jnp.asarray(a) for a in (active, occupied, scale[active], keep)))
-        parameters, predicted = _refit_lanes(
-            problem, lanes, jnp.asarray(start), jnp.asarray(tolerance)
+
+    def one(support, begin, keep) -> Fit:
+        places, count = list(support), len(support)
+        if count > slots:
+            raise ValueError(f"A support of {count} terms does not fit {slots} slots.")
+        coefficients, inner = begin
+        active = np.zeros(slots, dtype=int)
+        start = np.zeros(slots + n_inner)
+        active[:count] = places
+        start[:count] = coefficients[places] / scale[places]
+        start[slots:] = free_from_inner(problem, inner)
+        layout = _Layout(
+            *(jnp.asarray(a) for a in (active, np.arange(slots) < count, scale[active], keep))
+        )
+        parameters, predicted = _descend(
+            problem, layout, jnp.asarray(start), jnp.asarray(tolerance)
         )
         parameters, predicted = np.asarray(parameters), np.asarray(predicted)
-        residual = predicted - target
-        for lane, i in enumerate(batch):
-            support = list(supports[i])
-            coefficients = parameters[lane, : len(support)] * scale[support]
-            inner = np.asarray(inner_from_free(problem, jnp.asarray(parameters[lane, slots:])))
-            rows = np.repeat(keep[lane].reshape(-1), problem.target.shape[2])
-            share = np.sum((np.asarray(problem.weight).reshape(-1) > 0) & rows)
-            kept = float(np.sum(residual[lane][rows] ** 2)) * problem.n_observations / max(share, 1)
-            fits.append(
-                Fit(
-                    tuple(int(j) for j in support),
-                    coefficients,
-                    inner,
-                    float(np.sqrt(kept)),
-                    predicted[lane],
-                )
-            )
-    return fits
+        rows = np.repeat(keep.reshape(-1), problem.target.shape[2])
+        kept = np.sum((predicted - target)[rows] ** 2)
+        share = problem.n_observations / max(np.sum(observed & rows), 1)
+        return Fit(
+            tuple(int(i) for i in support),
+            parameters[:count] * scale[places],
+            np.asarray(inner_from_free(problem, jnp.asarray(parameters[slots:]))),
+            float(np.sqrt(kept * share)),
+            predicted,
+        )
+
+    everything = np.ones(problem.target.shape[:2], dtype=bool)
+    keeps = [everything] * len(supports) if keeps is None else keeps
+    jobs = list(zip(supports, starts, keeps, strict=True))
+    if not jobs:
+        return []
+    # the first alone, so that the program is compiled once
+    fits = [one(*jobs[0])]
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return fits + list(pool.map(lambda job: one(*job), jobs[1:]))

@@ -15,11 +15,14 @@ from discover.learners.tensor_sindy.linear_model import (
 )
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
-from discover.learners.tensor_sindy.refit import LANES, POLISHING, SCREENING, Fit, refit
+from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
 from discover.learners.tensor_sindy.selection import extended_bic
 
 _HORIZONS = (0.2, 0.5)
 _ROUNDS = 3
+BREADTH = 8
+"""Supports refitted in one move of the search."""
+
 _FEWEST_SLOTS = 5
 
 
@@ -121,10 +124,11 @@ class SupportSearch:
             if size > 1:
                 self._rescale(self.model_at(self.of_size(size - 1)[0]))
             parents = self.of_size(size - 1)[:2]
-            self._try(size, parents, seeds.get(size, {}), limit=2 * LANES if size == 1 else LANES)
+            breadth = 2 * BREADTH if size == 1 else BREADTH
+            self._try(size, parents, seeds.get(size, {}), limit=breadth)
             for _ in range(_ROUNDS):
                 before = self.of_size(size)[0].support
-                if not self._try(size, self.of_size(size)[:1], {}, limit=LANES):
+                if not self._try(size, self.of_size(size)[:1], {}, limit=BREADTH):
                     break
                 if self.of_size(size)[0].support == before:
                     break
@@ -151,7 +155,8 @@ class SupportSearch:
             ranked = self.of_size(size)
             # what may turn out an exact tie once both are at their minimum
             limit = 1.001 * ranked[0].misfit + 10.0 * self.floor
-            chosen += [f.support for f in ranked if f.misfit <= limit][: LANES if size == 1 else 4]
+            near = [f.support for f in ranked if f.misfit <= limit]
+            chosen += near[: BREADTH if size == 1 else 4]
         self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
         return [self.of_size(size)[0] for size in range(largest + 1)]
 
@@ -178,12 +183,12 @@ class SupportSearch:
             keep = order <= horizon
             model = LinearModel.at(self.problem, current, keep)
             self._rescale(model)
-            candidates = self._ranked(model, 1, all_of_size(1, self.n_terms))[: LANES // 2]
+            candidates = self._ranked(model, 1, all_of_size(1, self.n_terms))[: BREADTH // 2]
             if self.largest > 1:
                 candidates += self._ranked(model, 2, all_of_size(2, self.n_terms))[:2]
             proposals = solve_sparse(self.optimizer, model.design, model.target, self.largest)
             small = [p.support for p in proposals if len(p.support) <= self.largest]
-            candidates = distinct([*small, *candidates])[:LANES]
+            candidates = distinct([*small, *candidates])[:BREADTH]
             fits = self._refit(candidates, {s: empty for s in candidates}, keep=keep)
             for fit in fits:
                 seeds.setdefault(len(fit.support), {})[fit.support] = fit
@@ -245,9 +250,7 @@ class SupportSearch:
             )
         ]
         # from each such part: several may lead to different minima
-        for first in range(0, len(again), LANES):
-            batch = again[first : first + LANES]
-            self._refit([s for s, _ in batch], [fit for _, fit in batch])
+        self._refit([s for s, _ in again], [fit for _, fit in again])
 
     def _refit(
         self,
