@@ -9,8 +9,9 @@ from jaxtyping import Float
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.run_batch import RunBatch
 
-LANES = 16
-"""Parameter vectors in one call of the compiled model."""
+LANES = 4
+"""Parameter vectors in one call of the compiled model: with more, compiling takes longer and the
+work of each is no less (measured)."""
 
 _LARGEST_DAMPING = 1e7
 _MISSED = 10.0

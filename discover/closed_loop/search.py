@@ -18,7 +18,6 @@ from discover.closed_loop.augment import (
 )
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
-    LANES,
     NO_PRIOR,
     Fit,
     Prior,
@@ -45,6 +44,8 @@ _TIME_STARTS = (1e-3, 1e-2, 0.1, 0.3, 3.0, 10.0)
 
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
+
+_COMPARED = 16
 
 
 class Search:
@@ -245,8 +246,7 @@ class Search:
 
         leading = attribute(self.model, self.batch, without, others, LEADERS, rival).leading
         current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
-        # one more than fills the lanes would cost twice as much
-        asked = [current, *leading][:LANES]
+        asked = [current, *leading][:_COMPARED]
         choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
         choices = [c for c in choices if self._predictable(c.fit.theta)]
         if not any(c.candidate is current for c in choices):
