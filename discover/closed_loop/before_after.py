@@ -56,8 +56,19 @@ def record_runs(
     runs: Sequence[ShearRun],
     thetas: Sequence[np.ndarray],
     held_out: bool,
+    order: Sequence[str] = (),
 ) -> list[RunRecord]:
-    """Return each run with the predictions of several parameter vectors."""
+    """Return each run with the predictions of several parameter vectors.
+
+    Parameters
+    ----------
+    model, batch, runs, thetas
+        The runs, laid out for the model, and the parameter vectors.
+    held_out
+        Whether no fit saw them.
+    order
+        Names of the runs of the data set, in its order.
+    """
     predictions = np.stack([model.predict(theta, batch) for theta in thetas])
     records = []
     for i, run in enumerate(runs):
@@ -75,9 +86,18 @@ def record_runs(
                 measured=run.shear_stress,
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
+                conditions=_conditions(run, order),
             )
         )
     return records
+
+
+def _conditions(run: ShearRun, order: Sequence[str]) -> dict[str, float]:
+    numbers = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
+    numbers.pop("n_points", None)  # of the file, not of the experiment
+    if run.name in order:
+        numbers["the order of the runs"] = float(list(order).index(run.name))
+    return numbers
 
 
 def errors_of(records: Sequence[RunRecord], index: int) -> ErrorPair:

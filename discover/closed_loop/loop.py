@@ -138,9 +138,10 @@ def run_loop(
     _settle(search, fitted_runs, max_effects, say)
     search.run(max_effects, say)
     current, active, thetas = search.fit, search.active, search.path
-    records = record_runs(model, batch, fitted_runs, thetas, held_out=False)
+    order = dataset.names
+    records = record_runs(model, batch, fitted_runs, thetas, held_out=False, order=order)
     if held_batch is not None:
-        records += record_runs(model, held_batch, held_runs, thetas, held_out=True)
+        records += record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
     stages = tuple(

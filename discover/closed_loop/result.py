@@ -4,7 +4,7 @@ import json
 import math
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,9 @@ from discover.closed_loop.attribution import CandidateScore
 from discover.equations import Equation, equation_to_json
 from discover.errors import InputError
 from discover.laws import Fluid
+
+if TYPE_CHECKING:
+    from discover.closed_loop.reading import Reading
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained"]
 
@@ -84,6 +87,9 @@ class RunRecord:
         Shear stress in Pa by the declared model and after each stage, shape (stages + 1, n).
     errors
         Relative error of each of these, shape (stages + 1,).
+    conditions
+        Numbers that the source gives of the run, such as its temperature, and its place in the
+        order of the runs.
     """
 
     name: str
@@ -95,6 +101,7 @@ class RunRecord:
     measured: Float[np.ndarray, " n"]
     predicted: Float[np.ndarray, "stages n"]
     errors: Float[np.ndarray, " stages"]
+    conditions: dict[str, float] = field(default_factory=dict)
 
     @property
     def residual(self) -> Float[np.ndarray, "stages n"]:
@@ -175,6 +182,18 @@ class LoopResult:
 
         return loop_equation(self)
 
+    def reading(self, model: int = -1) -> "Reading":
+        """Return what the residual depends on; see `discover.closed_loop.reading`.
+
+        Parameters
+        ----------
+        model
+            Whose residual: 0 of the declared model, −1 of the augmented one.
+        """
+        from discover.closed_loop.reading import read_residual
+
+        return read_residual(self.records, model)
+
     def table(self) -> pd.DataFrame:
         """Return the effects that were added, one line for each of their parameters."""
         lines = []
@@ -228,6 +247,10 @@ class LoopResult:
             "noise_floor": self.noise_floor,
             "stages": [asdict(stage) for stage in self.stages],
             "remaining": self.remaining,
+            "residual": {
+                "declared": self.reading(0).to_json(),
+                "augmented": self.reading(-1).to_json(),
+            },
             "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
             "ranking": [
                 [

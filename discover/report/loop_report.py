@@ -13,6 +13,7 @@ from discover.report.mathtext import formula
 from discover.report.page import render
 from discover.report.plots.loop import (
     ranking_picture,
+    reading_picture,
     residual_picture,
     run_error_picture,
     runs_picture,
@@ -85,6 +86,7 @@ def write_loop(
         waterfall_picture(result),
         runs_picture(result),
         residual_picture(result),
+        reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),
     ]
@@ -105,6 +107,10 @@ def write_loop(
         folds=[_fold(fold) for fold in result.folds],
         law=_law(result),
         remaining=_flatten(result.remaining),
+        readings=[
+            (f"Of the {name} model", result.reading(model).sentences)
+            for name, model in (("declared", 0), ("augmented", -1))
+        ],
         pictures=drawn,
         study_text=study_text,
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from discover.closed_loop.reading import differences
 from discover.closed_loop.result import LoopResult, RunRecord
 from discover.report.plots.style import (
     BEFORE,
@@ -109,6 +110,71 @@ def residual_picture(result: LoopResult) -> Picture:
             "and strain. Note the different scales above and below. What is left should look like "
             "noise around zero; anything else is an effect still missing.",
         )
+
+
+def reading_picture(result: LoopResult) -> Picture | None:
+    """Return on what the residual depends, before and after."""
+    readings = [
+        (result.reading(0), "declared", BEFORE),
+        (result.reading(-1), "augmented", _FIT),
+    ]
+    if not readings[0][0].collapses:
+        return None
+    waves = any(reading.waves for reading, _, _ in readings)
+    with figure(1, 3 if waves else 2, width=10.0, height=2.8) as (drawing, axes):
+        names = [c.coordinate for c in readings[0][0].collapses]
+        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=True):
+            shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
+            places = np.arange(len(names)) + shift
+            axes[0, 0].barh(
+                places, [shares.get(n, 0.0) for n in names], 0.36, color=colour, label=label
+            )
+        axes[0, 0].set_yticks(range(len(names)), [f"along {name}" for name in names])
+        axes[0, 0].set_xlim(0.0, 100.0)
+        axes[0, 0].set_xlabel("squared residual in common (%)")
+        _draw_run_by_run(axes[0, 1], result)
+        if waves:
+            _draw_waves(axes[0, 2], readings)
+        legend_above(drawing, axes)
+        caption = (
+            "Left: how much of the squared residual the runs share when drawn against each "
+            "coordinate, judged run by run from the others. Right of it: the error of each run."
+        )
+        if waves:
+            caption += (
+                " Far right: parts of the residual of each oscillating run: fundamental in phase "
+                "with the strain and with the rate, higher harmonics, drift."
+            )
+        return picture(drawing, "reading", caption)
+
+
+def _draw_run_by_run(panel, result: LoopResult) -> None:
+    """Draw the error of each run against what its residual follows, or the largest shear rate."""
+    varied = differences(result.records)
+    followed = [trend.quantity for trend in result.reading(-1).trends]
+    name = next(iter([*followed, *varied]), None)
+    if name is None:
+        panel.set_visible(False)
+        return
+    values = varied[name]
+    for model, colour, label in ((0, BEFORE, "declared"), (-1, _FIT, "augmented")):
+        errors = [100.0 * float(record.errors[model]) for record in result.records]
+        panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
+    if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
+        panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.set_xlabel(name.replace("_", " "))
+    panel.set_ylabel("relative error (%)")
+
+
+def _draw_waves(panel, readings) -> None:
+    parts = ("elastic", "viscous", "odd", "even", "drift")
+    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=True):
+        for place, part in enumerate(parts):
+            sizes = [100.0 * abs(getattr(wave, part)) for wave in reading.waves]
+            panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)
+    panel.set_xticks(range(len(parts)), parts, rotation=30)
+    panel.set_ylabel("residual (% of fundamental)")
 
 
 def waterfall_picture(result: LoopResult) -> Picture:

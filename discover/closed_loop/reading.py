@@ -1,0 +1,394 @@
+"""A residual read as a rheologist would: on what it depends, and of which waves it is made."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import minimize_scalar
+from scipy.stats import permutation_test, rankdata
+
+from discover.closed_loop.result import RunRecord
+
+_BINS = 24
+_DECADES = 30.0
+_SHARED = 0.5
+"""Share of the squared residual that runs must have in common along a coordinate."""
+_AHEAD = 0.1
+"""By how much a coordinate must lead the next to be named alone."""
+
+_FEWEST_RUNS = 5  # with fewer no order of runs is improbable enough
+_PROBABILITY = 0.05
+_PERMUTATIONS = 9999
+
+HARMONICS = 5
+"""Highest multiple of the frequency at which a residual is read."""
+_FEWEST_CYCLES = 2.0
+_REGULAR = 0.15  # relative spread of half periods, up to which a rate oscillates
+_PURE = 0.97  # share of the rate that odd harmonics must explain
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """How much of the residual the runs share along a coordinate.
+
+    Attributes
+    ----------
+    coordinate
+        What the residuals of all runs were drawn against.
+    share
+        Of the squared residual, that a function of this coordinate alone explains.
+    """
+
+    coordinate: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the residual changes from run to run.
+
+    Attributes
+    ----------
+    quantity
+        What differs between runs.
+    of
+        ``"size"`` of the relative residual, or ``"sign"``: the excess of the prediction.
+    correlation
+        Rank correlation with the quantity.
+    probability
+        Of one as strong among as many unrelated quantities   [Bonferroni].
+    """
+
+    quantity: str
+    of: str
+    correlation: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Wave:
+    """What the residual of an oscillation is made of, each relative to the stress's fundamental.
+
+    Attributes
+    ----------
+    run
+        The run.
+    frequency
+        In rad/s.
+    elastic, viscous
+        Fundamental in phase with the strain and with the shear rate; positive where the model
+        predicts too much.
+    odd, even
+        Higher odd harmonics, and even ones; root of the sum of squares.
+    drift
+        Change from the first to the last sample that does not oscillate.
+    """
+
+    run: str
+    frequency: float
+    elastic: float
+    viscous: float
+    odd: float
+    even: float
+    drift: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A residual, read.
+
+    Attributes
+    ----------
+    collapses
+        Coordinates, the one that explains most first.
+    trends
+        From run to run, the least probable first; only those beyond chance.
+    waves
+        One for each oscillating run.
+    """
+
+    collapses: tuple[Collapse, ...]
+    trends: tuple[Trend, ...]
+    waves: tuple[Wave, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What the reading says, each in a sentence; empty where nothing stands out."""
+        return [*self._along(), *map(_trend_sentence, self.trends), *self._oscillating()]
+
+    def _along(self) -> list[str]:
+        if not self.collapses or self.collapses[0].share < _SHARED:
+            return []
+        best = self.collapses[0]
+        alike = [c.coordinate for c in self.collapses if best.share - c.share < _AHEAD]
+        if len(alike) > 1:
+            return [
+                f"The residuals of the runs share a pattern ({100 * best.share:.0f} % of their "
+                f"square), along {', '.join(alike[:-1])} and {alike[-1]} alike."
+            ]
+        return [
+            f"Drawn against {best.coordinate} the residuals of the runs fall together: "
+            f"{100 * best.share:.0f} % of their square is one curve. {_HINTS[best.coordinate]}"
+        ]
+
+    def _oscillating(self) -> list[str]:
+        if not self.waves:
+            return []
+        parts = {
+            "in phase with the strain (elastic)": [abs(w.elastic) for w in self.waves],
+            "in phase with the rate (viscous)": [abs(w.viscous) for w in self.waves],
+            "in higher odd harmonics, as of a nonlinear fluid": [w.odd for w in self.waves],
+            "in even harmonics, which a fluid alone does not make": [w.even for w in self.waves],
+            "in a drift": [abs(w.drift) for w in self.waves],
+        }
+        sizes = {name: float(np.mean(values)) for name, values in parts.items()}
+        largest = max(sizes, key=lambda name: sizes[name])
+        return [
+            f"Over the oscillating runs the residual is mostly {largest}: "
+            f"{100 * sizes[largest]:.2g} % of the fundamental of the stress."
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the reading as JSON-able values."""
+        return {
+            "sentences": self.sentences,
+            "collapses": [asdict(c) for c in self.collapses],
+            "trends": [asdict(t) for t in self.trends],
+            "waves": [asdict(w) for w in self.waves],
+        }
+
+
+_HINTS = {
+    "time": "Look for what needs time and not strain: a slow mode, an offset, a drift.",
+    "time on the instrument's clock": "The instrument answers on its own clock: look at its "
+    "motor, its transducer and its drift.",
+    "strain": "Look at the fluid's nonlinear response, or at a fracture of the edge.",
+    "shear rate": "Look at what depends on rate: slip, heating, a solvent, a missing relaxation.",
+    "stress": "Look at what gives way under stress: compliance, slip, a gain.",
+    "phase of the oscillation": "The same happens in every cycle: look at harmonics below.",
+}
+
+
+def _trend_sentence(trend: Trend) -> str:
+    what = "The relative residual" if trend.of == "size" else "What the model predicts too much"
+    way = "grows" if trend.correlation > 0 else "falls"
+    return (
+        f"{what} {way} from run to run with {trend.quantity} (rank correlation "
+        f"{trend.correlation:.2f}, probability by chance {trend.probability:.2g})."
+    )
+
+
+def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
+    """Return what the residuals of some runs depend on.
+
+    Parameters
+    ----------
+    records
+        Runs with their predictions.
+    model
+        Which prediction: 0 for the declared model, −1 for the augmented one.
+    """
+    waves = tuple(w for r in records if (w := read_wave(r, model)) is not None)
+    return Reading(_collapses(records, model), _trends(records, model), waves)
+
+
+def _relative(record: RunRecord, model: int) -> Float[np.ndarray, " n"]:
+    size = float(np.sqrt(np.mean(record.measured**2)))
+    return record.residual[model] / (size if size > 0 else 1.0)
+
+
+def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
+    """Return what the samples of all runs can be drawn against, by name."""
+    found = {
+        "time": [r.time for r in records],
+        "strain": [np.abs(r.strain) for r in records],
+        "shear rate": [r.shear_rate for r in records],
+        "stress": [r.measured for r in records],
+    }
+    if any(np.ptp(r.time - r.instrument_time) > 0 for r in records):
+        found["time on the instrument's clock"] = [r.instrument_time for r in records]
+    frequencies = [oscillation(r) for r in records]
+    if all(w is not None for w in frequencies):
+        found["phase of the oscillation"] = [
+            np.mod(r.time * w / (2.0 * np.pi), 1.0)
+            for r, w in zip(records, frequencies, strict=True)
+            if w is not None
+        ]
+    return found
+
+
+def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]:
+    """Return the share of the squared residual that runs have in common along each coordinate.
+
+    Samples are sorted into bins along the coordinate, logarithmic where it runs over decades. What
+    the others have in a bin on average predicts each run: a run on its own explains nothing.
+    """
+    if len(records) < 2:
+        return ()
+    residual = [_relative(r, model) for r in records]
+    total = sum(float(np.mean(row**2)) for row in residual)
+    if total == 0.0:
+        return ()
+    found = []
+    for name, values in coordinates(records).items():
+        every = np.concatenate(values)
+        if np.ptp(every) == 0.0:
+            continue
+        edges = _edges(every)
+        means = np.full((len(records), _BINS), np.nan)
+        places = [
+            np.clip(np.searchsorted(edges, v, side="right") - 1, 0, _BINS - 1) for v in values
+        ]
+        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
+            counts = np.bincount(place, minlength=_BINS)
+            sums = np.bincount(place, row, minlength=_BINS)
+            means[i, counts > 0] = sums[counts > 0] / counts[counts > 0]
+        left = 0.0
+        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
+            others = np.delete(means, i, axis=0)
+            seen = np.any(np.isfinite(others), axis=0)
+            predicted = np.zeros(_BINS)
+            predicted[seen] = np.nanmean(others[:, seen], axis=0)
+            left += float(np.mean((row - predicted[place]) ** 2))
+        found.append(Collapse(name, max(0.0, 1.0 - left / total)))
+    return tuple(sorted(found, key=lambda c: -c.share))
+
+
+def _edges(values: np.ndarray) -> Float[np.ndarray, " bins"]:
+    """Return the lower edges of the bins: equal ratios where the values run over decades."""
+    low, middle, high = np.percentile(values, [1.0, 10.0, 100.0])
+    if low > 0 and high > _DECADES * middle:
+        return np.geomspace(low, high, _BINS, endpoint=False)
+    return np.linspace(low, high, _BINS, endpoint=False)
+
+
+def differences(records: Sequence[RunRecord]) -> dict[str, Float[np.ndarray, " runs"]]:
+    """Return what differs from run to run, by name: of the flow, and what the source says."""
+    found = {
+        "the largest shear rate": [float(np.max(np.abs(r.shear_rate))) for r in records],
+        "the largest strain": [float(np.max(np.abs(r.strain))) for r in records],
+        "the largest stress": [float(np.max(np.abs(r.measured))) for r in records],
+        "the duration": [float(r.time[-1]) for r in records],
+    }
+    names = [n for n in records[0].conditions if all(n in r.conditions for r in records)]
+    found |= {name: [r.conditions[name] for r in records] for name in names}
+    return {
+        name: np.array(values)
+        for name, values in found.items()
+        if np.ptp(values) > 1e-6 * np.max(np.abs(values))
+    }
+
+
+def _trends(records: Sequence[RunRecord], model: int) -> tuple[Trend, ...]:
+    if len(records) < _FEWEST_RUNS:
+        return ()
+    size = np.array([r.errors[model] for r in records])
+    sign = np.array([
+        float(np.sum(r.residual[model] * r.measured)) / max(float(np.sum(r.measured**2)), 1e-300)
+        for r in records
+    ])  # fmt: skip
+    tried = differences(records)
+    found = []
+    for name, values in tried.items():
+        for of, outcome in (("size", size), ("sign", sign)):
+            correlation, probability = _rank_correlation(values, outcome)
+            probability *= 2 * len(tried)
+            if probability < _PROBABILITY:
+                found.append(Trend(name, of, correlation, probability))
+    return tuple(sorted(found, key=lambda t: t.probability))
+
+
+def _rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
+    """Return Spearman's correlation, and its probability by chance from permutations.
+
+    With a handful of runs the usual approximation by a t distribution is far off.
+    """
+    x, y = (rankdata(v) - 0.5 * (len(v) + 1.0) for v in (first, second))
+    scale = float(np.linalg.norm(x) * np.linalg.norm(y))
+    if scale == 0.0:
+        return 0.0, 1.0
+
+    def correlation(ranks, axis=-1):
+        return np.sum(ranks * y, axis=axis) / scale
+
+    # of up to seven runs every permutation is tried, of more a fixed sample
+    test = permutation_test(
+        (x,),
+        correlation,
+        permutation_type="pairings",
+        vectorized=True,
+        n_resamples=_PERMUTATIONS,
+        rng=np.random.default_rng(0),
+    )
+    return float(test.statistic), float(test.pvalue)
+
+
+def oscillation(record: RunRecord) -> float | None:
+    """Return the frequency in rad/s at which the shear rate of a run oscillates, if it does."""
+    rate, time = record.shear_rate, record.time
+    signs = np.sign(rate)
+    turns = np.flatnonzero(signs[1:] * signs[:-1] < 0)
+    if len(turns) < 2 * _FEWEST_CYCLES:
+        return None
+    share = rate[turns] / (rate[turns] - rate[turns + 1])
+    crossings = time[turns] + share * (time[turns + 1] - time[turns])
+    halves = np.diff(crossings)
+    if np.std(halves) > _REGULAR * np.mean(halves):
+        return None
+    first = np.pi / float(np.mean(halves))
+
+    def missed(frequency: float) -> float:
+        basis = _harmonics(time, frequency, (1, 3, 5))
+        left = rate - basis @ np.linalg.lstsq(basis, rate, rcond=None)[0]
+        return float(left @ left)
+
+    best: Any = minimize_scalar(missed, bounds=(0.95 * first, 1.05 * first), method="bounded")
+    explained = 1.0 - missed(float(best.x)) / float(rate @ rate)
+    return float(best.x) if explained > _PURE else None
+
+
+def _harmonics(time, frequency: float, multiples) -> Float[np.ndarray, "n columns"]:
+    return np.column_stack([f(m * frequency * time) for m in multiples for f in (np.cos, np.sin)])
+
+
+def read_wave(record: RunRecord, model: int = -1) -> Wave | None:
+    """Return what the residual of one run is made of, or nothing where it does not oscillate.
+
+    Least squares on the harmonics of the rate's frequency, a constant and a slope, over the last
+    half of the run, where what started with it has mostly died away.
+    """
+    frequency = oscillation(record)
+    if frequency is None:
+        return None
+    late = record.time >= 0.5 * record.time[-1]
+    if np.ptp(record.time[late]) * frequency < 2.0 * np.pi:
+        late = np.ones_like(late)
+    time = record.time[late]
+    multiples = tuple(range(1, HARMONICS + 1))
+    middle = (time - time.mean()) / max(float(np.ptp(time)), 1e-300)
+    basis = np.column_stack([_harmonics(time, frequency, multiples), np.ones_like(time), middle])
+
+    def coefficients(values):
+        found = np.linalg.lstsq(basis, values[late], rcond=None)[0]
+        return found[: 2 * HARMONICS : 2] - 1j * found[1 : 2 * HARMONICS : 2], float(found[-1])
+
+    rate, _ = coefficients(record.shear_rate)
+    stress, _ = coefficients(record.measured)
+    left, drift = coefficients(record.residual[model])
+    scale = abs(stress[0])
+    if scale == 0.0 or rate[0] == 0.0:
+        return None
+    # strain lags the rate by a quarter of a cycle
+    along_rate = rate[0] / abs(rate[0])
+    along_strain = -1j * along_rate
+    return Wave(
+        run=record.name,
+        frequency=frequency,
+        elastic=float((left[0] * np.conj(along_strain)).real / scale),
+        viscous=float((left[0] * np.conj(along_rate)).real / scale),
+        odd=float(np.linalg.norm(left[2::2]) / scale),
+        even=float(np.linalg.norm(left[1::2]) / scale),
+        drift=drift / scale,
+    )
