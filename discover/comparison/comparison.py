@@ -169,6 +169,7 @@ class Comparison:
                         "coefficient_penalised": t.coefficient_penalised,
                         "inner": dict(t.inner),
                         "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},
+                        "inner_at_one": {k: list(v) for k, v in t.inner_at_one.items()},
                         "latex": t.latex,
                     }
                     for t in outcome.terms

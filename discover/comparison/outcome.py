@@ -83,6 +83,7 @@ class LearnerOutcome:
                     **t,
                     "ci95": None if t["ci95"] is None else tuple(t["ci95"]),
                     "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
+                    "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
                 }
             )
             for t in state["terms"]

@@ -35,6 +35,9 @@ class RecoveredTerm:
         The term as LaTeX, without its coefficient.
     inner_ci95
         95 % intervals of the inner parameters.
+    inner_at_one
+        For a closed form whose coefficient may be one, as in the law that it is named after:
+        each inner parameter with its 95 % interval (value, low, high) if the coefficient is one.
     """
 
     term: str
@@ -44,6 +47,7 @@ class RecoveredTerm:
     inner: Mapping[str, float] = field(default_factory=dict)
     latex: str = ""
     inner_ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    inner_at_one: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -179,6 +179,11 @@ def _term_rows(comparison: Comparison) -> list[dict[str, Any]]:
                     + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
                     for key, value in term.inner.items()
                 ]
+                inner += [
+                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {key} = {value:.4g} "
+                    f"({interval((low, high))})"
+                    for key, (value, low, high) in term.inner_at_one.items()
+                ]
         true = truth.get(name)
         rows.append(
             {

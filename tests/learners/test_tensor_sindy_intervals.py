@@ -5,7 +5,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
-from discover.learners.tensor_sindy.intervals import least_squares_covariance
+from discover.learners.tensor_sindy.intervals import (
+    ParameterUncertainty,
+    least_squares_covariance,
+)
 from discover.learners.tensor_sindy.noise_model import noise_model
 
 N_RUNS, N_SAMPLES, N_SETS = 6, 120, 400
@@ -90,3 +93,22 @@ def test_a_perfect_fit_has_no_noise_and_no_error():
     model = noise_model([np.zeros(40), np.zeros(10)])
     assert model.coefficients.size == 0
     assert np.all(model.variance == 0.0)
+
+
+def test_a_known_parameter_gives_the_least_squares_fit_to_the_others():
+    rng = np.random.default_rng(3)
+    design = rng.normal(size=(80, 3)) @ np.array([[1.0, 0.9, 0.2], [0.0, 0.3, 0.1], [0.0, 0.0, 1]])
+    target = design @ [1.0, 0.4, -0.2] + 0.1 * rng.normal(size=80)
+    values, *_ = np.linalg.lstsq(design, target, rcond=None)
+    covariance, inverse, noise = least_squares_covariance(
+        design, target - design @ values, [np.arange(80)]
+    )
+    free = ParameterUncertainty(covariance, inverse, (), np.zeros(3), 2.0, noise)
+    known, half = free.given(values, 0, 1.0)
+    others, *_ = np.linalg.lstsq(design[:, 1:], target - design[:, 0], rcond=None)
+    # the same least-squares problem solved twice: rounding only
+    np.testing.assert_allclose(known, [1.0, *others], rtol=1e-10)
+    alone, *_ = least_squares_covariance(design[:, 1:], target - design @ values, [np.arange(80)])
+    # the same noise: the two differ in its degrees of freedom, 77 and 78
+    np.testing.assert_allclose(half, [0.0, *(2.0 * np.sqrt(np.diag(alone)))], rtol=0.02, atol=1e-12)
+    assert half[1] < 0.5 * free.half_widths[1]

@@ -333,25 +333,34 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             penalised = np.zeros(len(library))
             if alone:
                 penalised[support] = max(alone, key=lambda s: len(s.support)).coefficients
+        fitted = np.append(fit.coefficients, fit.inner[list(self.uncertainty_.inner_positions)])
+
+        def around(middle: float, half: float) -> tuple[float, float]:
+            return middle - float(half), middle + float(half)
+
         terms = []
         for position, (index, value) in enumerate(zip(fit.support, fit.coefficients, strict=True)):
             term = library.terms[index]
             half = half_widths[position]
-            inner, inner_ci95 = {}, {}
-            for place, i in enumerate(self.uncertainty_.inner_positions):
+            inner, inner_ci95, at_one = {}, {}, {}
+            for place, i in enumerate(self.uncertainty_.inner_positions, len(fit.support)):
                 if (form := library.forms[i]).name == term.closed_form:
-                    value_of_inner = float(fit.inner[i])
-                    spread = half_widths[len(fit.support) + place]
-                    inner[form.inner_name] = value_of_inner
-                    inner_ci95[form.inner_name] = (value_of_inner - spread, value_of_inner + spread)
+                    known = float(fit.inner[i])
+                    inner[form.inner_name] = known
+                    inner_ci95[form.inner_name] = around(known, half_widths[place])
+                    if abs(value - 1.0) <= half:
+                        given, halves = self.uncertainty_.given(fitted, position, 1.0)
+                        ends = around(float(given[place]), halves[place])
+                        at_one[form.inner_name] = (float(given[place]), *ends)
             terms.append(
                 RecoveredTerm(
                     term=term.name,
                     coefficient=float(value),
                     coefficient_penalised=float(penalised[index]),
-                    ci95=(float(value - half), float(value + half)),
+                    ci95=around(float(value), half),
                     inner=inner,
                     inner_ci95=inner_ci95,
+                    inner_at_one=at_one,
                     latex=term.latex(),
                 )
             )

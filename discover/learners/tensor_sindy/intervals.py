@@ -31,6 +31,8 @@ class ParameterUncertainty:
     ----------
     covariance
         Of the coefficients of the support, then of the inner parameters used, shape (p, p).
+    inverse
+        (SᵀS)⁻¹ of the fit, in the same order.
     inner_positions
         Which inner parameters of the library those are.
     numerical
@@ -42,6 +44,7 @@ class ParameterUncertainty:
     """
 
     covariance: Float[np.ndarray, "p p"]
+    inverse: Float[np.ndarray, "p p"]
     inner_positions: tuple[int, ...]
     numerical: Float[np.ndarray, " p"]
     factor: float
@@ -51,6 +54,32 @@ class ParameterUncertainty:
     def half_widths(self) -> Float[np.ndarray, " p"]:
         """Half the width of each 95 % interval: noise, plus what integration cannot promise."""
         return self.factor * np.sqrt(np.diag(self.covariance)) + self.numerical
+
+    def given(
+        self, values: Float[np.ndarray, " p"], position: int, value: float
+    ) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+        """Return what the fit and half its intervals become if one parameter is known.
+
+        Least squares under the constraint, to first order in the change: with H = (SᵀS)⁻¹ and
+        h its column of the known parameter, all parameters move by −h (θ − value)/h_known.
+
+        Parameters
+        ----------
+        values
+            The fitted parameters, in the order of `covariance`.
+        position
+            Of the known one.
+        value
+            What it is known to be.
+        """
+        share = self.inverse[:, position] / self.inverse[position, position]
+        project = np.eye(len(values))
+        project[:, position] -= share
+        covariance = project @ self.covariance @ project.T
+        left = np.diag(project @ self.inverse)
+        numerical = self.numerical * np.sqrt(np.clip(left / np.diag(self.inverse), 0.0, 1.0))
+        half = self.factor * np.sqrt(np.clip(np.diag(covariance), 0.0, None)) + numerical
+        return values - share * (values[position] - value), half
 
 
 def parameter_uncertainty(
@@ -78,6 +107,7 @@ def parameter_uncertainty(
     free = max(noise.effective_samples - chosen.shape[1], 1.0)
     return ParameterUncertainty(
         covariance=covariance,
+        inverse=inverse,
         inner_positions=inner,
         # an error vector of norm f moves a least-squares solution by at most f √diag (SᵀS)⁻¹
         numerical=misfit_floor * np.sqrt(np.diag(inverse)),
