@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.least_squares import Fit, evaluate
+from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
 
@@ -103,7 +103,7 @@ def attribute(
         probes.append(theta)
     residual = fit.residual.ravel()
     total = float(residual @ residual)
-    changes = evaluate(model, batch, probes).reshape(len(probes), -1) - residual
+    changes = model.residuals(probes, batch).reshape(len(probes), -1) - residual
     basis = np.zeros((residual.size, 0))
     if len(fit.free):
         basis, _ = np.linalg.qr(fit.jacobian.reshape(len(fit.free), -1).T)
@@ -178,7 +178,7 @@ def _try_amplitudes(model, batch, fit, candidates, bases, at):
             owner.append(i)
     if not trials:
         return
-    costs = np.sum(evaluate(model, batch, trials) ** 2, axis=(1, 2))
+    costs = np.sum(model.residuals(trials, batch) ** 2, axis=(1, 2))
     for theta, i, cost in zip(trials, owner, costs, strict=True):
         reduction = 1.0 - cost / fit.cost if np.isfinite(cost) else 0.0
         if reduction > candidates[i].reduction:

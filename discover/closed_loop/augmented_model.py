@@ -31,6 +31,10 @@ from discover.effects import (
 )
 from discover.laws import LAWS, AbstractConstitutiveLaw
 
+LANES = 4
+"""Parameter vectors in one call of the compiled program: with more, compiling takes longer and the
+work of each is no less (measured)."""
+
 
 class _Numbers(eqx.Module):
     """What of a declared model is data to the compiled program."""
@@ -82,15 +86,10 @@ class _Program:
         self._series = [e for e in self._kinematic if isinstance(e, SeriesElement)]
         self._signal = [e for e in effects if isinstance(e, SignalEffect)]
         over_runs = jax.vmap(self._predict_run, in_axes=(None, None, 0))
-        self.predict = eqx.filter_jit(over_runs)
-        self.residuals = eqx.filter_jit(jax.vmap(self._residuals, in_axes=(None, 0, None)))
+        self.predict = eqx.filter_jit(jax.vmap(over_runs, in_axes=(None, 0, None)))
 
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
-
-    def _residuals(self, numbers, theta, batch):
-        predicted = jax.vmap(self._predict_run, in_axes=(None, None, 0))(numbers, theta, batch)
-        return (predicted - batch.stress) * batch.weight
 
     def _predict_run(self, numbers, theta, run):
         instrument_times = run.times / run.clock_factor
@@ -241,8 +240,24 @@ class AugmentedModel:
 
     def predict(self, theta, batch: RunBatch) -> Float[np.ndarray, "runs n"]:
         """Return the predicted records, in Pa."""
-        return np.asarray(self._program.predict(self._numbers, jnp.asarray(theta), batch))
+        return self.predictions([theta], batch)[0]
 
-    def residuals(self, thetas, batch: RunBatch) -> Float[np.ndarray, "trials runs n"]:
-        """Return the weighted residuals of several parameter vectors; not finite if one fails."""
-        return np.array(self._program.residuals(self._numbers, jnp.asarray(thetas), batch))
+    def predictions(
+        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch
+    ) -> Float[np.ndarray, "trials runs n"]:
+        """Return the predicted records of any number of parameter vectors, in Pa."""
+        out = []
+        for first in range(0, len(thetas), LANES):
+            block = list(thetas[first : first + LANES])
+            count = len(block)
+            block += [block[-1]] * (LANES - count)
+            made = self._program.predict(self._numbers, jnp.asarray(np.stack(block)), batch)
+            out.append(np.asarray(made)[:count])
+        return np.concatenate(out)
+
+    def residuals(
+        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch
+    ) -> Float[np.ndarray, "trials runs n"]:
+        """Return the weighted residuals of parameter vectors; not finite where one fails."""
+        difference = self.predictions(thetas, batch) - np.asarray(batch.stress)
+        return difference * np.asarray(batch.weight)

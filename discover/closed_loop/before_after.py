@@ -69,7 +69,7 @@ def record_runs(
     order
         Names of the runs of the data set, in its order.
     """
-    predictions = np.stack([model.predict(theta, batch) for theta in thetas])
+    predictions = model.predictions(thetas, batch)
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]

@@ -9,10 +9,6 @@ from jaxtyping import Float
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.run_batch import RunBatch
 
-LANES = 4
-"""Parameter vectors in one call of the compiled model: with more, compiling takes longer and the
-work of each is no less (measured)."""
-
 _LARGEST_DAMPING = 1e7
 _MISSED = 10.0
 
@@ -121,7 +117,7 @@ def fit_batch(
     """
     theta = np.array(starts, dtype=float)
     count = len(theta)
-    residual = evaluate(model, batch, theta)
+    residual = model.residuals(theta, batch)
 
     def priced(costs, vectors, problems):
         known = [
@@ -147,7 +143,7 @@ def fit_batch(
             known = prior.rows(theta[i], free[i])
             moved = theta[i, at] + _step(jacobian[i], residual[i], damping[i], known)
             trial[row, at] = np.clip(moved, model.low[at], model.high[at])
-        trial_residual = evaluate(model, batch, trial)
+        trial_residual = model.residuals(trial, batch)
         trial_cost = priced(_costs(trial_residual), trial, going)
         for row, i in enumerate(going):
             if trial_cost[row] < cost[i]:
@@ -176,7 +172,7 @@ def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
             widths.append(width)
     if not trials:
         return [np.zeros((0, *residuals.shape[1:])) for _ in thetas]
-    moved_residuals = evaluate(model, batch, trials)
+    moved_residuals = model.residuals(trials, batch)
     out, row = [], 0
     for base, positions in zip(residuals, free, strict=True):
         n = len(positions)
@@ -231,19 +227,6 @@ def leave_one_run_out(
         step = _step(fit.jacobian[:, others], fit.residual[others], 1e-8, prior.rows(theta, at))
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)
-    errors = np.sqrt(np.sum(evaluate(model, batch, trials) ** 2, axis=2))
+    errors = np.sqrt(np.sum(model.residuals(trials, batch) ** 2, axis=2))
     own = errors[np.arange(n_runs), np.arange(n_runs)]
     return np.where(np.isfinite(own), np.minimum(own, _MISSED), _MISSED)
-
-
-def evaluate(
-    model: AugmentedModel, batch: RunBatch, thetas: Sequence[np.ndarray] | np.ndarray
-) -> Float[np.ndarray, "trials runs n"]:
-    """Return the residuals of any number of parameter vectors, `LANES` at a time."""
-    out = []
-    for first in range(0, len(thetas), LANES):
-        block = list(thetas[first : first + LANES])
-        count = len(block)
-        block += [block[-1]] * (LANES - count)
-        out.append(model.residuals(np.stack(block), batch)[:count])
-    return np.concatenate(out)

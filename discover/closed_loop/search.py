@@ -21,7 +21,6 @@ from discover.closed_loop.least_squares import (
     NO_PRIOR,
     Fit,
     Prior,
-    evaluate,
     fit_batch,
     jacobians,
     leave_one_run_out,
@@ -280,7 +279,7 @@ class Search:
         fit = fit_batch(self.model, self.batch, [theta], [free], prior=self.prior)[0]
         if fit.usable:
             return fit
-        residual = evaluate(self.model, self.batch, [theta])
+        residual = self.model.residuals([theta], self.batch)
         return Fit(
             theta,
             free,
