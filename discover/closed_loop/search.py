@@ -238,6 +238,8 @@ class Search:
     def _exchange(self, name: str) -> bool:
         own = self.model.positions(name)
         without = self._without(own)
+        if not without.usable:
+            return False  # without it the law runs away: nothing can be ranked from there
         others = [other for other in self.active if other != name]
 
         def rival(effect: AbstractEffect) -> bool:

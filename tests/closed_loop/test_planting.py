@@ -5,6 +5,7 @@ import pytest
 
 from discover.closed_loop import run_loop
 from discover.closed_loop.planting import OUTSIDE, Noise, Planter
+from discover.closed_loop.search import Search
 from discover.effects import named_effects
 from discover.errors import InputError
 
@@ -119,6 +120,19 @@ def test_two_flaws_that_only_together_explain_the_data_are_both_named(planter):
     assert result.verdict == "effects_added"
     for effect in effects:
         assert any(effect in stage for stage in names(result))
+
+
+def test_an_effect_without_which_the_law_runs_away_is_kept(planter, monkeypatch):
+    whole = Search._without
+
+    def runs_away(self, positions):
+        fit = whole(self, positions)
+        fit.residual[:] = np.nan
+        return fit
+
+    monkeypatch.setattr(Search, "_without", runs_away)
+    case = planter.plant(["stress_drift"], size=0.12, noise=Noise(0.01), seed=3)
+    assert [stage.effect for stage in loop(case).stages] == ["stress_drift"]
 
 
 @pytest.mark.parametrize("mechanism", ["clipped_transducer", "hum"])
