@@ -162,7 +162,9 @@ def _term_rows(comparison: Comparison) -> list[dict[str, Any]]:
     for name in dict.fromkeys([*truth, *found]):
         cells, inner = [], []
         if name in truth and truth[name].inner:
-            inner += [f"truth: {key} = {value:.4g}" for key, value in truth[name].inner.items()]
+            inner += [
+                f"truth: {spoken(key)} = {value:.4g}" for key, value in truth[name].inner.items()
+            ]
         for learner, outcome in comparison.outcomes.items():
             term = found.get(name, {}).get(learner)
             cells.append(
@@ -175,13 +177,13 @@ def _term_rows(comparison: Comparison) -> list[dict[str, Any]]:
             )
             if term is not None:
                 inner += [
-                    f"{LEARNER_TITLES[learner]}: {key} = {value:.4g}"
+                    f"{LEARNER_TITLES[learner]}: {spoken(key)} = {value:.4g}"
                     + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
                     for key, value in term.inner.items()
                 ]
                 inner += [
-                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {key} = {value:.4g} "
-                    f"({interval((low, high))})"
+                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {spoken(key)} = "
+                    f"{value:.4g} ({interval((low, high))})"
                     for key, (value, low, high) in term.inner_at_one.items()
                 ]
         true = truth.get(name)

@@ -169,8 +169,9 @@ def comparison_verdict(comparison: Comparison) -> list[str]:
             sentences.append(f"{LEARNERS[name]} predicts {', '.join(parts)} at worst in {what}.")
     if comparison.undetermined:
         names = " and ".join(comparison.undetermined)
+        shown = "it" if len(comparison.undetermined) == 1 else "them"
         sentences.append(
-            f"Not determined by these data: {names}. What is shown of it is the choice of the "
+            f"Not determined by these data: {names}. What is shown of {shown} is the choice of the "
             "simplest law that fits, not a measurement."
         )
     for name, report in comparison.physics.items():
