@@ -13,7 +13,7 @@ from discover.closed_loop.result import RunRecord
 
 _BINS = 24
 _DECADES = 30.0
-_SHARED = 0.5
+_SHARED = 0.3
 """Share of the squared residual that runs must have in common along a coordinate."""
 _AHEAD = 0.1
 """By how much a coordinate must lead the next to be named alone."""
@@ -116,7 +116,7 @@ class Reading:
     @property
     def sentences(self) -> list[str]:
         """What the reading says, each in a sentence; empty where nothing stands out."""
-        return [*self._along(), *map(_trend_sentence, self.trends), *self._oscillating()]
+        return [*self._along(), *self._from_run_to_run(), *self._oscillating()]
 
     def _along(self) -> list[str]:
         if not self.collapses or self.collapses[0].share < _SHARED:
@@ -132,6 +132,27 @@ class Reading:
             f"Drawn against {best.coordinate} the residuals of the runs fall together: "
             f"{100 * best.share:.0f} % of their square is one curve. {_HINTS[best.coordinate]}"
         ]
+
+    def _from_run_to_run(self) -> list[str]:
+        sentences = []
+        for of, what in (
+            ("size", "The relative residual"),
+            ("sign", "What the model predicts too much"),
+        ):
+            trends = [trend for trend in self.trends if trend.of == of]
+            if not trends:
+                continue
+            first = trends[0]
+            text = (
+                f"{what} {'grows' if first.correlation > 0 else 'falls'} from run to run with "
+                f"{_plain(first.quantity)} (rank correlation {first.correlation:.2f}, probability "
+                f"by chance {first.probability:.2g})"
+            )
+            if len(trends) > 1:
+                others = ", ".join(_plain(trend.quantity) for trend in trends[1:])
+                text += f", and follows {others} too: these runs do not tell which of them matters"
+            sentences.append(f"{text}.".replace("-", "−"))
+        return sentences
 
     def _oscillating(self) -> list[str]:
         if not self.waves:
@@ -171,13 +192,8 @@ _HINTS = {
 }
 
 
-def _trend_sentence(trend: Trend) -> str:
-    what = "The relative residual" if trend.of == "size" else "What the model predicts too much"
-    way = "grows" if trend.correlation > 0 else "falls"
-    return (
-        f"{what} {way} from run to run with {trend.quantity} (rank correlation "
-        f"{trend.correlation:.2f}, probability by chance {trend.probability:.2g})."
-    )
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:

@@ -1,6 +1,7 @@
 """Pictures of a closed loop: data and predictions, residuals, waterfall, ranking."""
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from discover.closed_loop.reading import differences
 from discover.closed_loop.result import LoopResult, RunRecord
@@ -19,6 +20,8 @@ from discover.report.plots.style import (
 from discover.report.wording import percent, spoken
 
 _FIT, _HELD = NETWORK, SPARSE
+_DECADES = 30.0
+_UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
 
 def _rms(values: np.ndarray) -> float:
@@ -26,8 +29,19 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _is_start_up(record: RunRecord) -> bool:
-    """Whether log time is the natural axis: a constant rate, which runs through decades."""
+    """Whether the rate is constant, which makes log time the natural axis."""
     return bool(np.ptp(record.shear_rate) <= 1e-6 * np.max(np.abs(record.shear_rate)))
+
+
+def _runs_through_decades(record: RunRecord) -> bool:
+    positive = record.time[record.time > 0]
+    return bool(positive.size and positive[-1] > _DECADES * positive[0])
+
+
+def _logarithmic(axis) -> None:
+    """Make an axis logarithmic, with labels at decades only."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_minor_formatter(NullFormatter())
 
 
 def runs_picture(result: LoopResult) -> Picture:
@@ -59,7 +73,7 @@ def runs_picture(result: LoopResult) -> Picture:
             margin = 0.05 * (high - low) or 1.0
             panel.set_ylim(low - margin, high + margin)
             if _is_start_up(record):
-                panel.set_xscale("log")
+                _logarithmic(panel.xaxis)
             panel.set_title(_short(record), fontsize=8)
         for panel in axes[-1]:
             panel.set_xlabel("time (s)")
@@ -96,7 +110,7 @@ def residual_picture(result: LoopResult) -> Picture:
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
                 if all(_is_start_up(record) for record in result.records):
-                    panel.set_xscale("log")
+                    _logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
@@ -163,7 +177,8 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
     if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
         panel.set_xscale("log")
     panel.set_yscale("log")
-    panel.set_xlabel(name.replace("_", " "))
+    unit = f" ({_UNITS[name]})" if name in _UNITS else ""
+    panel.set_xlabel(name.replace("_", " ") + unit)
     panel.set_ylabel("relative error (%)")
 
 
