@@ -180,7 +180,13 @@ def draw_confusion(confusion: dict[str, dict[str, int]], path: Path) -> None:
     """Write a picture of what was planted against what was named."""
     import matplotlib.pyplot as plt
 
-    planted = list(confusion)
+    plain = {*named_effects(), "nothing"}
+    merged: dict[str, Counter] = {name: Counter() for name in confusion}
+    for name, row in confusion.items():
+        for said, count in row.items():
+            merged[name][said if said in plain else "a term of the library"] += count
+    confusion = {name: dict(row) for name, row in merged.items()}
+    planted = sorted(confusion, key=lambda name: (name not in plain, name))
     others = sorted({name for row in confusion.values() for name in row} - set(planted))
     named = [name for name in planted if any(name in row for row in confusion.values())] + others
     counts = np.array([[confusion[p].get(n, 0) for n in named] for p in planted])
