@@ -204,7 +204,7 @@ def loop_result(held_out=0.2):
     time = np.geomspace(0.01, 10.0, 40)
     rate = np.ones(40)
     records = []
-    for name, held in (("a<b>.csv", False), ("c.csv", True)):
+    for name, held in ((r"a<b>$\frac$.csv", False), ("c.csv", True)):
         measured = 1.0 - np.exp(-time)
         predicted = np.stack([1.4 * measured, 1.01 * measured])
         errors = np.array([0.4, 0.01])
@@ -235,8 +235,8 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
     page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
     assert stands_alone(page)
     assert "<i>name" not in page
-    assert "a&lt;b&gt;.csv" in page
-    for name in ("waterfall", "runs", "residual", "run_errors", "ranking"):
+    assert r"a&lt;b&gt;$\frac$.csv" in page
+    for name in ("waterfall", "runs", "residual", "reading", "run_errors", "ranking"):
         assert f'<figure id="{name}">' in page
         assert (tmp_path / "figures" / f"{name}.svg").is_file()
     for text in ("cannot tell it from", "rate_gain", "held-out runs", "gain", "0.69 to 0.71"):

@@ -15,6 +15,7 @@ from discover.report.plots.style import (
     Picture,
     figure,
     legend_above,
+    literal,
     picture,
 )
 
@@ -62,7 +63,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
             in_time.set_ylabel(SYMBOLS[quantity] + stress_unit)
             in_time.set_xlabel(time_label if row == 2 else "")
             lissajous.set_xlabel(f"shear rate {rate_label}" if row == 2 else "")
-        axes[0, 0].set_title(f"against time, {flow.title}")
+        axes[0, 0].set_title(f"against time, {literal(flow.title)}")
         axes[0, 1].set_title("viscous Lissajous curve, last cycle")
         legend_above(drawing, axes)
         return picture(
@@ -119,7 +120,7 @@ def training_picture(comparison: Comparison) -> Picture:
                     panel.plot(
                         flow.times, prediction["sigma12"], label=LEARNER_TITLES[name], **style
                     )
-            panel.set_title(flow.title, fontsize=8)
+            panel.set_title(literal(flow.title), fontsize=8)
             if not flow.oscillatory and np.min(flow.times[1:]) * 30 < flow.times[-1]:
                 panel.set_xscale("log")
         for panel in axes[-1]:

@@ -15,6 +15,7 @@ from discover.report.plots.style import (
     Picture,
     figure,
     legend_above,
+    literal,
     picture,
 )
 from discover.report.wording import percent, spoken
@@ -88,7 +89,7 @@ def runs_picture(result: LoopResult) -> Picture:
 
 
 def _short(record: RunRecord) -> str:
-    name = record.name.removesuffix(".csv")
+    name = literal(record.name.removesuffix(".csv"))
     return f"{name}: {percent(record.errors[0])} → {percent(record.errors[-1])}"
 
 
@@ -178,7 +179,7 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
         panel.set_xscale("log")
     panel.set_yscale("log")
     unit = f" ({_UNITS[name]})" if name in _UNITS else ""
-    panel.set_xlabel(name.replace("_", " ") + unit)
+    panel.set_xlabel(literal(name.replace("_", " ")) + unit)
     panel.set_ylabel("relative error (%)")
 
 
@@ -268,7 +269,7 @@ def run_error_picture(result: LoopResult) -> Picture:
             panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
             label = "augmented, held out" if record.held_out else "augmented, fitted"
             panel.plot(after, position, "o", color=colour, label=label)
-        panel.set_yticks(range(len(records)), [r.name for r in records[::-1]])
+        panel.set_yticks(range(len(records)), [literal(r.name) for r in records[::-1]])
         panel.set_xscale("log")
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)

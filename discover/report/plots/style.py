@@ -146,6 +146,11 @@ def legend_above(drawing: Figure, axes, columns: int = 4) -> None:
         )
 
 
+def literal(text: str) -> str:
+    """Return text from a file so that no part of it is taken for a formula."""
+    return text.replace("$", r"\$")
+
+
 def picture(drawing: Figure, name: str, caption: str) -> Picture:
     """Return the figure as SVG, the same bytes every time."""
     buffer = io.StringIO()
