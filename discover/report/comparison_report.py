@@ -119,8 +119,17 @@ def _selection(comparison: Comparison) -> dict[str, Any] | None:
         }
         for row in path
     ]
+    titles = {flow.name: flow.title for flow in comparison.flows_of("training")}
+    runs = [
+        {
+            "title": titles.get(name, name),
+            "errors": [row["held_out_by_run"][name] for row in path],
+        }
+        for name in path[0].get("held_out_by_run", {})
+    ]
     return {
         "rows": rows,
+        "runs": runs,
         "picture": selection_picture(sparse.details),
         "sentence": selection_sentence(sparse),
     }

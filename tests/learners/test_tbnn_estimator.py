@@ -57,7 +57,9 @@ def test_coefficients_along_trajectories_are_reported_with_their_spread(model):
 def test_every_member_of_an_ensemble_is_reported(model):
     members = model.result_.details["members"]
     assert len(members) == len(model.members_) == 2
-    assert model.result_.details["misfit"] == min(m["misfit"] for m in members)
+    best = min(m["misfit"] for m in members)
+    # computed by two programs, which may round differently
+    assert model.result_.details["misfit"] == pytest.approx(best, rel=1e-9)
 
 
 def test_predictions_follow_the_runs_and_their_order(model, data):

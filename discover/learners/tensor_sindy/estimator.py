@@ -15,7 +15,7 @@ from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
-from discover.learners.run_prediction import RunPrediction
+from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
     check_optimiser,
@@ -182,10 +182,12 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             problem, self.optimizer, self.max_terms, self.misfit_floor, self.progress
         )
         path = search.run()
-        held_out = None
+        held_out, by_run = None, None
         if validates:
             folds = run_folds(n_runs, self.n_folds, self.random_state)
-            held_out = held_out_misfits(problem, path, folds, search.scale, search.slots)
+            held_out, errors = held_out_misfits(problem, path, folds, search.scale, search.slots)
+            names = [run.name for run in as_runs(X)]
+            by_run = [dict(zip(names, map(float, row), strict=True)) for row in errors]
         criterion = np.array([search.criterion(fit) for fit in path])
         if self.selection == "held_out" and held_out is not None:
             chosen = choose_by_held_out(held_out, self.misfit_floor)
@@ -242,7 +244,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 np.minimum.accumulate(np.square(misfits)),
             ),
             details={
-                "path": path_table(search, path, criterion, held_out),
+                "path": path_table(search, path, criterion, held_out, by_run),
                 "chosen": chosen,
                 "selection": self.selection,
                 "selectors": selectors,

@@ -1,6 +1,6 @@
 """What a search says of its path and of rivals, as plain JSON-able tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,12 @@ def path_table(
     path: Sequence[Fit],
     criterion: Float[np.ndarray, " path"],
     held_out: Float[np.ndarray, "path folds"] | None,
+    by_run: Sequence[Mapping[str, float]] | None = None,
 ) -> list[dict[str, Any]]:
-    """Return one row for each member of the path: support, size, misfit, held-out misfit, BIC."""
+    """Return one row for each member of the path: support, size, misfit, held-out misfit, BIC.
+
+    The held-out misfit is the mean over folds; `by_run` gives it for each run, by name.
+    """
     rows = []
     for i, fit in enumerate(path):
         row = _describe(search, fit)
@@ -45,6 +49,7 @@ def path_table(
         row["held_out"] = (
             None if held_out is None else float(np.sqrt(np.mean(np.square(held_out[i]))))
         )
+        row["held_out_by_run"] = {} if by_run is None else dict(by_run[i])
         rows.append(row)
     return rows
 

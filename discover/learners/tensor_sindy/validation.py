@@ -23,8 +23,8 @@ def held_out_misfits(
     folds: Int[np.ndarray, " runs"],
     scale: Float[np.ndarray, " n"],
     slots: int,
-) -> Float[np.ndarray, "path folds"]:
-    """Return the relative misfit of each member on each fold, refitted on the other folds.
+) -> tuple[Float[np.ndarray, "path folds"], Float[np.ndarray, "path runs"]]:
+    """Return the relative misfit of each member on each fold and run, refitted on other folds.
 
     Parameters
     ----------
@@ -51,10 +51,16 @@ def held_out_misfits(
     target = np.asarray(problem.weight * problem.target).reshape(-1)
     observed = np.asarray(problem.weight).reshape(-1) > 0
     fold_of_row = folds[problem.run_of_row]
-    errors = np.empty((len(path), n_folds))
-    for (member, fold), fit in zip(pairs, fits, strict=True):
-        rows = observed & (fold_of_row == fold)
+    by_fold = np.empty((len(path), n_folds))
+    by_run = np.empty((len(path), len(folds)))
+
+    def misfit(fit: Fit, rows: np.ndarray) -> float:
         squares = np.sum((fit.predicted[rows] - target[rows]) ** 2)
-        # weights carry 1/√(all observations); here the mean is over this fold's
-        errors[member, fold] = np.sqrt(squares * problem.n_observations / max(np.sum(rows), 1))
-    return errors
+        # weights carry 1/√(all observations); here the mean is over the rows asked for
+        return float(np.sqrt(squares * problem.n_observations / max(np.sum(rows), 1)))
+
+    for (member, fold), fit in zip(pairs, fits, strict=True):
+        by_fold[member, fold] = misfit(fit, observed & (fold_of_row == fold))
+        for run in np.flatnonzero(folds == fold):
+            by_run[member, run] = misfit(fit, observed & (problem.run_of_row == run))
+    return by_fold, by_run
