@@ -26,6 +26,7 @@ HARMONICS = 5
 """Highest multiple of the frequency at which a residual is read."""
 _FEWEST_CYCLES = 2.0
 _REGULAR = 0.15  # relative spread of half periods, up to which a rate oscillates
+_ABOVE_NOISE = 4.0  # in a run of its own a drift of chance reaches three
 _PURE = 0.97  # share of the rate that odd harmonics must explain
 
 
@@ -84,6 +85,8 @@ class Wave:
         Higher odd harmonics, and even ones; root of the sum of squares.
     drift
         Change from the first to the last sample that does not oscillate.
+    noise
+        What noise, as large as what is left between the harmonics, would put into two of them.
     """
 
     run: str
@@ -93,6 +96,7 @@ class Wave:
     odd: float
     even: float
     drift: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -166,6 +170,8 @@ class Reading:
         }
         sizes = {name: float(np.mean(values)) for name, values in parts.items()}
         largest = max(sizes, key=lambda name: sizes[name])
+        if sizes[largest] < _ABOVE_NOISE * float(np.mean([w.noise for w in self.waves])):
+            return []
         return [
             f"Over the oscillating runs the residual is mostly {largest}: "
             f"{100 * sizes[largest]:.2g} % of the fundamental of the stress."
@@ -393,6 +399,11 @@ def read_wave(record: RunRecord, model: int = -1) -> Wave | None:
     rate, _ = coefficients(record.shear_rate)
     stress, _ = coefficients(record.measured)
     left, drift = coefficients(record.residual[model])
+    rest = record.residual[model][late]
+    rest = rest - basis @ np.linalg.lstsq(basis, rest, rcond=None)[0]
+    free = max(len(time) - basis.shape[1], 1)
+    # cosine and sine of a harmonic each have a variance of 2 s²/n, and two harmonics four of them
+    noise = float(np.sqrt(8.0 * np.sum(rest**2) / free / len(time)))
     scale = abs(stress[0])
     if scale == 0.0 or rate[0] == 0.0:
         return None
@@ -407,4 +418,5 @@ def read_wave(record: RunRecord, model: int = -1) -> Wave | None:
         odd=float(np.linalg.norm(left[2::2]) / scale),
         even=float(np.linalg.norm(left[1::2]) / scale),
         drift=drift / scale,
+        noise=noise / scale,
     )

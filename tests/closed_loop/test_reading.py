@@ -27,12 +27,12 @@ def start_up(rate, residual, seed=0, **options):
     )
 
 
-def oscillating(residual, frequency=0.7, cycles=6.0, samples=400, noise=0.0):
+def oscillating(residual, frequency=0.7, cycles=6.0, samples=400, noise=0.0, seed=1):
     """Return the record of an oscillation with strain sin ωt and stress 2 sin ωt + cos ωt."""
     time = np.linspace(0.0, cycles * 2.0 * np.pi / frequency, samples)
     phase = frequency * time
     measured = 2.0 * np.sin(phase) + np.cos(phase)
-    left = residual(phase) + noise * np.random.default_rng(1).normal(size=samples)
+    left = residual(phase) + noise * np.random.default_rng(seed).normal(size=samples)
     return RunRecord(
         name="wave",
         held_out=False,
@@ -113,6 +113,17 @@ def test_an_oscillating_residual_is_taken_apart(part, residual, size):
     # the fundamental of the stress is √5; the search for the frequency is good to 1e-4
     assert parts.pop(part) == pytest.approx(size / np.sqrt(5.0), rel=1e-2)
     assert max(map(abs, parts.values())) < 2e-3
+
+
+def test_noise_in_an_oscillation_is_of_no_kind():
+    spoke = [
+        read_residual([oscillating(lambda p: 0.0 * p, noise=0.1, seed=seed)]).sentences
+        for seed in range(40)
+    ]
+    # four times what noise puts into two harmonics on average
+    assert not any(spoke)
+    seen = read_residual([oscillating(lambda p: 0.1 * np.sin(3 * p), noise=0.1)])
+    assert "odd harmonics" in seen.sentences[0]
 
 
 def test_a_drift_is_no_harmonic():

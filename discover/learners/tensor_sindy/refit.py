@@ -17,7 +17,7 @@ from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.sensitivities import observe
 
 # One support to a program, and programs side by side in threads: a batch of supports by `vmap`
-# takes as many steps as its slowest member, twice the work (`benchmarks/refits.py`).
+# takes as many steps as its slowest member, two to three times the work (`benchmarks/refits.py`).
 _WORKERS = min(os.cpu_count() or 1, 4)
 
 _MAX_STEPS = 40
