@@ -41,26 +41,19 @@ def recorded(library, data) -> list[tuple]:
 
 def batches(call):
     """Return layouts, starts and the number of supports of each padded batch of a call."""
-    from discover.learners.tensor_sindy.refit import _Layout, free_from_inner
+    from discover.learners.tensor_sindy.refit import _lay_out
 
     problem, supports, starts, scale, slots, keeps, _ = call
     everything = np.ones(problem.target.shape[:2], dtype=bool)
-    for first in range(0, len(supports), LANES):
-        some = range(first, min(first + LANES, len(supports)))
-        active = np.zeros((LANES, slots), dtype=int)
-        occupied = np.zeros((LANES, slots), dtype=bool)
-        begin = np.zeros((LANES, slots + len(problem.library.inner_names)))
-        keep = np.stack([everything] * LANES)
-        for lane, i in enumerate(some):
-            support, (coefficients, inner) = list(supports[i]), starts[i]
-            active[lane, : len(support)] = support
-            occupied[lane, : len(support)] = True
-            begin[lane, : len(support)] = coefficients[support] / scale[support]
-            begin[lane, slots:] = free_from_inner(problem, inner)
-            if keeps is not None:
-                keep[lane] = keeps[i]
-        arrays = (jnp.asarray(a) for a in (active, occupied, scale[active], keep))
-        yield _Layout(*arrays), jnp.asarray(begin), len(some)
+    keeps = [everything] * len(supports) if keeps is None else keeps
+    jobs = list(zip(supports, starts, keeps, strict=True))
+    nothing = ((), starts[0], everything)
+    for first in range(0, len(jobs), LANES):
+        some = jobs[first : first + LANES]
+        padded = [*some, *[nothing] * (LANES - len(some))]
+        laid_out = [_lay_out(problem, s, begin, scale, slots, keep) for s, begin, keep in padded]
+        layouts, begins = jax.tree.map(lambda *leaves: jnp.stack(leaves), *laid_out)
+        yield layouts, begins, len(some)
 
 
 def main() -> None:

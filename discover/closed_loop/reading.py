@@ -216,11 +216,6 @@ def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
     return Reading(_collapses(records, model), _trends(records, model), waves)
 
 
-def _relative(record: RunRecord, model: int) -> Float[np.ndarray, " n"]:
-    size = float(np.sqrt(np.mean(record.measured**2)))
-    return record.residual[model] / (size if size > 0 else 1.0)
-
-
 def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
     """Return what the samples of all runs can be drawn against, by name."""
     found = {
@@ -249,7 +244,7 @@ def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]
     """
     if len(records) < 2:
         return ()
-    residual = [_relative(r, model) for r in records]
+    residual = [r.relative_residual[model] for r in records]
     total = sum(float(np.mean(row**2)) for row in residual)
     if total == 0.0:
         return ()

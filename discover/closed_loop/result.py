@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -108,6 +109,11 @@ class RunRecord:
         """Prediction minus measurement in Pa, for each model."""
         return self.predicted - self.measured
 
+    @property
+    def relative_residual(self) -> Float[np.ndarray, "stages n"]:
+        """The residual over the root-mean-square stress."""
+        return self.residual / (float(np.sqrt(np.mean(self.measured**2))) or 1.0)
+
 
 @dataclass(frozen=True)
 class Fold:
@@ -182,17 +188,12 @@ class LoopResult:
 
         return loop_equation(self)
 
-    def reading(self, model: int = -1) -> "Reading":
-        """Return what the residual depends on; see `discover.closed_loop.reading`.
-
-        Parameters
-        ----------
-        model
-            Whose residual: 0 of the declared model, −1 of the augmented one.
-        """
+    @cached_property
+    def readings(self) -> "tuple[Reading, Reading]":
+        """On what the residuals of the declared and of the augmented model depend."""
         from discover.closed_loop.reading import read_residual
 
-        return read_residual(self.records, model)
+        return read_residual(self.records, 0), read_residual(self.records, -1)
 
     def table(self) -> pd.DataFrame:
         """Return the effects that were added, one line for each of their parameters."""
@@ -248,8 +249,8 @@ class LoopResult:
             "stages": [asdict(stage) for stage in self.stages],
             "remaining": self.remaining,
             "residual": {
-                "declared": self.reading(0).to_json(),
-                "augmented": self.reading(-1).to_json(),
+                name: reading.to_json()
+                for name, reading in zip(("declared", "augmented"), self.readings, strict=True)
             },
             "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
             "ranking": [

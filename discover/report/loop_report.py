@@ -108,8 +108,8 @@ def write_loop(
         law=_law(result),
         remaining=_flatten(result.remaining),
         readings=[
-            (f"Of the {name} model", result.reading(model).sentences)
-            for name, model in (("declared", 0), ("augmented", -1))
+            (f"Of the {name} model", reading.sentences)
+            for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
         ],
         pictures=drawn,
         study_text=study_text,

@@ -174,6 +174,12 @@ def test_the_path_says_how_well_each_run_is_predicted_without_it(giesekus):
     assert empty["laos_2_0.5"] > empty["laos_1_0.5"]
 
 
+def test_runs_may_come_one_after_another(giesekus):
+    model = TensorSINDy(LIBRARY, max_terms=1, n_stability=0)
+    model.fit(iter(small_dataset("giesekus", {"alpha": 0.2}).runs))
+    assert found(model) == pytest.approx(found(giesekus), rel=1e-9)
+
+
 def test_scikit_learn_splits_by_run():
     dataset = small_dataset("giesekus", {"alpha": 0.2})
     model = TensorSINDy(LIBRARY, max_terms=1)

@@ -160,8 +160,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         started = time.perf_counter()
         self._check_parameters()
         library = build_library() if self.library is None else self.library
+        runs = as_runs(X)  # once, for it may be read only once
         problem = make_problem(
-            X,
+            runs,
             library,
             self.modulus,
             self.relaxation_time,
@@ -186,7 +187,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         if validates:
             folds = run_folds(n_runs, self.n_folds, self.random_state)
             held_out, errors = held_out_misfits(problem, path, folds, search.scale, search.slots)
-            names = [run.name for run in as_runs(X)]
+            names = [run.name for run in runs]
             by_run = [dict(zip(names, map(float, row), strict=True)) for row in errors]
         criterion = np.array([search.criterion(fit) for fit in path])
         if self.selection == "held_out" and held_out is not None:

@@ -144,6 +144,21 @@ def _descend(
     return solution.value, solution.aux
 
 
+def _lay_out(problem: TrajectoryProblem, support, begin, scale, slots: int, keep):
+    """Return a support in its slots, and the scaled parameters from which its fit starts."""
+    places, count = list(support), len(support)
+    if count > slots:
+        raise ValueError(f"A support of {count} terms does not fit {slots} slots.")
+    coefficients, inner = begin
+    active = np.zeros(slots, dtype=int)
+    start = np.zeros(slots + len(problem.library.inner_names))
+    active[:count] = places
+    start[:count] = coefficients[places] / scale[places]
+    start[slots:] = free_from_inner(problem, inner)
+    arrays = (active, np.arange(slots) < count, scale[active], keep)
+    return _Layout(*(jnp.asarray(a) for a in arrays)), jnp.asarray(start)
+
+
 def refit(
     problem: TrajectoryProblem,
     supports: Sequence[tuple[int, ...]],
@@ -179,24 +194,11 @@ def refit(
     """
     target = np.asarray(problem.weight * problem.target).reshape(-1)
     observed = np.asarray(problem.weight).reshape(-1) > 0
-    n_inner = len(problem.library.inner_names)
 
     def one(support, begin, keep) -> Fit:
         places, count = list(support), len(support)
-        if count > slots:
-            raise ValueError(f"A support of {count} terms does not fit {slots} slots.")
-        coefficients, inner = begin
-        active = np.zeros(slots, dtype=int)
-        start = np.zeros(slots + n_inner)
-        active[:count] = places
-        start[:count] = coefficients[places] / scale[places]
-        start[slots:] = free_from_inner(problem, inner)
-        layout = _Layout(
-            *(jnp.asarray(a) for a in (active, np.arange(slots) < count, scale[active], keep))
-        )
-        parameters, predicted = _descend(
-            problem, layout, jnp.asarray(start), jnp.asarray(tolerance)
-        )
+        layout, start = _lay_out(problem, support, begin, scale, slots, keep)
+        parameters, predicted = _descend(problem, layout, start, jnp.asarray(tolerance))
         parameters, predicted = np.asarray(parameters), np.asarray(predicted)
         rows = np.repeat(keep.reshape(-1), problem.target.shape[2])
         kept = np.sum((predicted - target)[rows] ** 2)

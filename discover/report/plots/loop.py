@@ -25,10 +25,6 @@ _DECADES = 30.0
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) or 1.0
-
-
 def _is_start_up(record: RunRecord) -> bool:
     """Whether the rate is constant, which makes log time the natural axis."""
     return bool(np.ptp(record.shear_rate) <= 1e-6 * np.max(np.abs(record.shear_rate)))
@@ -99,7 +95,7 @@ def residual_picture(result: LoopResult) -> Picture:
         for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
             limit = 0.0
             for record in result.records:
-                relative = 100.0 * record.residual[stage] / _rms(record.measured)
+                relative = 100.0 * record.relative_residual[stage]
                 style = {
                     "color": _HELD if record.held_out else _FIT,
                     "lw": 0.9,
@@ -130,8 +126,8 @@ def residual_picture(result: LoopResult) -> Picture:
 def reading_picture(result: LoopResult) -> Picture | None:
     """Return on what the residual depends, before and after."""
     readings = [
-        (result.reading(0), "declared", BEFORE),
-        (result.reading(-1), "augmented", _FIT),
+        (result.readings[0], "declared", BEFORE),
+        (result.readings[1], "augmented", _FIT),
     ]
     if not readings[0][0].collapses:
         return None
@@ -166,7 +162,7 @@ def reading_picture(result: LoopResult) -> Picture | None:
 def _draw_run_by_run(panel, result: LoopResult) -> None:
     """Draw the error of each run against what its residual follows, or the largest shear rate."""
     varied = differences(result.records)
-    followed = [trend.quantity for trend in result.reading(-1).trends]
+    followed = [trend.quantity for trend in result.readings[1].trends]
     name = next(iter([*followed, *varied]), None)
     if name is None:
         panel.set_visible(False)
