@@ -9,7 +9,7 @@ from discover.learners.tensor_sindy.intervals import (
     ParameterUncertainty,
     least_squares_covariance,
 )
-from discover.learners.tensor_sindy.noise_model import noise_model
+from discover.statistics import noise_model
 
 N_RUNS, N_SAMPLES, N_SETS = 6, 120, 400
 SEQUENCES = list(np.arange(N_RUNS * N_SAMPLES).reshape(N_RUNS, N_SAMPLES))

@@ -1,26 +1,16 @@
-"""Intervals of fitted parameters, from the sensitivities of the integrated trajectories.
-
-A least-squares fit weighs all samples alike whatever their noise, so its covariance is
-
-    C = (SᵀS)⁻¹ Sᵀ Ω S (SᵀS)⁻¹,
-
-with S the weighted sensitivities and Ω the covariance of the noise. Ω is estimated from the
-residual as an autoregressive process (`noise_model`): a block bootstrap needs a refit for every
-draw, an effective sample size alone would shrink all directions alike, while slow noise spoils a
-slow signature more than a fast one.
-"""
+"""Intervals of fitted parameters, from the sensitivities of the integrated trajectories."""
 
 from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.learners.tensor_sindy.noise_model import NoiseModel, noise_model
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.statistics import NoiseModel, least_squares_covariance
 
 
 @dataclass(frozen=True)
@@ -114,35 +104,6 @@ def parameter_uncertainty(
         factor=float(student.ppf(0.975, free)),
         noise=noise,
     )
-
-
-def least_squares_covariance(
-    columns: Float[np.ndarray, "rows p"],
-    residual: Float[np.ndarray, " rows"],
-    sequences: list[Int[np.ndarray, " _"]],
-) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
-    """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
-
-    Parameters
-    ----------
-    columns
-        Sensitivities S.
-    residual
-        Residual of the fit.
-    sequences
-        Rows of each sequence of observations, in the order of time.
-    """
-    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
-    # columns of like size, or the pseudo-inverse would drop what is merely small
-    norms = np.linalg.norm(columns, axis=0)
-    norms = np.where(norms > 0, norms, 1.0)
-    scaled = columns / norms
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14)
-    middle = sum(
-        scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
-    )
-    sizes = np.outer(norms, norms)
-    return inverse @ middle @ inverse / sizes, inverse / sizes, noise
 
 
 def _sequences(problem: TrajectoryProblem) -> list[np.ndarray]:

@@ -1,0 +1,47 @@
+"""How uncertain the parameters of a least-squares fit are when the noise is correlated.
+
+A least-squares fit weighs all samples alike whatever their noise, so its covariance is
+
+    C = (SᵀS)⁻¹ Sᵀ Ω S (SᵀS)⁻¹,
+
+with S the weighted sensitivities and Ω the covariance of the noise. Ω is estimated from the
+residual as an autoregressive process (`noise_model`): a block bootstrap needs a refit for every
+draw, an effective sample size alone would shrink all directions alike, while slow noise spoils a
+slow signature more than a fast one.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from discover.statistics.noise_model import NoiseModel, noise_model
+
+
+def least_squares_covariance(
+    columns: Float[np.ndarray, "rows p"],
+    residual: Float[np.ndarray, " rows"],
+    sequences: Sequence[Int[np.ndarray, " _"]],
+) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
+    """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
+
+    Parameters
+    ----------
+    columns
+        Sensitivities S.
+    residual
+        Residual of the fit.
+    sequences
+        Rows of each sequence of observations, in the order of time.
+    """
+    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
+    # columns of like size, or the pseudo-inverse would drop what is merely small
+    norms = np.linalg.norm(columns, axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    scaled = columns / norms
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14)
+    middle = sum(
+        scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
+    )
+    sizes = np.outer(norms, norms)
+    return inverse @ middle @ inverse / sizes, inverse / sizes, noise
