@@ -15,7 +15,8 @@ ALIAS_COSINE = 0.99
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
-_INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
+INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
+"""Multiples of an inner time or exponent from which an effect is tried too."""
 
 
 @dataclass
@@ -76,7 +77,8 @@ def attribute(
     The signature of an effect is the change of the prediction at a small amplitude, made
     orthogonal to what the fitted parameters can do. Because a base law may be far off, where a
     signature at zero amplitude says little, amplitudes around the first-order one are tried with
-    the whole nonlinear model as well, and candidates are ranked by the best of them.
+    the whole nonlinear model as well, once with what is fitted held and once with it giving way to
+    first order, and candidates are ranked by the best of them.
 
     Parameters
     ----------
@@ -104,14 +106,13 @@ def attribute(
     residual = fit.residual.ravel()
     total = float(residual @ residual)
     changes = model.residuals(probes, batch).reshape(len(probes), -1) - residual
-    basis = np.zeros((residual.size, 0))
-    if len(fit.free):
-        basis, _ = np.linalg.qr(fit.jacobian.reshape(len(fit.free), -1).T)
-    tried, sides = [], []
+    basis, upper = np.linalg.qr(fit.jacobian.reshape(len(fit.free), residual.size).T)
+    tried, sides, yields = [], [], []
     for effect, position, change in zip(owners, at, changes, strict=True):
         signature = np.where(np.isfinite(change), change, 0.0) / (0.1 * model.first_trial[position])
         length = np.linalg.norm(signature)
-        beyond = signature - basis @ (basis.T @ signature)
+        shared = basis.T @ signature
+        beyond = signature - basis @ shared
         beyond_length = np.linalg.norm(beyond)
         score, step = 0.0, 0.0
         if beyond_length > 1e-4 * length and length > 0:
@@ -122,7 +123,8 @@ def attribute(
                 score, step = 0.0, 0.0
         tried.append(CandidateScore(effect.name, effect.kind, score, step))
         sides.append(beyond / beyond_length if score > 0 else np.zeros_like(beyond))
-    _try_amplitudes(model, batch, fit, tried, bases, at)
+        yields.append(-np.linalg.lstsq(upper, shared, rcond=None)[0])
+    _try_amplitudes(model, batch, fit, tried, bases, at, yields)
     candidates, signatures = [], []
     for effect in waiting:
         own = [i for i, owner in enumerate(owners) if owner is effect]
@@ -156,16 +158,20 @@ def _bases(model: AugmentedModel, fit: Fit, effect: AbstractEffect) -> list[np.n
     """
     bases = [fit.theta.copy()]
     inner = model.positions(effect.name)[1:]
-    for stretch in _INNER_STRETCHES if inner else ():
+    for stretch in INNER_STRETCHES if inner else ():
         base = fit.theta.copy()
         base[inner] = np.clip(stretch * base[inner], model.low[inner], model.high[inner])
         bases.append(base)
     return bases
 
 
-def _try_amplitudes(model, batch, fit, candidates, bases, at):
+def _try_amplitudes(model, batch, fit, candidates, bases, at, yields):
+    """Try amplitudes, with what is fitted already held, and giving way to first order."""
     trials, owner = [], []
-    for i, (candidate, base, position) in enumerate(zip(candidates, bases, at, strict=True)):
+    others = list(fit.free)
+    for i, (candidate, base, position, given) in enumerate(
+        zip(candidates, bases, at, yields, strict=True)
+    ):
         candidate.start = base.copy()
         if candidate.score <= 0:
             continue
@@ -176,6 +182,11 @@ def _try_amplitudes(model, batch, fit, candidates, bases, at):
             )
             trials.append(theta)
             owner.append(i)
+            if others:
+                moved = theta.copy()
+                moved[others] += theta[position] * given
+                trials.append(np.clip(moved, model.low, model.high))
+                owner.append(i)
     if not trials:
         return
     costs = np.sum(model.residuals(trials, batch) ** 2, axis=(1, 2))

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import t as student
 
-from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.attribution import INNER_STRETCHES, CandidateScore
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
     NO_PRIOR,
     Fit,
     Prior,
     fit_batch,
-    leave_one_run_out,
+    left_out_errors,
 )
 from discover.closed_loop.residual import summarise
 from discover.closed_loop.run_batch import RunBatch
+from discover.statistics import least_squares_covariance
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""
@@ -29,6 +31,14 @@ INDISTINGUISHABLE = 6.0
 BARE_MENTION = 2.0
 """A difference of the criterion below this is worth no more than a bare mention (same source): it
 adds no effect, and of two effects the simpler is taken."""
+
+
+RANKING = 1e-3
+"""A refit that ranks ends when a step lowers its cost by less than this fraction, which moves no
+criterion by one."""
+
+
+_RESTARTED = 3
 
 
 @dataclass
@@ -89,8 +99,8 @@ def refit(
 ) -> list[Choice]:
     """Refit each leading candidate together with all that is fitted already.
 
-    The refit carries no penalty, so its coefficients are not biased towards zero. Fills in the
-    candidates' errors and evidence.
+    The refit carries no penalty, so its coefficients are not biased towards zero; it is as sharp as
+    a ranking needs (`RANKING`). Fills in the candidates' errors and evidence.
 
     Parameters
     ----------
@@ -107,19 +117,52 @@ def refit(
         return []
     weight = np.asarray(batch.weight)
     free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
-    fits = fit_batch(model, batch, [candidate.start for candidate in leaders], free, prior=prior)
+    starts = [candidate.start for candidate in leaders]
+    fits = fit_batch(model, batch, starts, free, tolerance=RANKING, prior=prior, rivals=True)
+    fits = _restarted(model, batch, fits, prior)
     best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
     effective = summarise(best.residual, weight).effective_samples
     choices = []
     for candidate, trial in zip(leaders, fits, strict=True):
         if not trial.usable:
             continue
-        left_out = leave_one_run_out(model, batch, trial, prior)
+        left_out = left_out_errors(model, batch, trial, prior)
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
         candidate.evidence = evidence(fit, trial, effective, n_candidates)
         choices.append(Choice(candidate, trial, left_out))
     return choices
+
+
+def _restarted(
+    model: AugmentedModel, batch: RunBatch, fits: Sequence[Fit], prior: Prior
+) -> list[Fit]:
+    """Return fits of which the best were also started from other inner times and exponents.
+
+    In these a misfit has several minima: where two effects share a misfit, the inner time at which
+    the first stood alone may be far from the one at which both serve best.
+    """
+    fits = list(fits)
+    order = sorted((i for i, fit in enumerate(fits) if fit.usable), key=lambda i: fits[i].cost)
+    starts, owners = [], []
+    for i in order[:_RESTARTED]:
+        for effect in model.effects:
+            amplitude, *inner = model.positions(effect.name)
+            if not inner or amplitude not in fits[i].free:
+                continue
+            for stretch in INNER_STRETCHES:
+                theta = fits[i].theta.copy()
+                theta[inner] = np.clip(stretch * theta[inner], model.low[inner], model.high[inner])
+                starts.append(theta)
+                owners.append(i)
+    if not starts:
+        return fits
+    free = [fits[i].free for i in owners]
+    again = fit_batch(model, batch, starts, free, tolerance=RANKING, prior=prior, rivals=True)
+    for i, fit in zip(owners, again, strict=True):
+        if fit.usable and fit.cost < fits[i].cost:
+            fits[i] = fit
+    return fits
 
 
 def simplest(choices: Sequence[Choice], model: AugmentedModel) -> Choice:
@@ -144,13 +187,11 @@ def choose(
     left_out_before
         Mean error of the runs left out before adding anything.
     """
-    one_run = bool(choices) and len(choices[0].left_out) < 2
     earned = [
         choice
         for choice in choices
         if (choice.candidate.evidence or 0.0) > BARE_MENTION
-        # a run left out of one run leaves nothing to fit
-        and (one_run or np.mean(choice.left_out) < IMPROVEMENT * left_out_before)
+        and np.mean(choice.left_out) < IMPROVEMENT * left_out_before
     ]
     if not earned:
         return None
@@ -224,24 +265,25 @@ def prune(
 def intervals(model: AugmentedModel, batch: RunBatch, fit: Fit) -> dict[int, tuple[float, float]]:
     """Return the 95 % interval of each fitted parameter, by position.
 
-    From the curvature at the fit, with the residual's variance counted on as many samples as its
-    correlation leaves independent.
+    From the curvature at the fit and the noise that its residual shows; see
+    `discover.statistics.least_squares_covariance`.
     """
     if not fit.free:
         return {}
+    n_runs, n = fit.residual.shape
     design = fit.jacobian.reshape(len(fit.free), -1).T
-    weight = np.asarray(batch.weight)
-    n = np.count_nonzero(weight)
-    effective = summarise(fit.residual, weight).effective_samples
-    scale = np.linalg.norm(design, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
-    variance = fit.cost / max(n - len(fit.free), 1) * n / max(effective, 1.0)
-    half = 1.96 * np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance) / scale
-    return {
-        position: (
-            float(max(fit.theta[position] - h, model.low[position])),
-            float(min(fit.theta[position] + h, model.high[position])),
+    rows = np.arange(n_runs * n).reshape(n_runs, n)
+    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
+    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
+    independent = max(noise.effective_samples - len(fit.free), 1.0)
+    half = student.ppf(0.975, independent) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    bounds = {}
+    for position, h in zip(fit.free, half, strict=True):
+        value, low, high = fit.theta[position], model.low[position], model.high[position]
+        # a time must be positive, and what may be as short as that may be nothing
+        floor = 0.0 if 0.0 < low < 1e-6 * value else low
+        bounds[position] = (
+            float(floor if value - h < low else value - h),
+            float(min(value + h, high)),
         )
-        for position, h in zip(fit.free, half, strict=True)
-    }
+    return bounds

@@ -17,7 +17,7 @@ def run_loop_on_each(
     dataset: ShearDataset,
     declared: DeclaredModel,
     fit: Sequence[str] | None = None,
-    effects: Sequence[str | AbstractEffect] | None = None,
+    effects: Sequence[str | AbstractEffect] | str | None = None,
     max_effects: int = 3,
     strain: tuple[float, float] | None = None,
     noise: float | None = None,

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.run_batch import RunBatch
 
 _LARGEST_DAMPING = 1e7
+_FAR_BEHIND, _HARDLY = 2.0, 0.05
 _MISSED = 10.0
 
 
@@ -90,17 +91,21 @@ def fit_batch(
     batch: RunBatch,
     starts: Sequence[np.ndarray],
     free: Sequence[Sequence[int]],
-    max_steps: int = 25,
+    max_steps: int = 60,
     tolerance: float = 1e-4,
     prior: Prior = NO_PRIOR,
+    rivals: bool = False,
 ) -> list[Fit]:
     """Minimise the squared residuals from several starts, each in its own free parameters.
 
     All problems advance together, so that each step is a few calls of one compiled function.
     Derivatives are differences: a residual costs so little beside a compilation of its derivative
-    that this is several times faster here. A trial that cannot be integrated has no finite
-    residual and is a rejected step. Parameters stay in their admissible range by projection
-    [Marquardt 1963, J. SIAM 11, 431].
+    that this is several times faster here. A step taken corrects them as far as it tells about
+    them   [Broyden 1965, Math. Comput. 19, 577], and they are taken anew when a step so found is
+    rejected, or so short that the problem would count as finished: a step then costs one residual
+    instead of one for each parameter. A trial that cannot be integrated has no finite residual and
+    is a rejected step. Parameters stay in their admissible range by projection   [Marquardt 1963,
+    J. SIAM 11, 431].
 
     Parameters
     ----------
@@ -114,6 +119,9 @@ def fit_batch(
         A problem is finished when a step lowers its cost by less than this fraction.
     prior
         What is known of some parameters; it counts where they are free.
+    rivals
+        Whether only the best problems matter: one that is far behind and hardly gains any more is
+        left where it is.
     """
     theta = np.array(starts, dtype=float)
     count = len(theta)
@@ -129,13 +137,14 @@ def fit_batch(
     damping = np.full(count, 1e-2)
     done = ~np.isfinite(cost) | np.array([len(positions) == 0 for positions in free])
     jacobian: list[np.ndarray | None] = [None] * count
+    fresh = np.zeros(count, dtype=bool)
     for _ in range(max_steps):
         if done.all():
             break
         stale = [int(i) for i in np.flatnonzero(~done) if jacobian[i] is None]
-        fresh = jacobians(model, batch, theta[stale], residual[stale], [free[i] for i in stale])
-        for i, value in zip(stale, fresh, strict=True):
-            jacobian[i] = value
+        taken = jacobians(model, batch, theta[stale], residual[stale], [free[i] for i in stale])
+        for i, value in zip(stale, taken, strict=True):
+            jacobian[i], fresh[i] = value, True
         going = [int(i) for i in np.flatnonzero(~done)]
         trial = theta[going].copy()
         for row, i in enumerate(going):
@@ -147,15 +156,32 @@ def fit_batch(
         trial_cost = priced(_costs(trial_residual), trial, going)
         for row, i in enumerate(going):
             if trial_cost[row] < cost[i]:
-                done[i] = 1.0 - trial_cost[row] / cost[i] < tolerance
+                gain = 1.0 - trial_cost[row] / cost[i]
+                short = gain < tolerance
+                behind = rivals and cost[i] > _FAR_BEHIND * np.min(cost) and gain < _HARDLY
+                done[i] = (short and fresh[i]) or behind
+                step = trial[row, list(free[i])] - theta[i, list(free[i])]
+                change = trial_residual[row] - residual[i]
                 theta[i], residual[i], cost[i] = trial[row], trial_residual[row], trial_cost[row]
                 damping[i] = max(damping[i] / 5.0, 1e-10)
-                jacobian[i] = None
-            else:
+                if not done[i]:
+                    jacobian[i] = None if short else _corrected(jacobian[i], step, change)
+                    fresh[i] = False
+            elif fresh[i]:
                 damping[i] *= 5.0
                 done[i] = damping[i] > _LARGEST_DAMPING
-    final = jacobians(model, batch, theta, residual, free)
-    return [Fit(theta[i], tuple(free[i]), residual[i], final[i]) for i in range(count)]
+            else:
+                jacobian[i] = None
+    # those of the last step, unless that was not the last
+    missing = [i for i in range(count) if not fresh[i]]
+    taken = jacobians(model, batch, theta[missing], residual[missing], [free[i] for i in missing])
+    for i, value in zip(missing, taken, strict=True):
+        jacobian[i] = value
+    return [
+        Fit(theta[i], tuple(free[i]), residual[i], derivatives)
+        for i, derivatives in enumerate(jacobian)
+        if derivatives is not None
+    ]
 
 
 def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
@@ -182,6 +208,12 @@ def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
     return out
 
 
+def _corrected(jacobian, step, change):
+    """Return derivatives that explain the change that a step made."""
+    missed = change - np.tensordot(step, jacobian, axes=1)
+    return jacobian + np.multiply.outer(step / (step @ step), missed)
+
+
 def _costs(residual):
     with np.errstate(over="ignore", invalid="ignore"):
         cost = np.sum(residual**2, axis=(1, 2))
@@ -206,27 +238,61 @@ def _step(jacobian, residual, damping, known=None):
     return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
 
 
-def leave_one_run_out(
+def left_out_errors(
     model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> Float[np.ndarray, " runs"]:
-    """Return the relative error of each run when it is left out of the fit.
+    """Return the relative error of each run where it is left out of the fit.
 
-    The fit without a run is one Gauss–Newton step from the fit with it, and the run is then
-    predicted with the whole nonlinear model. A run whose prediction fails counts as missed by far.
+    Runs are left out one after another. Of fewer than `FEWEST_FOLDS` runs each is left out in parts
+    instead, stretches of equal length: to leave out one run of three would ask for an extrapolation
+    from the other two, which says little of a law, and one run alone would be all that there is.
+
+    A fit without some samples is one Gauss–Newton step from the fit with them, and they are then
+    predicted with the whole nonlinear model. What cannot be predicted counts as missed by far.
 
     Parameters
     ----------
-    model, batch, fit
-        The fit to all runs.
+    model, batch
+        The model and the runs.
+    fit
+        The fit to all of them.
+    prior
+        What is known of some parameters.
     """
-    n_runs = len(fit.residual)
+    weighted = np.asarray(batch.weight) > 0
+    folds = _folds(weighted)
+    at = list(fit.free)
     trials = []
-    for left_out in range(n_runs):
-        others = np.arange(n_runs) != left_out
-        theta, at = fit.theta.copy(), list(fit.free)
-        step = _step(fit.jacobian[:, others], fit.residual[others], 1e-8, prior.rows(theta, at))
+    for left_out in folds:
+        # rows of zeros count for nothing
+        kept = weighted & ~left_out
+        step = _step(fit.jacobian * kept, fit.residual * kept, 1e-8, prior.rows(fit.theta, at))
+        theta = fit.theta.copy()
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)
-    errors = np.sqrt(np.sum(model.residuals(trials, batch) ** 2, axis=2))
-    own = errors[np.arange(n_runs), np.arange(n_runs)]
-    return np.where(np.isfinite(own), np.minimum(own, _MISSED), _MISSED)
+    squares = np.zeros(len(weighted))
+    for left_out, residual in zip(folds, model.residuals(trials, batch), strict=True):
+        with np.errstate(over="ignore", invalid="ignore"):
+            missed = np.sum(np.where(left_out, residual**2, 0.0), axis=1)
+        squares += np.where(np.isfinite(missed), missed, np.inf)
+    return np.minimum(np.sqrt(squares), _MISSED)
+
+
+FEWEST_FOLDS = 4
+"""Runs from which on each is left out as a whole."""
+
+_PARTS = 8
+
+
+def _folds(weighted: Bool[np.ndarray, "runs n"]) -> list[Bool[np.ndarray, "runs n"]]:
+    """Return which samples are left out together."""
+    n_runs = len(weighted)
+    parts = 1 if n_runs >= FEWEST_FOLDS else -(-_PARTS // n_runs)
+    folds = []
+    for run, seen in enumerate(weighted):
+        for part in np.array_split(np.flatnonzero(seen), parts):
+            if part.size:
+                left_out = np.zeros_like(weighted)
+                left_out[run, part] = True
+                folds.append(left_out)
+    return folds

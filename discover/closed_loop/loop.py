@@ -16,8 +16,9 @@ from discover.closed_loop.before_after import (
     strain_of,
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
+from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import STRUCTURE, Expectation, summarise
+from discover.closed_loop.residual import STRUCTURE, Expectation, fast_part, summarise
 from discover.closed_loop.result import ErrorPair, LoopResult, Stage, StageParameter, Verdict
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
@@ -43,8 +44,12 @@ FEWEST_LINEAR_SAMPLES = 10
 """Fewer samples than this at small strain settle nothing."""
 
 MOST_SAMPLES = 400
-"""Samples of a run that are used by default: a search costs as much as it has samples, and more of
-them say little more of a law."""
+"""Samples of a run that are used by default, at most: a search costs as much as it has samples, and
+more of them say little more of a law."""
+
+_FEWEST_KEPT = 150
+_RESOLVED = 1e-3
+"""Relative error that the noise of as many samples as are used may leave."""
 
 ONLY_NOISE = 0.9
 """A model that misses a record by more of it than this says nothing of it."""
@@ -66,7 +71,7 @@ def run_loop(
     declared: DeclaredModel,
     fit: Sequence[str] | None = None,
     held_out: Sequence[str] = (),
-    effects: Sequence[str | AbstractEffect] | None = None,
+    effects: Sequence[str | AbstractEffect] | str | None = None,
     max_effects: int = 3,
     strain: tuple[float, float] | None = None,
     noise: float | None = None,
@@ -95,8 +100,8 @@ def run_loop(
     held_out
         Names of the runs that only judge.
     effects
-        Candidates, by name, by spelling of a library term, or as objects; by default every named
-        effect and every library term up to one invariant.
+        Candidates, by name, by spelling of a library term, or as objects; ``"named"`` for every
+        effect with a name; by default these and every library term up to one invariant.
     max_effects
         Largest number of effects added.
     strain
@@ -104,7 +109,8 @@ def run_loop(
     noise
         Relative noise, where it is known; estimated from the residuals otherwise.
     most_samples
-        Of a run with more samples only so many are used, evenly chosen, to fit and to judge.
+        Of a run with more samples at most so many are used, evenly chosen, to fit and to judge; of
+        one with little noise fewer, but no fewer than 150.
     progress
         Called with a line of text now and then.
 
@@ -137,7 +143,8 @@ def run_loop(
     search.start()
     _settle(search, fitted_runs, max_effects, say)
     search.run(max_effects, say)
-    current, active, thetas = search.fit, search.active, search.path
+    active, thetas = search.active, search.path
+    search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     order = dataset.names
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False, order=order)
     if held_batch is not None:
@@ -200,8 +207,16 @@ def _split(dataset, fit, held_out, strain, most):
             "told from fewer samples."
         )
     return [
-        [thin_run(run, most) for run in cut_to_strain(part.runs, strain)] for part in (fitted, held)
+        [thin_run(run, _needed(run, most)) for run in cut_to_strain(part.runs, strain)]
+        for part in (fitted, held)
     ]
+
+
+def _needed(run: ShearRun, most: int) -> int:
+    """Return how many samples of a run resolve its stress to `_RESOLVED`."""
+    size = float(np.sqrt(np.mean(run.shear_stress**2)))
+    noise = fast_part(run.shear_stress) / size if size > 0.0 else 0.0
+    return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
 
 
 def _require_samples(runs: Sequence[ShearRun], declared: DeclaredModel) -> None:
@@ -215,9 +230,16 @@ def _require_samples(runs: Sequence[ShearRun], declared: DeclaredModel) -> None:
         )
 
 
-def _candidates(effects: Sequence[str | AbstractEffect] | None) -> list[AbstractEffect]:
+def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
     if effects is None:
         return [*named_effects().values(), *library_effects()]
+    if effects == "named":
+        return [*named_effects().values()]
+    if isinstance(effects, str):
+        raise InputError(
+            f'effects must be a list of names, or "named" for every effect with a name; got '
+            f"{effects!r}. Write [{effects!r}] for this one alone."
+        )
     if not effects:
         raise InputError("The loop needs at least one candidate effect; got none.")
     made = [make_effect(effect) if isinstance(effect, str) else effect for effect in effects]

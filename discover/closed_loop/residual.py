@@ -7,6 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.statistics import independent_samples
+
 LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
 
@@ -45,10 +47,7 @@ def summarise(
 ) -> ResidualSummary:
     """Return noise and structure of weighted residuals.
 
-    The noise comes from third differences, which a smooth residual hardly has, through their
-    median, which a few jumps hardly move   [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73,
-    625, for the idea]. Samples correlated with their neighbours are worth
-    n (1 − ρ)/(1 + ρ) independent ones.
+    For the noise see `fast_part`, for the number of samples `independent_samples`.
 
     Parameters
     ----------
@@ -61,15 +60,30 @@ def summarise(
     for row, w in zip(residual, weight, strict=True):
         values = row[w > 0] * np.sqrt(np.count_nonzero(w))
         n = len(values)
-        third = np.diff(values, 3)
-        # the coefficients 1, 3, 3, 1 have a sum of squares of 20
-        noise.append(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0) if n > 6 else 0.0)
+        noise.append(fast_part(values))
         power = float(np.sum(values**2))
         rho = float(np.sum(values[1:] * values[:-1])) / power if power > 0 and n > 2 else 0.0
         rho = float(np.clip(rho, 0.0, 0.99))
         correlation.append(rho)
-        effective += max(1.0, n * (1.0 - rho) / (1.0 + rho))
+        effective += independent_samples(values)
     return ResidualSummary(np.array(noise), np.array(correlation), effective)
+
+
+def fast_part(values: Float[np.ndarray, " n"]) -> float:
+    """Return the standard deviation of what changes from sample to sample.
+
+    From third differences, which a smooth sequence hardly has, through their median, which a few
+    jumps hardly move   [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73, 625, for the idea].
+
+    Parameters
+    ----------
+    values
+        In order; of fewer than 7 nothing is said.
+    """
+    if len(values) < 7:
+        return 0.0
+    # the coefficients 1, 3, 3, 1 have a sum of squares of 20
+    return float(1.4826 * np.median(np.abs(np.diff(values, 3))) / np.sqrt(20.0))
 
 
 def noise_floor(

@@ -23,7 +23,7 @@ from discover.closed_loop.least_squares import (
     Prior,
     fit_batch,
     jacobians,
-    leave_one_run_out,
+    left_out_errors,
 )
 from discover.closed_loop.residual import (
     SIGNIFICANCE,
@@ -201,9 +201,10 @@ class Search:
             added = len(kept) - len(active)
             effective = summarise(fit.residual, np.asarray(self.batch.weight)).effective_samples
             support = evidence(before, fit, effective, self.n_candidates, added)
-            errors = leave_one_run_out(self.model, self.batch, fit, self.prior)
+            errors = left_out_errors(self.model, self.batch, fit, self.prior)
             if added < 2 or support <= BARE_MENTION or np.mean(errors) >= IMPROVEMENT * left_out:
                 continue
+            fit = self._sharpened(fit)
             self.fit = fit
             self.fit, self.active = prune(
                 self.model, self.batch, fit, kept, self.n_candidates, self.settled, self.prior
@@ -224,8 +225,10 @@ class Search:
         """Ask of each effect but the last whether another serves better now; say if one does.
 
         An effect was chosen when those after it were still missing, and may have stood for a part
-        of them. What was settled at small strain gives way only where the whole is then explained:
-        the misfit of a law still missing cannot judge the instrument.
+        of them. Another serves better if it has more evidence and predicts runs left out better.
+        What was settled at small strain gives way only where the whole is then explained, for the
+        misfit of a law still missing cannot judge the instrument, and only to what gains more than
+        small strains said for it.
         """
         asked = list(self.active)
         if self.active and not self.settled:
@@ -250,13 +253,18 @@ class Search:
         asked = [current, *leading][:_COMPARED]
         choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
         choices = [c for c in choices if self._predictable(c.fit.theta)]
-        if not any(c.candidate is current for c in choices):
+        own_choice = next((c for c in choices if c.candidate is current), None)
+        if own_choice is None:
             return False
-        best = simplest(choices, self.model)
+        # evidence alone would let a term in that fits a little better and predicts worse
+        expected = np.mean(own_choice.left_out)
+        able = [c for c in choices if c is own_choice or np.mean(c.left_out) < expected]
+        best = simplest(able, self.model)
         if (best.candidate.evidence or 0.0) < (current.evidence or 0.0):
-            best = next(c for c in choices if c.candidate is current)
+            best = own_choice
         explained = self.expectation.explains(best.fit.residual, np.asarray(self.batch.weight))
-        if name in self.settled and not explained:
+        gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
+        if name in self.settled and not (explained and gain > self.support[name]):
             return False
         self.aliases[name] = aliases_of(best, choices)
         if best.candidate is current:
@@ -267,7 +275,7 @@ class Search:
         self.active[self.active.index(name)] = new
         self.settled = tuple(n for n in self.settled if n != name)
         self.known = {at: value for at, value in self.known.items() if at not in own}
-        self.fit = best.fit
+        self.fit = self._sharpened(best.fit)
         self._polish()
         self._fit_path()
         self._leave_out()
@@ -309,7 +317,7 @@ class Search:
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
         kept = [*self.active, name]
-        self.fit = chosen.fit
+        self.fit = self._sharpened(chosen.fit)
         self._polish()
         self.fit, self.active = prune(
             self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
@@ -349,6 +357,11 @@ class Search:
         start[positions] = values[positions]
         return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]
 
+    def _sharpened(self, fit: Fit) -> Fit:
+        """Return a fit that only ranked candidates, carried on to the end."""
+        again = fit_batch(self.model, self.batch, [fit.theta], [fit.free], prior=self.prior)[0]
+        return again if again.usable else fit
+
     def _polish(self) -> None:
         """Fit again while a better fit weighs what is known otherwise."""
         for _ in range(_POLISHES if self.known else 0):
@@ -363,12 +376,20 @@ class Search:
                 break
 
     def _fit_path(self) -> None:
-        earlier = [self._fit(self.active[:n], self.fit.theta) for n in range(len(self.active))]
-        self.path = [*(fit.theta for fit in earlier), self.fit.theta]
+        """Fit the stages that lead to the model again.
+
+        An effect may make a law run away until a later one checks it; that stage then stays where
+        the one before it was, for it explains nothing that could be said in numbers.
+        """
+        earlier: list[np.ndarray] = []
+        for n in range(len(self.active)):
+            fit = self._fit(self.active[:n], self.fit.theta)
+            earlier.append(fit.theta if fit.usable or not earlier else earlier[-1])
+        self.path = [*earlier, self.fit.theta]
 
     def _leave_out(self) -> None:
         self.left_out = float(
-            np.mean(leave_one_run_out(self.model, self.batch, self.fit, self.prior))
+            np.mean(left_out_errors(self.model, self.batch, self.fit, self.prior))
         )
 
     def _predictable(self, theta: np.ndarray) -> bool:

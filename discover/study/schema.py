@@ -87,7 +87,7 @@ class Loop(_Section):
 
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
     strain: tuple[float, float] | None = None
-    effects: tuple[str, ...] | None = None
+    effects: tuple[str, ...] | Literal["named"] | None = None
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
 

@@ -4,7 +4,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.least_squares import fit_batch, leave_one_run_out
+from discover.closed_loop.least_squares import fit_batch, left_out_errors
 from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearRun
 from discover.effects import make_effect
@@ -82,7 +82,7 @@ def test_a_fit_finds_the_parameter_and_predicts_runs_left_out():
     start[at] = 0.05
     fit = fit_batch(model, batch, [start], [at], tolerance=1e-8)[0]
     assert fit.theta[at[0]] == pytest.approx(0.3, abs=1e-3)
-    assert np.max(leave_one_run_out(model, batch, fit)) < 1e-3
+    assert np.max(left_out_errors(model, batch, fit)) < 1e-3
 
 
 def test_a_trial_that_runs_away_is_a_rejected_step_and_no_crash():
