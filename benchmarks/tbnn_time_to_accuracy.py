@@ -67,10 +67,9 @@ def adaptive_gradient(problem, network):
                 diffrax.Tsit5(),
                 0.0,
                 times[-1],
-                None,
+                0.01,
                 jnp.zeros((1, 4)),
                 args=(fluid, protocol),
-                dt0=0.01,
                 saveat=diffrax.SaveAt(ts=times),
                 stepsize_controller=diffrax.PIDController(1e-6, 1e-8),
                 adjoint=diffrax.BacksolveAdjoint(

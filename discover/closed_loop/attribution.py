@@ -15,6 +15,9 @@ ALIAS_COSINE = 0.99
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
+_FINITE = 4.0
+"""Multiple of an effect's first trial at which it shows."""
+
 INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
 """Multiples of an inner time or exponent from which an effect is tried too."""
 
@@ -89,8 +92,9 @@ def attribute(
     active
         Effects already in the model.
     leaders
-        How many candidates with signatures of their own lead, and how many more whose signature
-        one of those has already.
+        How many candidates with signatures of their own lead, how many more whose signature one
+        of those has already, and, where constants of the declared model are fitted, how many of
+        the simplest that seem to do nothing.
     admitted
         Which effects are candidates.
     """
@@ -146,6 +150,19 @@ def attribute(
     # too; but they must not crowd out candidates of another kind
     twins.sort(key=lambda i: (waiting[i].complexity, -candidates[i].reduction))
     leading = heads[:leaders] + twins[:leaders]
+    if model.declared.free_positions:
+        # constants that were fitted without an effect may stand where every small amount of it is
+        # worse: what points the wrong way is refitted from a finite amount
+        silent = [i for i in order if candidates[i].reduction <= 0.0]
+        silent.sort(key=lambda i: (waiting[i].complexity, i))
+        for i in silent[:leaders]:
+            position = model.slices[waiting[i].name].start
+            start = fit.theta.copy()
+            start[position] = np.clip(
+                _FINITE * model.first_trial[position], model.low[position], model.high[position]
+            )
+            candidates[i].start = start
+            leading.append(i)
     rest = [i for i in order if i not in leading]
     return Attribution([candidates[i] for i in leading], [candidates[i] for i in rest])
 

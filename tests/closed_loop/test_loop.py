@@ -227,3 +227,20 @@ def test_one_instrument_effect_cuts_the_held_out_error_of_the_melt_fourfold(meas
     assert stage.kind in ("kinematic", "signal")
     assert len(stage.parameters) == 1
     assert result.error_after.held_out < 0.25 * result.error_before.held_out
+
+
+def test_one_start_up_gives_the_law_though_modulus_and_time_are_unknown_too():
+    # fitted without the effect, the constants stand where every small amount of it is worse
+    dataset = make_dataset(Giesekus(0.3), noise=0.002)
+    declared = DeclaredModel.maxwell(10.0, 3.0, fit_modulus=True, fit_relaxation_time=True)
+    result = run_loop(
+        ShearDataset("one", (dataset["fast"],)),
+        declared,
+        effects=["giesekus_mobility", "thixotropy", "tool_compliance", "stress_offset"],
+        max_effects=2,
+    )
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    for name, value in (("modulus_Pa", 100.0), ("relaxation_time_s", 1.0)):
+        low, high = result.declared_parameters[name].ci95
+        # twice the interval: one case in a thousand
+        assert abs(result.declared_parameters[name].value - value) < high - low
