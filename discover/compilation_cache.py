@@ -3,6 +3,12 @@
 import os
 from pathlib import Path
 
+# Diffrax and Optimistix report errors inside a program through a call back to Python, and a program
+# with such a call cannot be kept. So, where nothing else was asked for, an error becomes NaN: every
+# solve of this library reads the solver's result and refuses what is not finite. Equinox reads this
+# when it is first imported, which is why it stands here and not in the function.
+os.environ.setdefault("EQX_ON_ERROR", "nan")
+
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """Let JAX keep what it compiled, so that a second start does not compile again.
