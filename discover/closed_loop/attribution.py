@@ -18,7 +18,7 @@ _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 _FINITE = 4.0
 """Multiple of an effect's first trial at which it shows."""
 
-INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
+_INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
 """Multiples of an inner time or exponent from which an effect is tried too."""
 
 
@@ -173,13 +173,20 @@ def _bases(model: AugmentedModel, fit: Fit, effect: AbstractEffect) -> list[np.n
     At zero amplitude they change nothing, but the signature depends on them, and from a time that
     is far off a fit finds no way.
     """
-    bases = [fit.theta.copy()]
+    return [fit.theta.copy(), *with_other_inner(model, fit.theta, effect)]
+
+
+def with_other_inner(
+    model: AugmentedModel, theta: np.ndarray, effect: AbstractEffect
+) -> list[np.ndarray]:
+    """Return a parameter vector with the inner parameters of an effect at other sizes, if any."""
     inner = model.positions(effect.name)[1:]
-    for stretch in INNER_STRETCHES if inner else ():
-        base = fit.theta.copy()
-        base[inner] = np.clip(stretch * base[inner], model.low[inner], model.high[inner])
-        bases.append(base)
-    return bases
+    out = []
+    for stretch in _INNER_STRETCHES if inner else ():
+        other = theta.copy()
+        other[inner] = np.clip(stretch * theta[inner], model.low[inner], model.high[inner])
+        out.append(other)
+    return out
 
 
 def _try_amplitudes(model, batch, fit, candidates, bases, at, yields):

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.closed_loop.attribution import INNER_STRETCHES, CandidateScore
+from discover.closed_loop.attribution import CandidateScore, with_other_inner
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
     NO_PRIOR,
@@ -147,14 +147,10 @@ def _restarted(
     starts, owners = [], []
     for i in order[:_RESTARTED]:
         for effect in model.effects:
-            amplitude, *inner = model.positions(effect.name)
-            if not inner or amplitude not in fits[i].free:
-                continue
-            for stretch in INNER_STRETCHES:
-                theta = fits[i].theta.copy()
-                theta[inner] = np.clip(stretch * theta[inner], model.low[inner], model.high[inner])
-                starts.append(theta)
-                owners.append(i)
+            if model.positions(effect.name)[0] in fits[i].free:
+                others = with_other_inner(model, fits[i].theta, effect)
+                starts += others
+                owners += [i] * len(others)
     if not starts:
         return fits
     free = [fits[i].free for i in owners]

@@ -42,7 +42,7 @@ def on_finer_steps(
     # without the candidates that were not chosen there is little to compile
     small = AugmentedModel(model.declared, effects)
     theta = small.zero()
-    shared = min((model.slices[e.name].start for e in model.effects), default=model.size)
+    shared = 2 + len(model.declared.free_parameters)
     theta[:shared] = fit.theta[:shared]
     for effect in effects:
         theta[small.positions(effect.name)] = fit.theta[model.positions(effect.name)]
