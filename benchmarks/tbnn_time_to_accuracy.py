@@ -26,6 +26,7 @@ CASES = {
     "johnson_segalman": ("johnson_segalman", {"xi": 0.4}, True),
     "giesekus": ("giesekus", {"alpha": 0.2}, True),
     "ptt_exponential": ("ptt_exponential", {"epsilon": 0.4}, False),
+    "ptt_linear": ("ptt_linear", {"epsilon": 0.4}, True),
 }
 ITERATIONS = 7200
 LM_STEPS = 60
@@ -117,13 +118,19 @@ def everything_at_once(problem, seed: int, known: bool):
     import optimistix as optx
 
     from discover.learners.tbnn_ude.recipe_paper import make_network
-    from discover.learners.tbnn_ude.variational import residual_of_weights
+    from discover.learners.tbnn_ude.variational import residual_and_jacobian
     from discover.learners.tbnn_ude.weights import Rebuild
 
     rebuild = Rebuild.everything(make_network(jax.random.key(seed), 16, known))
 
+    @eqx.filter_custom_jvp
     def residual(weights, problem):
-        return residual_of_weights(weights, rebuild=rebuild, problem=problem).ravel()
+        return problem.residual(rebuild(weights)).ravel()
+
+    @residual.def_jvp
+    def _(primals, tangents):
+        value, jacobian = residual_and_jacobian(primals[0], rebuild, primals[1])
+        return value.ravel(), (jacobian @ tangents[0]).ravel()
 
     solution = optx.least_squares(
         residual,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from discover.laws import Giesekus
-from discover.learners.tbnn_ude.least_squares import Objective, minimise
+from discover.learners.tbnn_ude.least_squares import Objective, Stopping, minimise
 from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.recipe_default import (
@@ -174,3 +174,15 @@ def test_the_network_stands_on_a_known_base_law():
     problem = make_problem(data.runs, np.ones(1), np.ones(1))
     trained = train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
     assert float(trained.law.constants[3]) == pytest.approx(0.2, abs=1e-4)  # the rest of 0.3
+
+
+def test_a_descent_far_behind_its_rival_is_given_up_and_one_close_behind_is_not():
+    pace = [1.0 / 2**step for step in range(10)]
+
+    def steps_until_given_up(times_worse):
+        stopping = Stopping(0.0, pace)
+        misfits = (times_worse * value for value in pace)
+        return next((i for i, misfit in enumerate(misfits) if stopping.done(misfit)), len(pace))
+
+    assert steps_until_given_up(10.0) < len(pace)
+    assert steps_until_given_up(2.0) == len(pace)

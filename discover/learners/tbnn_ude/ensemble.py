@@ -17,6 +17,7 @@ from discover.learners.tbnn_ude.least_squares import (
     Stopping,
     first_state,
     law_misfit,
+    linearise,
     next_state,
     norm_of_cost,
 )
@@ -123,18 +124,18 @@ def _begin(laws, clouds, problem, tensors, strengths):
     def one(law, cloud, strength):
         rebuild = Rebuild.with_network(law, tensors, constant_scale(cloud))
         prior = reweighted(law, cloud, strength)
-        state = first_state(rebuild.start, Objective(problem, rebuild, cloud, prior))
-        return (rebuild, cloud, prior), rebuild.start, state
+        return (rebuild, cloud, prior), rebuild.start
 
     return eqx.filter_vmap(one)(laws, clouds, strengths)
 
 
 @eqx.filter_jit
-def _advance(weights, parts, problem, state):
-    def one(w, part, s):
-        return next_state(w, Objective(problem, *part), s)
+def _linearised(weights, parts, problem):
+    return eqx.filter_vmap(lambda w, part: linearise(w, Objective(problem, *part)))(weights, parts)
 
-    return eqx.filter_vmap(one)(weights, parts, state)
+
+_first_states = eqx.filter_jit(eqx.filter_vmap(first_state))
+_next_states = eqx.filter_jit(eqx.filter_vmap(next_state))
 
 
 @eqx.filter_jit
@@ -155,12 +156,14 @@ def _round(
     n = laws.constants.shape[0]
     strengths = jnp.asarray(np.broadcast_to(strength, (n,)).astype(float))
     clouds = _stack([sample_states(member_of(laws, i), problem) for i in range(n)])
-    parts, weights, state = _begin(laws, clouds, problem, jnp.asarray(tensors), strengths)
+    parts, weights = _begin(laws, clouds, problem, jnp.asarray(tensors), strengths)
     best = np.array(weights)
     stopping, going = [Stopping(target) for _ in range(n)], np.ones(n, bool)
     misfits = np.full(n, np.inf)
+    linearised = _linearised(weights, parts, problem)
+    state = _first_states(linearised)
     for _ in range(steps):
-        weights, state, _ = _advance(weights, parts, problem, state)
+        weights, state = _next_states(weights, linearised, state)
         costs = np.asarray(_costs(state))
         for i in np.flatnonzero(going):
             misfits[i] = norm_of_cost(float(costs[i]))
@@ -170,6 +173,7 @@ def _round(
         callback(misfits)
         if not np.any(going):
             break
+        linearised = _linearised(state.y_eval, parts, problem)
     return _laws(parts, jnp.asarray(best))
 
 

@@ -1,8 +1,9 @@
 """Levenberg–Marquardt on trajectories and prior together, one step at a time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import lineax
 import numpy as np
@@ -12,7 +13,7 @@ from jaxtyping import Array, Float
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem, trajectories
-from discover.learners.tbnn_ude.variational import residual_of_weights
+from discover.learners.tbnn_ude.variational import residual_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
 
 # Normal equations halve the digits, which is harmless here: the damping keeps them well
@@ -26,6 +27,8 @@ _AMPLIFICATION = 30.0
 _PATIENCE = 4
 _LEAST_PROGRESS = 1e-3
 _MOST_REJECTED = 8
+_FAIR_STEPS = 5
+_FAR_BEHIND = 5.0
 
 Callback = Callable[[float], None]
 
@@ -59,59 +62,116 @@ def data_scale(problem: TrainingProblem) -> Float[Array, "runs 1"]:
     return (1.0 / jnp.sqrt(mean_square * count * mask.shape[0]))[:, None]
 
 
-def residual_rows(
-    weights: Float[Array, " p"], objective: Objective
-) -> tuple[Float[Array, " rows"], Float[Array, "runs n"]]:
-    """Return data and prior as one amplified vector of residuals, and the data's part by run."""
-    data = residual_of_weights(weights, rebuild=objective.rebuild, problem=objective.problem)
-    data = data * data_scale(objective.problem)
-    prior = prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
-    return _AMPLIFICATION * jnp.concatenate([data.ravel(), prior]), data
+class Linearised(eqx.Module):
+    """An objective and its derivative at one set of weights.
+
+    Attributes
+    ----------
+    weights
+        Where it was linearised.
+    rows
+        Data and prior as one vector of residuals, amplified.
+    matrix
+        Their derivative by every weight.
+    """
+
+    weights: Float[Array, " p"]
+    rows: Float[Array, " rows"]
+    matrix: Float[Array, "rows p"]
+
+    def __call__(
+        self, weights: Float[Array, " p"], _args=None
+    ) -> tuple[Float[Array, " rows"], None]:
+        """Return the residuals of the linear model: all of them, as optimistix takes them."""
+        return self.rows + self.matrix @ (weights - self.weights), None
+
+
+def linearise(weights: Float[Array, " p"], objective: Objective) -> Linearised:
+    """Return the objective around some weights.
+
+    The integration is a program of its own, apart from the solver's step: compiled inside it, it
+    took as long again.
+    """
+    residual, jacobian = residual_and_jacobian(weights, objective.rebuild, objective.problem)
+    return _with_prior(weights, objective, residual, jacobian)
+
+
+@eqx.filter_jit
+def _with_prior(weights, objective, residual, jacobian):
+    scale = data_scale(objective.problem)
+
+    def prior(weights):
+        return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
+
+    rows = jnp.concatenate([(scale * residual).ravel(), prior(weights)])
+    data = (scale[..., None] * jacobian).reshape(-1, weights.shape[0])
+    matrix = jnp.concatenate([data, jax.jacfwd(prior)(weights)])
+    return Linearised(weights, _AMPLIFICATION * rows, _AMPLIFICATION * matrix)
 
 
 class Stopping:
     """Decides when a descent has ended: at its target, or when steps no longer pay.
 
     A rejected step is no sign of an end: it teaches the damping. Only steps taken count, unless
-    one rejection follows another.
+    one rejection follows another. Of two descents that compete, the one far behind is given up.
 
     Parameters
     ----------
     target
         Misfit that is good enough.
+    pace
+        Misfits of a rival after each of its steps, or None.
     """
 
-    def __init__(self, target: float):
+    def __init__(self, target: float, pace: Sequence[float] | None = None):
         self.target = target
+        self.pace = pace
+        self.steps = 0
         self.taken: list[float] = []
         self.rejected = 0
 
     def done(self, misfit: float) -> bool:
         """Return whether to stop, given the misfit after another step."""
+        self.steps += 1
         if np.isfinite(misfit):
             if self.taken and misfit == self.taken[-1]:
                 self.rejected += 1
             else:
                 self.taken.append(misfit)
                 self.rejected = 0
-        if misfit < self.target or self.rejected >= _MOST_REJECTED:
+        if misfit < self.target or self.rejected >= _MOST_REJECTED or self._far_behind(misfit):
             return True
         recent = self.taken[-_PATIENCE - 1 :]
         return len(recent) > _PATIENCE and recent[0] - recent[-1] < _LEAST_PROGRESS * recent[0]
 
+    def _far_behind(self, misfit: float) -> bool:
+        if self.pace is None or self.steps < _FAIR_STEPS:
+            return False
+        return not misfit < _FAR_BEHIND * self.pace[min(self.steps, len(self.pace)) - 1]
+
 
 @eqx.filter_jit
-def first_state(weights: Float[Array, " p"], objective: Objective):
+def first_state(linearised: Linearised):
     """Return the solver's state before the first step."""
-    rows, by_run = eqx.filter_eval_shape(residual_rows, weights, objective)
-    return _SOLVER.init(residual_rows, weights, objective, {}, rows, by_run, frozenset())
+    rows, aux = eqx.filter_eval_shape(linearised, linearised.weights)
+    return _SOLVER.init(linearised, linearised.weights, None, {}, rows, aux, frozenset())
 
 
 @eqx.filter_jit
-def next_state(weights: Float[Array, " p"], objective: Objective, state):
-    """Return weights, the solver's state and the residuals after one more step."""
-    weights, state, aux = _SOLVER.step(residual_rows, weights, objective, {}, state, frozenset())
-    return weights, state, aux
+def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
+    """Return the best weights and the solver's state after one more step.
+
+    Parameters
+    ----------
+    weights
+        The best weights so far.
+    linearised
+        The objective where the solver tries next, `state.y_eval`.
+    state
+        The solver's state.
+    """
+    weights, state, _ = _SOLVER.step(linearised, weights, None, {}, state, frozenset())
+    return weights, state
 
 
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
@@ -132,6 +192,7 @@ def minimise(
     steps: int,
     callback: Callback | None = None,
     target: float = 0.0,
+    pace: Sequence[float] | None = None,
 ) -> Float[Array, " p"]:
     """Return better weights after at most `steps` Levenberg–Marquardt steps.
 
@@ -150,11 +211,14 @@ def minimise(
         Called after every step with the relative misfit of the best weights.
     target
         Stop when the norm of all residuals is below this.
+    pace
+        Misfits of a rival after each of its steps: stop when far behind it.
     """
-    state = first_state(weights, objective)
-    best, stopping = weights, Stopping(target)
+    linearised = linearise(weights, objective)
+    state = first_state(linearised)
+    best, stopping = weights, Stopping(target, pace)
     for _ in range(steps):
-        weights, state, _ = next_state(weights, objective, state)
+        weights, state = next_state(weights, linearised, state)
         misfit = norm_of_cost(float(state.f_info.as_min()))
         if np.isfinite(misfit):
             best = weights
@@ -162,6 +226,7 @@ def minimise(
             callback(misfit)
         if stopping.done(misfit):
             break
+        linearised = linearise(state.y_eval, objective)
     return best
 
 

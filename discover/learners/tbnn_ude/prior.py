@@ -23,7 +23,9 @@ from tensor_library.algebra import inner
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
 
-STATES_PER_RUN = 24
+STATES_PER_RUN = 8
+"""Enough to see where a coefficient varies; every state is 16 rows of each least-squares step."""
+
 _FLOOR = 1e-4
 """Weights stop growing where a term is below 1e-4 of the stress: it is gone by then."""
 

@@ -10,7 +10,7 @@ the smallest law that explains it, in this order:
 
 1. the eight constants c_n alone, with a penalty that empties tensors (see `prior`) and is then
    taken away;
-2. if what they leave has structure, coefficient functions on one tensor, tried for each of the
+2. if what they leave has structure, coefficient functions on one tensor, raced for each of the
    eight; then on one more tensor beside the best, while the misfit is above what a rheometer
    resolves.
 
@@ -61,7 +61,7 @@ class DefaultRecipe:
         Relative misfit at which data count as fitted exactly: the error of integration.
     """
 
-    width: int = 16
+    width: int = 12
     strengths: tuple[float, ...] = (1e-3, 1e-4)
     steps: int = 10
     polish_steps: int = 40
@@ -151,7 +151,7 @@ class _Session:
         self.problem, self.recipe, self.progress = problem, recipe, progress
         self.misfits: list[float] = []
         first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
-        trials = N_COEFFICIENTS * _START_STEPS + _MOST_TRIALS * recipe.steps
+        trials = N_COEFFICIENTS * (_START_STEPS + recipe.steps)
         search = recipe.max_tensors * (trials + _MOST_POLISHES * recipe.polish_steps)
         self.total = first + search
 
@@ -169,9 +169,12 @@ class _Session:
 
     def round(
         self, law: TensorBasisNetwork, strength: float, tensors: np.ndarray, network: bool,
-        steps: int,
+        steps: int, pace: list[float] | None = None,
     ) -> TensorBasisNetwork:  # fmt: skip
-        """Return a law trained for one round, with the prior reweighted at its start."""
+        """Return a law trained for one round, with the prior reweighted at its start.
+
+        It ends early where it falls far behind the pace of a rival's misfits.
+        """
         cloud = sample_states(law, self.problem)
         if not bool(jnp.all(jnp.isfinite(cloud.stress))):
             return law
@@ -181,7 +184,7 @@ class _Session:
             self.problem, rebuild, cloud, reweighted(law, cloud, jnp.asarray(strength))
         )
         target = 0.1 * self.recipe.exact
-        weights = minimise(rebuild.start, objective, steps, self.record, target)
+        weights = minimise(rebuild.start, objective, steps, self.record, target, pace)
         trained = rebuilt(rebuild, weights)
         # a law that runs away in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
@@ -234,17 +237,20 @@ class _Session:
         penalised = law
         for _ in range(self.recipe.max_tensors):
             # first the best constant on each tensor: from h = 0 a whole network's first step
-            # overshoots, and the few best constants show which functions are worth a training
+            # overshoots; then a race of functions, in which those far behind are given up
             starts = []
             for tensor in np.flatnonzero(~chosen):
                 tensors = chosen.copy()
                 tensors[tensor] = True
                 start = self.round(_with_tensors(law, tensors), 0.0, tensors, False, _START_STEPS)
                 starts.append((self.misfit(start), int(tensor), start, tensors))
-            trials = []
-            for _, tensor, start, tensors in sorted(starts, key=lambda s: s[:2])[:_MOST_TRIALS]:
-                trial = self.round(start, PRIOR_SHARE, tensors, True, self.recipe.steps)
+            trials, pace = [], None
+            for _, tensor, start, tensors in sorted(starts, key=lambda s: s[:2]):
+                before = len(self.misfits)
+                trial = self.round(start, PRIOR_SHARE, tensors, True, self.recipe.steps, pace)
                 trials.append((self.misfit(trial), tensor, trial))
+                if min(trials, key=lambda trial: trial[:2])[1] == tensor:
+                    pace = self.misfits[before:]
             found = min(trials, key=lambda trial: trial[:2])
             if not found[0] < misfit:
                 break
@@ -260,7 +266,6 @@ class _Session:
 
 _CLEARINGS = 3
 _START_STEPS = 6
-_MOST_TRIALS = 4
 _MOST_POLISHES = 3
 
 PRIOR_SHARE = 1e-6

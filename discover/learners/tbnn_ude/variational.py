@@ -20,34 +20,7 @@ from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 Rebuild = Callable[[Float[Array, " p"]], AbstractConstitutiveLaw]
 
 
-@eqx.filter_custom_jvp
-def residual_of_weights(
-    weights: Float[Array, " p"], *, rebuild: Rebuild, problem: TrainingProblem
-) -> Float[Array, "runs n"]:
-    """Return predicted minus measured σ12 of the law with these weights.
-
-    Differentiable in forward mode; the derivative is that of the variational equation.
-
-    Parameters
-    ----------
-    weights
-        All trainable numbers of the law in one vector.
-    rebuild
-        Makes the law from them.
-    problem
-        The training data.
-    """
-    return problem.residual(rebuild(weights))
-
-
-@residual_of_weights.def_jvp
-def _residual_jvp(primals, tangents, *, rebuild: Rebuild, problem: TrainingProblem):
-    (weights,), (direction,) = primals, tangents
-    residual, jacobian = residual_and_jacobian(weights, rebuild, problem)
-    return residual, jacobian @ direction
-
-
-@eqx.filter_jit  # traced once, also where the solver asks for shapes, for a start and for a step
+@eqx.filter_jit
 def residual_and_jacobian(
     weights: Float[Array, " p"], rebuild: Rebuild, problem: TrainingProblem
 ) -> tuple[Float[Array, "runs n"], Float[Array, "runs n p"]]:
