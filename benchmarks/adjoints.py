@@ -28,7 +28,7 @@ def main() -> None:
 
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.learners.tbnn_ude.recipe_paper import make_network
-    from discover.learners.tbnn_ude.variational import residual_and_jacobian
+    from discover.learners.tbnn_ude.variational import states_and_jacobian
     from discover.learners.tbnn_ude.weights import Rebuild
     from discover.simulate import ExponentialRungeKutta4, synthetic_dataset
 
@@ -69,7 +69,8 @@ def main() -> None:
 
     @eqx.filter_jit
     def variational(weights, problem):
-        residual, jacobian = residual_and_jacobian(weights, rebuild, problem)
+        states, jacobian = states_and_jacobian(weights, rebuild, problem)
+        residual = problem.misses(states)
         n = residual.shape[1]
         return 2.0 / n * jnp.einsum("rn,rnp->p", residual, jacobian)
 

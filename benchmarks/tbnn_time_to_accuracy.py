@@ -118,7 +118,7 @@ def everything_at_once(problem, seed: int, known: bool):
     import optimistix as optx
 
     from discover.learners.tbnn_ude.recipe_paper import make_network
-    from discover.learners.tbnn_ude.variational import residual_and_jacobian
+    from discover.learners.tbnn_ude.variational import states_and_jacobian
     from discover.learners.tbnn_ude.weights import Rebuild
 
     rebuild = Rebuild.everything(make_network(jax.random.key(seed), 16, known))
@@ -129,8 +129,9 @@ def everything_at_once(problem, seed: int, known: bool):
 
     @residual.def_jvp
     def _(primals, tangents):
-        value, jacobian = residual_and_jacobian(primals[0], rebuild, primals[1])
-        return value.ravel(), (jacobian @ tangents[0]).ravel()
+        weights, data = primals
+        states, jacobian = states_and_jacobian(weights, rebuild, data)
+        return data.misses(states).ravel(), (jacobian @ tangents[0]).ravel()
 
     solution = optx.least_squares(
         residual,

@@ -12,8 +12,8 @@ from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
-from discover.learners.tbnn_ude.problem import TrainingProblem, trajectories
-from discover.learners.tbnn_ude.variational import residual_and_jacobian
+from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.variational import states_and_jacobian, trajectories
 from discover.learners.tbnn_ude.weights import Rebuild
 
 # Normal equations halve the digits, which is harmless here: the damping keeps them well
@@ -92,18 +92,19 @@ def linearise(weights: Float[Array, " p"], objective: Objective) -> Linearised:
     The integration is a program of its own, apart from the solver's step: compiled inside it, it
     took as long again.
     """
-    residual, jacobian = residual_and_jacobian(weights, objective.rebuild, objective.problem)
-    return _with_prior(weights, objective, residual, jacobian)
+    states, jacobian = states_and_jacobian(weights, objective.rebuild, objective.problem)
+    return _with_prior(weights, objective, states, jacobian)
 
 
 @eqx.filter_jit
-def _with_prior(weights, objective, residual, jacobian):
+def _with_prior(weights, objective, states, jacobian):
     scale = data_scale(objective.problem)
+    misses = scale * objective.problem.misses(states)
 
     def prior(weights):
         return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
 
-    rows = jnp.concatenate([(scale * residual).ravel(), prior(weights)])
+    rows = jnp.concatenate([misses.ravel(), prior(weights)])
     data = (scale[..., None] * jacobian).reshape(-1, weights.shape[0])
     matrix = jnp.concatenate([data, jax.jacfwd(prior)(weights)])
     return Linearised(weights, _AMPLIFICATION * rows, _AMPLIFICATION * matrix)
@@ -176,14 +177,15 @@ def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
 
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
     """Return the data's residuals under a law; their norm is the relative misfit."""
-    return _misses(trajectories(law, problem), problem)
+    return relative_misses(trajectories(law, problem), problem)
 
 
 @eqx.filter_jit
-def _misses(states, problem):
-    predicted = jnp.tensordot(states[..., 3], problem.modulus, axes=1)
-    misses = jnp.where(problem.grids.sample_mask, predicted - problem.target, 0.0)
-    return misses * data_scale(problem)
+def relative_misses(
+    states: Float[Array, "runs n k 4"], problem: TrainingProblem
+) -> Float[Array, "runs n"]:
+    """Return the data's residuals, whose norm is the relative misfit, from stresses at samples."""
+    return problem.misses(states) * data_scale(problem)
 
 
 def minimise(

@@ -18,7 +18,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.problem import TrainingProblem, trajectories
+from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.variational import trajectories
 from tensor_library.algebra import inner
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
@@ -59,11 +60,13 @@ def _coefficients(law, stress, rate):
 
 def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
     """Return states evenly spread over the samples of every run and mode."""
-    return _cloud(trajectories(law, problem), problem)
+    return cloud_of(trajectories(law, problem), problem)
 
 
 @eqx.filter_jit
-def _cloud(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
+def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
+    """Return states evenly spread over the samples, from the stresses of every mode there."""
+
     def one(states, protocol, grid):
         pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
         times = grid.times[grid.sample_index][pick]

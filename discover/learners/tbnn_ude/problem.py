@@ -14,7 +14,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.protocols.shear import ShearProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
-from discover.simulate.solve import solve_on_grid, solve_states_on_grid
+from discover.simulate.solve import solve_on_grid
 
 
 class TrainingProblem(eqx.Module):
@@ -54,6 +54,11 @@ class TrainingProblem(eqx.Module):
         predicted = jax.vmap(one)(self.protocols, self.grids)
         return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
 
+    def misses(self, states: Float[Array, "runs n k 4"]) -> Float[Array, "runs n"]:
+        """Return predicted minus measured σ12 from the stresses of the modes at the samples."""
+        predicted = jnp.tensordot(states[..., 3], self.modulus, axes=1)
+        return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
+
     def mean_squared_errors(
         self,
         law: AbstractConstitutiveLaw,
@@ -67,21 +72,6 @@ class TrainingProblem(eqx.Module):
         """
         residual = self.residual(law, adjoint)
         return jnp.sum(residual**2, axis=1) / jnp.sum(self.grids.sample_mask, axis=1)
-
-
-@eqx.filter_jit
-def trajectories(
-    law: AbstractConstitutiveLaw, problem: TrainingProblem
-) -> Float[Array, "runs n k 4"]:
-    """Return the dimensionless stress of every mode at every sample.
-
-    Compiling an integration costs thousands of times its run. Misfits and states are therefore
-    both read off the result of this one program, by small programs of their own.
-    """
-    fluid = problem.fluid(law)
-    return jax.vmap(lambda p, g: solve_states_on_grid(fluid, p, g))(
-        problem.protocols, problem.grids
-    )
 
 
 def make_problem(

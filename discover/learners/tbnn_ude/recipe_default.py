@@ -28,9 +28,10 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import Objective, law_misfit, minimise
-from discover.learners.tbnn_ude.prior import Cloud, parts, reweighted, sample_states
+from discover.learners.tbnn_ude.least_squares import Objective, minimise, relative_misses
+from discover.learners.tbnn_ude.prior import Cloud, cloud_of, parts, reweighted
 from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.variational import trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 from tensor_library.invariants import scalar_invariants
 
@@ -150,6 +151,7 @@ class _Session:
     def __init__(self, problem: TrainingProblem, recipe: DefaultRecipe, progress: Progress | None):
         self.problem, self.recipe, self.progress = problem, recipe, progress
         self.misfits: list[float] = []
+        self._latest: tuple[TensorBasisNetwork, Float[Array, "runs n k 4"]] | None = None
         first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
         trials = N_COEFFICIENTS * (_START_STEPS + recipe.steps)
         search = recipe.max_tensors * (trials + _MOST_POLISHES * recipe.polish_steps)
@@ -160,8 +162,17 @@ class _Session:
         if self.progress is not None:
             self.progress(min(len(self.misfits), self.total), self.total, misfit)
 
+    def states(self, law: TensorBasisNetwork) -> Float[Array, "runs n k 4"]:
+        # most questions are asked of the law that was trained last
+        if self._latest is None or self._latest[0] is not law:
+            self._latest = (law, trajectories(law, self.problem))
+        return self._latest[1]
+
+    def cloud(self, law: TensorBasisNetwork) -> Cloud:
+        return cloud_of(self.states(law), self.problem)
+
     def residual(self, law: TensorBasisNetwork) -> np.ndarray:
-        return np.asarray(law_misfit(law, self.problem))
+        return np.asarray(relative_misses(self.states(law), self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
         misfit = float(np.sqrt(np.sum(self.residual(law) ** 2)))
@@ -175,7 +186,7 @@ class _Session:
 
         It ends early where it falls far behind the pace of a rival's misfits.
         """
-        cloud = sample_states(law, self.problem)
+        cloud = self.cloud(law)
         if not bool(jnp.all(jnp.isfinite(cloud.stress))):
             return law
         make = Rebuild.with_network if network else Rebuild.of_constants
@@ -205,9 +216,7 @@ class _Session:
         penalised = law
         for _ in range(_CLEARINGS):
             before = law
-            law = _without_empty_terms(
-                law, sample_states(law, self.problem), self.recipe.removed_below
-            )
+            law = _without_empty_terms(law, self.cloud(law), self.recipe.removed_below)
             kept = np.asarray(law.constants) != 0.0
             law = self.round(law, 0.0, kept, False, self.recipe.polish_steps)
             if np.array_equal(kept, np.asarray(before.constants) != 0.0):
@@ -310,7 +319,7 @@ def train_default(
     if session.settled(law) or recipe.max_tensors == 0:
         return _finish(session, law, penalised, False, "constant coefficients")
     # the invariants as the data's own stresses have them, from the best law so far
-    scale = invariant_sizes(sample_states(law, problem))
+    scale = invariant_sizes(session.cloud(law))
     start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
     penalised_functions, functions = session.functions(start)
     if session.misfit(functions) > 0.9 * session.misfit(law):

@@ -7,6 +7,7 @@ import numpy as np
 import pysindy
 from jaxtyping import Float
 from pysindy.optimizers import FROLS, SR3, SSR, STLSQ
+from sklearn import config_context
 from sklearn.base import clone
 
 from discover.errors import InputError
@@ -142,7 +143,9 @@ def _sweep(optimizer, matrix, right, max_terms):
 
 
 def _fitted(optimiser, matrix, right, history):
-    with warnings.catch_warnings():
+    # what is checked here was made here; the checks of thousands of small fits took half their time
+    unchecked = config_context(assume_finite=True, skip_parameter_validation=True)
+    with unchecked, warnings.catch_warnings():
         # "eliminated all coefficients" and "did not converge" are ordinary ends of a sweep
         warnings.simplefilter("ignore")
         try:
