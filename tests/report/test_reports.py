@@ -2,7 +2,9 @@
 
 import html
 import re
+import runpy
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -302,6 +304,13 @@ def test_a_picture_by_itself_follows_light_and_dark(comparison):
     assert "var(--sparse)" in text
     assert SPARSE not in text.replace(style_sheet(), "")
     assert SPARSE in drawn.svg  # for programs that know no variables
+
+
+def test_the_script_of_the_readme_draws_what_the_comparison_says(comparison):
+    script = Path(__file__).parents[2] / "docs" / "picture.py"
+    drawn = runpy.run_path(str(script))["draw"](comparison)
+    assert drawn.name == "lissajous"
+    assert {"truth", "sparse regression", "neural network"} <= set(texts_of(drawn.svg))
 
 
 def test_an_ellipse_has_no_third_harmonic_and_a_distorted_wave_has():

@@ -50,7 +50,7 @@ def curves(comparison: Comparison, flow: Flow):
 def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
-    last = _last_cycle(flow)
+    last = last_cycle(flow)
     strain = flow.strain[last]
     strain = strain - 0.5 * (strain.max() + strain.min())  # about the middle of the cycle
     closed = {"elastic": (strain, "strain γ"), "viscous": (flow.shear_rate[last], rate_label)}
@@ -189,7 +189,8 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
     panel.set_ylim(low - margin, high + margin)
 
 
-def _last_cycle(flow: Flow) -> np.ndarray:
+def last_cycle(flow: Flow) -> np.ndarray:
+    """Return which samples of a flow lie in its last cycle, a little more so that it closes."""
     frequencies = np.asarray(flow.protocol.frequencies)
     active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
     if active.size == 0 or np.min(active) <= 0:
