@@ -67,7 +67,7 @@ def run_compare(
         return TaskResult(page, data, kept.get("text", ""), True)
     from discover.comparison.run_comparison import compare
     from discover.report.comparison_report import write_comparison
-    from discover.report.wording import comparison_verdict
+    from discover.report.verdicts import comparison_verdict
 
     comparison = compare(study, seed, progress, folder, settle=fit_declared)
     text = "\n".join(comparison_verdict(comparison))
@@ -93,7 +93,8 @@ def run_close_loop(
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
     from discover.closed_loop import run_loop, run_loop_on_each
-    from discover.report.loop_report import loop_verdict, write_loop
+    from discover.report.loop_report import write_loop
+    from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, load_study_data
 
     progress("loading data", 0.0)

@@ -122,6 +122,19 @@ class Comparison:
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
 
+    def error_map(self, who: str) -> dict[tuple[float, float], dict[str, float | None]]:
+        """Return errors over the Pipkin diagram: (Wi, De) → quantity → relative error.
+
+        Parameters
+        ----------
+        who
+            A learner, or ``"before"``.
+        """
+        return {
+            (flow.amplitude, flow.frequency or 0.0): self.errors(who, flow)
+            for flow in self.flows_of("pipkin")
+        }
+
     def terms_table(self) -> pd.DataFrame:
         """Return the terms that each learner found, and the true ones where the law is known."""
         columns: dict[str, dict[str, float]] = {}
@@ -188,6 +201,10 @@ class Comparison:
             "seed": self.seed,
             "learners": learners,
             "before": {"errors": self._errors("before", self.judged)},
+            "pipkin": {
+                who: [{"Wi": wi, "De": de, **row} for (wi, de), row in self.error_map(who).items()]
+                for who in ("before", *self.outcomes)
+            },
             "truth": None
             if self.truth is None
             else [

@@ -1,6 +1,6 @@
 """The flows on which learned laws are looked at, with what is known of the truth in each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from scipy.integrate import cumulative_simpson
 
 from discover.dataset.run import ShearRun
 from discover.laws.multimode import Fluid
@@ -28,7 +29,7 @@ HIGH_DEBORAH_AMPLITUDE = 3.0
 
 _BUCKET = 401
 
-FlowKind = Literal["training", "held_out", "test", "high_deborah"]
+FlowKind = Literal["training", "held_out", "test", "high_deborah", "pipkin"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,16 @@ class Flow:
         return float(np.max(frequencies)) if frequencies.size else None
 
     @property
+    def amplitude(self) -> float:
+        """Largest amplitude of the oscillating part of the rate in 1/s."""
+        return float(np.max(np.abs(np.asarray(self.protocol.amplitudes)), initial=0.0))
+
+    @property
+    def strain(self) -> Float[np.ndarray, " n"]:
+        """Strain since the first sample, shape (n,)."""
+        return cumulative_simpson(self.shear_rate, x=self.times, initial=0.0)
+
+    @property
     def title(self) -> str:
         """The flow in the field's notation."""
         amplitudes = np.asarray(self.protocol.amplitudes)
@@ -96,10 +107,14 @@ class Flow:
         return self.name
 
 
-def comparison_flows(data: StudyData, high_deborah: tuple[float, ...]) -> list[Flow]:
-    """Return the flows of a comparison: training, held out, tests and high Deborah numbers.
+def comparison_flows(
+    data: StudyData,
+    high_deborah: tuple[float, ...],
+    pipkin: Sequence[tuple[float, float]] = (),
+) -> list[Flow]:
+    """Return the flows of a comparison: training, held out, tests, and where only errors are told.
 
-    The last two need a known law.
+    All but the first two need a known law.
 
     Parameters
     ----------
@@ -107,6 +122,8 @@ def comparison_flows(data: StudyData, high_deborah: tuple[float, ...]) -> list[F
         The data of the study.
     high_deborah
         De of the flows γ̇ = 3 cos(De t).
+    pipkin
+        Wi and De of the oscillations over which errors are mapped.
     """
     flows = [run_flow(run, "training", data) for run in data.fit]
     flows += [run_flow(run, "held_out", data) for run in data.held_out]
@@ -118,14 +135,23 @@ def comparison_flows(data: StudyData, high_deborah: tuple[float, ...]) -> list[F
         flows.append(_truth_flow(name, "test", protocol, times, truth))
     for deborah in high_deborah:
         protocol = oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
-        period = 2.0 * np.pi / deborah
-        # twelve relaxation times for the transient to die out, then one cycle
-        start = np.ceil(12.0 / period) * period
-        times = np.concatenate([[0.0], start + np.linspace(0.0, period, 121)])
+        times = _late_cycle(deborah)
         flows.append(
             _truth_flow(f"high_deborah_{deborah:g}", "high_deborah", protocol, times, truth)
         )
+    for weissenberg, deborah in pipkin:
+        protocol = oscillatory_shear(weissenberg, deborah)
+        times = _late_cycle(deborah, samples=61)
+        name = f"pipkin_{weissenberg:g}_{deborah:g}"
+        flows.append(_truth_flow(name, "pipkin", protocol, times, truth))
     return flows
+
+
+def _late_cycle(deborah: float, samples: int = 121) -> Float[np.ndarray, " n"]:
+    """Return rest, and one cycle after twelve relaxation times for the transient to die out."""
+    period = 2.0 * np.pi / deborah
+    start = np.ceil(12.0 / period) * period
+    return np.concatenate([[0.0], start + np.linspace(0.0, period, samples)])
 
 
 def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:

@@ -9,7 +9,7 @@ import numpy as np
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.identify.bands import PredictionBand, prediction_bands
-from discover.identify.experiments import candidate_experiments
+from discover.identify.experiments import OBSERVED, candidate_experiments
 from discover.identify.many_laws import Contender
 from discover.identify.next_experiment import Proposal, propose_experiments
 from discover.laws.multimode import Fluid
@@ -21,6 +21,48 @@ LEAST_NOISE = 0.01
 _MOST_RIVALS = 6
 _MOST_DRAWS = 40
 _SHOWN = 5
+
+
+@dataclass(frozen=True)
+class IdentifiabilityCell:
+    """What one oscillation would tell of the rivals.
+
+    Attributes
+    ----------
+    weissenberg, deborah
+        Its place on the Pipkin diagram.
+    observed
+        What would be measured.
+    difference
+        Root-mean-square difference of each quantity between the chosen law and the rival furthest
+        from it, relative to the chosen law's; N2's is relative to N1. None where a rival runs
+        away.
+    decides
+        Whether it is expected to rule out every rival, readjusted within its intervals.
+    """
+
+    weissenberg: float
+    deborah: float
+    observed: tuple[str, ...]
+    difference: Mapping[str, float | None]
+    decides: bool
+
+    @classmethod
+    def of(cls, proposal: Proposal) -> "IdentifiabilityCell":
+        """Return the cell of an oscillation."""
+        if proposal.experiment.pipkin is None:
+            raise ValueError(f"{proposal.experiment.title} is no oscillation.")
+        chosen, rivals = proposal.curves[0], proposal.curves[1:]
+        size = np.sqrt(np.mean(chosen**2, axis=0))
+        size[2] = size[1]
+        furthest = np.max(np.sqrt(np.mean((rivals - chosen) ** 2, axis=1)), axis=0, initial=0.0)
+        share = furthest / np.maximum(size, 1e-300)
+        difference = {
+            name: float(value) if np.isfinite(value) else None
+            for name, value in zip(OBSERVED, share, strict=True)
+        }
+        decides = len(proposal.falling) == len(proposal.evidence)
+        return cls(*proposal.experiment.pipkin, proposal.observed, difference, decides)
 
 
 @dataclass(frozen=True)
@@ -37,12 +79,15 @@ class NextMeasurement:
         By the key of the flow.
     noise
         Relative noise that the evidence assumes.
+    oscillations
+        What every oscillation of the candidates would decide, in any order.
     """
 
     laws: tuple[str, ...] = ()
     proposals: Sequence[Proposal] = ()
     bands: Mapping[str, PredictionBand] = field(default_factory=dict)
     noise: float = LEAST_NOISE
+    oscillations: Sequence[Proposal] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return everything but the curves."""
@@ -51,7 +96,21 @@ class NextMeasurement:
             "noise": self.noise,
             "proposals": [proposal.to_json() for proposal in self.proposals],
             "bands": {key: band.to_json() for key, band in self.bands.items()},
+            "pipkin": [
+                {
+                    "Wi": cell.weissenberg,
+                    "De": cell.deborah,
+                    "observed": list(cell.observed),
+                    "difference": dict(cell.difference),
+                    "decides": cell.decides,
+                }
+                for cell in self.identifiability()
+            ],
         }
+
+    def identifiability(self) -> list["IdentifiabilityCell"]:
+        """Return what each oscillation would tell of the rivals, over the Pipkin diagram."""
+        return [IdentifiabilityCell.of(proposal) for proposal in self.oscillations]
 
 
 def next_measurement(
@@ -106,7 +165,8 @@ def next_measurement(
             chosen, others, declared, experiments, noise, options.observe, seed=seed
         )
     names = (chosen.name, *(law.name for law in others))
-    return NextMeasurement(names, proposals[:_SHOWN], bands, noise)
+    oscillations = [p for p in proposals if p.experiment.pipkin is not None]
+    return NextMeasurement(names, proposals[:_SHOWN], bands, noise, oscillations)
 
 
 def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contender, list[Contender]]:

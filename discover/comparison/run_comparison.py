@@ -1,5 +1,6 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -63,7 +64,11 @@ def compare(
     declared = declared_model(study, data.dataset)
     model = declared if settle is None else settle(declared, data.fit)
     require_numbers(model)
-    flows = comparison_flows(data, options.high_deborah)
+    following_options = options.next
+    grid = itertools.product(
+        following_options.weissenberg_numbers, following_options.deborah_numbers
+    )
+    flows = comparison_flows(data, options.high_deborah, list(grid))
     learner_seed = options.seed if seed is None else seed
     sweep = _sweep_studies(study)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
@@ -103,7 +108,7 @@ def compare(
         )
         judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
         following = next_measurement(
-            chosen, rivals, model.fluid, judged, options.next, learner_seed
+            chosen, rivals, model.fluid, judged, following_options, learner_seed
         )
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
@@ -139,7 +144,7 @@ def _outcome(
     store: RunFolder | None,
 ) -> LearnerOutcome:
     kept = None if store is None else store.load(part)
-    if kept is not None:
+    if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
         return LearnerOutcome.from_state(kept)
     progress("starting", 0.0)
     result, fluid = train(learner, study, model, data.fit.runs, seed, progress)

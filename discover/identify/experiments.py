@@ -40,12 +40,15 @@ class Experiment:
         Shear rate against time.
     times
         Samples in s, shape (n,).
+    pipkin
+        Wi and De of an oscillation, its place on the Pipkin diagram; None for other flows.
     """
 
     title: str
     kind: FlowClass
     protocol: ShearProtocol
     times: Float[np.ndarray, " n"]
+    pipkin: tuple[float, float] | None = None
 
 
 def candidate_experiments(
@@ -88,8 +91,8 @@ def candidate_experiments(
     return found
 
 
-def _experiment(title, kind, protocol, duration, unit) -> Experiment:
-    return Experiment(title, kind, protocol, np.linspace(0.0, duration / unit, N_SAMPLES))
+def _experiment(title, kind, protocol, duration, unit, pipkin=None) -> Experiment:
+    return Experiment(title, kind, protocol, np.linspace(0.0, duration / unit, N_SAMPLES), pipkin)
 
 
 def _laos(unit, weissenberg, deborah):
@@ -100,6 +103,7 @@ def _laos(unit, weissenberg, deborah):
             oscillatory_shear(wi * unit, de * unit),
             max(10.0, 2.5 * 2.0 * np.pi / de),
             unit,
+            (wi, de),
         )
         for wi in weissenberg
         for de in deborah

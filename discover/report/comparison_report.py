@@ -4,20 +4,24 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.learners.result import RecoveredTerm
 from discover.report.equations import equations_tex
-from discover.report.page import render
+from discover.report.page import made_by, render
 from discover.report.plots.flows import SYMBOLS, flow_picture, start_up_picture, training_picture
 from discover.report.plots.next_experiment import next_picture
+from discover.report.plots.pipkin import error_map_picture, identifiability_picture
+from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
+from discover.report.verdicts import QUESTIONS, comparison_verdict
 from discover.report.wording import (
     RULES,
-    comparison_verdict,
     interval,
     selection_sentence,
     spoken,
@@ -48,14 +52,7 @@ def write_comparison(
     The page.
     """
     pictures, training = comparison_pictures(comparison)
-    selection = _selection(comparison)
-    drawings = [*pictures, *training]
-    if selection is not None and selection["picture"] is not None:
-        drawings.append(selection["picture"])
-    proposed = next_picture(comparison)
-    if proposed is not None:
-        drawings.append(proposed)
-    for drawn in drawings:
+    for drawn in (*pictures, *training):
         folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
     folder.write("comparison.json", content + "\n")
@@ -63,7 +60,8 @@ def write_comparison(
     page = render(
         "comparison.html",
         comparison=comparison,
-        verdict=comparison_verdict(comparison),
+        questions=QUESTIONS,
+        sentences=comparison_verdict(comparison),
         columns=[
             {"title": "before"},
             *({"title": LEARNER_TITLES[name]} for name in comparison.outcomes),
@@ -71,29 +69,43 @@ def write_comparison(
         error_rows=_error_rows(comparison),
         laws=[_law(outcome, linear_relaxation) for outcome in comparison.outcomes.values()],
         term_rows=_term_rows(comparison),
+        network_interval=_network_interval(comparison),
         coefficients=_coefficients(comparison),
         pictures=pictures,
         training_pictures=training,
-        selection=selection,
+        selection=_selection(comparison),
         rivals_text=_rivals_text(comparison),
         structure=_structure(comparison),
         physics_titles=[LEARNER_TITLES[name] for name in comparison.physics],
         physics_rows=_physics_rows(comparison),
-        proposed=proposed,
         proposals=_proposals(comparison),
         rivals=[_rival(rival) for rival in comparison.rivals],
-        study_text=study_text,
+        run=made_by(
+            folder.fingerprint,
+            f"discover compare {comparison.name}.toml --seed {comparison.seed}",
+            ("comparison.json", "equations.tex", "figures/*.svg"),
+            study_text,
+        ),
     )
     return folder.write("report.html", page)
 
 
 def comparison_pictures(comparison: Comparison) -> tuple[list[Picture], list[Picture]]:
-    """Return the pictures of predictions, and those of training."""
+    """Return the pictures of what was found, and those of training."""
     pictures: list[Picture | None] = [
         flow_picture(comparison, flow) if flow.oscillatory else start_up_picture(comparison, flow)
         for flow in comparison.judged
     ]
-    pictures += [high_deborah_picture(comparison), sweep_picture(comparison)]
+    sparse = comparison.outcomes.get("tensor_sindy")
+    pictures += [
+        error_map_picture(comparison),
+        identifiability_picture(comparison),
+        comparison_residual_map(comparison),
+        None if sparse is None else selection_picture(sparse.details),
+        next_picture(comparison),
+        high_deborah_picture(comparison),
+        sweep_picture(comparison),
+    ]
     training = [training_picture(comparison), loss_picture(comparison)]
     return [p for p in pictures if p is not None], training
 
@@ -109,9 +121,10 @@ def _selection(comparison: Comparison) -> dict[str, Any] | None:
     rows = [
         {
             "size": row["size"],
-            "math": " ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
+            "math": " + ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
             "misfit": row["misfit"],
             "held_out": row["held_out"],
+            "range": list(row.get("held_out_by_run", {}).values()),
             "bic": row["bic"] - lowest,
             "rules": ", ".join(
                 RULES[rule] for rule, support in chosen.items() if support == row["support"]
@@ -130,7 +143,6 @@ def _selection(comparison: Comparison) -> dict[str, Any] | None:
     return {
         "rows": rows,
         "runs": runs,
-        "picture": selection_picture(sparse.details),
         "sentence": selection_sentence(sparse),
     }
 
@@ -143,11 +155,26 @@ def safe_name(name: str) -> str:
 def _error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for flow in comparison.judged:
+        band = comparison.next_measurement.bands.get(flow.key)
+        widths = {} if band is None else band.widths(with_rivals=False)
         cells = []
         for who in ("before", *comparison.outcomes):
-            cells += comparison.errors(who, flow).values()
-        rows.append({"title": flow.title, "cells": cells})
+            known = widths if who == "tensor_sindy" else {}
+            cells += [
+                {"value": value, "half_width": None if value is None else _half(known.get(name))}
+                for name, value in comparison.errors(who, flow).items()
+            ]
+        rows.append({"title": flow.title, "anchor": f"flow_{flow.name}", "cells": cells})
     return rows
+
+
+def _half(width: float | None) -> float | None:
+    return None if width is None or not np.isfinite(width) else 0.5 * width
+
+
+def _network_interval(comparison: Comparison) -> bool:
+    network = comparison.outcomes.get("tbnn_ude")
+    return network is None or any(term.ci95 for term in network.terms)
 
 
 def _law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:

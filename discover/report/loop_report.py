@@ -4,13 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discover.closed_loop.loop import ONLY_NOISE
+import numpy as np
+
 from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.equations.mathml import law_element
 from discover.errors import InputError
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
-from discover.report.page import render
+from discover.report.page import made_by, render
 from discover.report.plots.loop import (
     ranking_picture,
     reading_picture,
@@ -19,47 +20,11 @@ from discover.report.plots.loop import (
     runs_picture,
     waterfall_picture,
 )
-from discover.report.wording import interval, percent, significant, spoken
+from discover.report.plots.loop_lissajous import lissajous_picture
+from discover.report.plots.residual_map import loop_residual_map
+from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict
+from discover.report.wording import percent, significant, spoken
 from discover.study.run_folder import RunFolder
-
-_VERDICTS = {
-    "effects_added": "The declared model lacked something, and adding it explains the data",
-    "no_effect_needed": "The declared model explains the data; no effect earned its place",
-    "unexplained": "What is left still has structure that no candidate explains",
-}
-_KINDS = {
-    "constitutive": "in the fluid",
-    "kinematic": "in the flow that the fluid felt",
-    "signal": "in the instrument's signal",
-}
-
-
-def loop_verdict(result: LoopResult) -> list[str]:
-    """Return the verdict on a closed loop, a few sentences."""
-    before, after = result.error_before, result.error_after
-    sentences = [_VERDICTS[result.verdict] + "."]
-    if result.verdict == "no_effect_needed" and after.fit > ONLY_NOISE:
-        sentences = ["The records hold hardly anything but noise, so they say nothing of any law."]
-    for stage in result.stages:
-        values = ", ".join(
-            f"{name} = {significant(p.value, 3)} {p.unit}".rstrip() + f" ({interval(p.ci95)})"
-            for name, p in stage.parameters.items()
-        )
-        text = f"Added {_KINDS[stage.kind]}: {spoken(stage.effect)}, {values}."
-        if stage.aliases:
-            others = ", ".join(map(spoken, stage.aliases))
-            text += f" These data cannot tell it from {others}."
-        sentences.append(text)
-    change = f"Error on fitted runs: {percent(before.fit)} before, {percent(after.fit)} after"
-    if before.held_out is not None:
-        unseen = "runs that no fit saw"
-        if result.folds:
-            unseen = "each run by a search that did not see it"
-        change += (
-            f"; on {unseen}: {percent(before.held_out)} before, {percent(after.held_out)} after"
-        )
-    sentences.append(f"{change}. The noise is about {percent(result.noise_floor)}.")
-    return sentences
 
 
 def write_loop(
@@ -85,6 +50,8 @@ def write_loop(
     pictures = [
         waterfall_picture(result),
         runs_picture(result),
+        lissajous_picture(result),
+        loop_residual_map(result),
         residual_picture(result),
         reading_picture(result),
         run_error_picture(result),
@@ -101,7 +68,10 @@ def write_loop(
         name=name,
         summary=summary,
         result=result,
-        verdict=loop_verdict(result),
+        questions=QUESTIONS,
+        sentences=loop_verdict(result),
+        error_rows=_error_rows(result),
+        run_rows=_run_rows(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         rankings=[_ranking(ranking) for ranking in result.rankings],
         folds=[_fold(fold) for fold in result.folds],
@@ -112,9 +82,65 @@ def write_loop(
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
         ],
         pictures=drawn,
-        study_text=study_text,
+        run=made_by(
+            folder.fingerprint,
+            f"discover close-loop {name}.toml",
+            ("loop.json", "equations.tex", "figures/*.svg"),
+            study_text,
+        ),
     )
     return folder.write("report.html", page)
+
+
+def _error_rows(result: LoopResult) -> list[dict[str, Any]]:
+    """Return the mean error of each model and the range over the runs behind it."""
+
+    def errors(held_out: bool, model: int) -> list[float]:
+        return [float(r.errors[model]) for r in result.records if r.held_out is held_out]
+
+    names = ["declared", *(f"+ {spoken(stage.effect)}" for stage in result.stages)]
+    pairs = [result.error_before, *(stage.error for stage in result.stages)]
+    rows = [
+        {
+            "model": name,
+            "fit": pair.fit,
+            "fit_range": errors(False, model),
+            "held_out": pair.held_out,
+            "held_out_range": errors(True, model),
+        }
+        for model, (name, pair) in enumerate(zip(names, pairs, strict=True))
+    ]
+    if result.folds:
+        before, after = (
+            [getattr(f, f"error_{w}") for f in result.folds] for w in ("before", "after")
+        )
+        rows[0]["held_out_range"] = before
+        rows.append(
+            {
+                "model": "as found without each run",
+                "fit": None,
+                "fit_range": None,
+                "held_out": result.error_after.held_out,
+                "held_out_range": after,
+            }
+        )
+    return rows
+
+
+def _run_rows(result: LoopResult) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": record.name,
+            "held_out": record.held_out,
+            "samples": record.time.size,
+            "end": float(record.time[-1]),
+            "rate": float(np.max(np.abs(record.shear_rate))),
+            "stress": float(np.sqrt(np.mean(record.measured**2))),
+            "before": float(record.errors[0]),
+            "after": float(record.errors[-1]),
+        }
+        for record in result.records
+    ]
 
 
 def loop_tex(result: LoopResult) -> str:
@@ -135,7 +161,7 @@ def loop_tex(result: LoopResult) -> str:
 def _stage(stage: Stage, number: int) -> dict[str, Any]:
     return {
         "effect": spoken(stage.effect) if "sigma" in stage.effect else stage.effect,
-        "kind": _KINDS[stage.kind],
+        "kind": KINDS[stage.kind],
         "formula": formula(stage.equation, f"formula{number}"),
         "parameters": [
             {"name": name, "value": p.value, "ci95": p.ci95, "unit": p.unit}
@@ -170,7 +196,7 @@ def _ranking(ranking, shown: int = 12) -> list[dict[str, Any]]:
     return [
         {
             "effect": spoken(c.effect),
-            "kind": _KINDS[c.kind],
+            "kind": KINDS[c.kind],
             "score": c.score,
             "reduction": c.reduction,
             "error": c.error,

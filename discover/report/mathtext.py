@@ -50,6 +50,6 @@ def formula(latex: str, name: str) -> str:
         return f"<code>{html.escape(latex)}</code>"
     finally:
         plt.close(drawing)
-    picture = Picture(name, "", buffer.getvalue())
+    picture = Picture(name, latex, buffer.getvalue())
     height = picture.svg.split('height="')[1].split('"')[0]
     return picture.inline.replace("<svg ", f'<svg class="formula" style="height:{height}" ', 1)

@@ -1,12 +1,47 @@
 """Templates → one self-contained page. The only place that knows jinja2."""
 
+import platform
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from discover import __version__
-from discover.report.wording import interval, percent, significant, spoken
+from discover.report.palette import style_sheet
+from discover.report.wording import interval, percent, percent_range, significant, spoken
+
+_CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
+
+
+def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: str) -> dict:
+    """Return what a page says of the run that made it; every table links to it.
+
+    Parameters
+    ----------
+    fingerprint
+        Of the study, its data and the version of this software.
+    command
+        What makes it again.
+    files
+        Written beside the page.
+    study_text
+        The study file.
+    """
+    packages = [f"Python {platform.python_version()}"]
+    for name in _CALCULATES:
+        try:
+            packages.append(f"{name} {version(name)}")
+        except PackageNotFoundError:  # a copy that was not installed
+            continue
+    return {
+        "id": fingerprint[:8],
+        "fingerprint": fingerprint,
+        "command": command,
+        "packages": ", ".join(packages),
+        "files": files,
+        "study_text": study_text,
+    }
 
 
 def render(template: str, **content: Any) -> str:
@@ -30,9 +65,12 @@ def render(template: str, **content: Any) -> str:
     )
     environment.filters.update(
         percent=percent,
+        percent_range=percent_range,
         significant=significant,
         interval=interval,
         spoken=spoken,
         safe_svg=Markup,
     )
-    return environment.get_template(template).render(version=__version__, **content)
+    return environment.get_template(template).render(
+        version=__version__, style_sheet=Markup(style_sheet()), **content
+    )

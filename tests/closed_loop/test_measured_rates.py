@@ -14,7 +14,7 @@ from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate, start_up
-from discover.report.loop_report import loop_verdict
+from discover.report.verdicts import loop_verdict
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)

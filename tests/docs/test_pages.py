@@ -16,6 +16,8 @@ import typer.main
 import discover.laws
 from discover.cli import app
 from discover.dataset import load_dataset
+from discover.effects import Record, make_effect, named_effects, signal
+from discover.effects.reference import reference_page
 from discover.equations import law_terms
 from discover.errors import InputError
 from discover.laws import registry
@@ -63,6 +65,26 @@ def test_the_page_on_loaders_makes_a_folder_that_loads(tmp_path):
     run = load_dataset(str(tmp_path / "melt")).runs[0]
     np.testing.assert_allclose(run.time, time)
     np.testing.assert_allclose(run.shear_stress[-1], 3 * torque[-1] / (2 * np.pi * 0.0125**3))
+
+
+def test_the_page_on_effects_adds_an_effect(tmp_path, monkeypatch):
+    script = tmp_path / "transducer_saturation.py"
+    script.write_text(blocks("docs/adding-an-effect.md", "python")[0])
+    before = set(named_effects())
+    monkeypatch.setattr(signal, "__path__", [*signal.__path__, str(tmp_path)])
+    named_effects.cache_clear()
+    try:
+        assert set(named_effects()) - before == {"transducer_saturation"}
+        effect = make_effect("transducer_saturation")
+        stress = jnp.asarray([-3.0, 0.0, 1.0])
+        record = Record(jnp.arange(3.0), jnp.ones(3), stress, jnp.asarray(1.0))
+        np.testing.assert_array_equal(effect.recorded_stress(jnp.zeros(1), record), stress)
+        recorded = effect.recorded_stress(jnp.asarray([0.5]), record)
+        np.testing.assert_allclose(recorded, [-3.0 / 2.5, 0.0, 1.0 / 1.5])
+        assert "### `transducer_saturation`" in reference_page()
+    finally:
+        named_effects.cache_clear()
+        sys.modules.pop("discover.effects.signal.transducer_saturation", None)
 
 
 def test_the_page_on_effects_names_neighbours_that_exist():
@@ -149,3 +171,18 @@ def test_a_study_file_of_the_tutorial_is_a_study(tmp_path):
 def test_the_batch_script_for_a_cluster_is_python():
     for text in blocks("docs/batches.md", "python"):
         ast.parse(text)
+
+
+def test_the_readme_shows_one_picture_that_follows_light_and_dark():
+    (name,) = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (ROOT / "README.md").read_text("utf-8"))
+    picture = (ROOT / name).read_text("utf-8")
+    assert "prefers-color-scheme: dark" in picture
+    assert "http://" not in re.sub(r'xmlns(?::\w+)?="[^"]*"|<metadata>.*?</metadata>', "", picture,
+                                   flags=re.S).split("<svg", 1)[1]  # fmt: skip
+    for text in ("σ₁₂", "N₁", "N₂", "truth", "sparse regression", "neural network"):
+        assert text in picture
+    assert len(picture) < 60_000
+
+
+def test_the_readme_fits_two_screens():
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 100

@@ -1,36 +1,44 @@
-"""Reports: what they contain, that they stand alone, that names are escaped."""
+"""The report of a comparison: what it contains, that it stands alone, that names are escaped."""
 
-import json
+import html
 import re
+import runpy
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from discover.closed_loop import CandidateScore
-from discover.closed_loop.result import (
-    ErrorPair,
-    Fold,
-    LoopResult,
-    RunRecord,
-    Stage,
-    StageParameter,
-)
 from discover.comparison import compare
+from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element
+from discover.identify.bands import PredictionBand
+from discover.laws import Fluid, make_law
 from discover.learners.result import LearnerResult, RecoveredTerm
-from discover.report.comparison_report import comparison_pictures, safe_name, write_comparison
-from discover.report.loop_report import write_loop
+from discover.report.comparison_report import (
+    _error_rows,
+    safe_name,
+    write_comparison,
+)
 from discover.report.mathtext import formula
-from discover.report.plots.flows import curves
+from discover.report.palette import style_sheet
+from discover.report.plots.flows import curves, flow_picture, training_picture
+from discover.report.plots.pipkin import (
+    differences,
+    error_map_picture,
+    identifiability_picture,
+)
+from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import third_harmonic
+from discover.report.plots.style import SPARSE
+from discover.report.verdicts import QUESTIONS, comparison_verdict
 from discover.report.wording import (
-    comparison_verdict,
     interval,
     percent,
+    percent_range,
     selection_sentence,
     significant,
     spoken,
@@ -40,8 +48,6 @@ from tensor_library.library import build_library
 
 
 def trained(learner, study, model, runs, seed=0, progress=None):
-    from discover.laws import Fluid, make_law
-
     law = make_law("giesekus", {"alpha": 0.2})
     history = (np.arange(1, 3), np.array([1.0, 0.1]))
     term = RecoveredTerm("sigma.sigma", 0.2, 0.19, (0.199, 0.201), {}, r"\sigma\cdot\sigma")
@@ -67,9 +73,15 @@ def comparison():
 
 
 @pytest.fixture(scope="module")
-def page(comparison, tmp_path_factory):
-    folder = RunFolder(tmp_path_factory.mktemp("report"), "x")
-    return write_comparison(comparison, folder, True, "[data] # <img src=x>").read_text("utf-8")
+def folder(comparison, tmp_path_factory):
+    written = RunFolder(tmp_path_factory.mktemp("report"), "x")
+    write_comparison(comparison, written, True, "[data] # <img src=x>")
+    return written.path
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return (folder / "report.html").read_text("utf-8")
 
 
 def stands_alone(text):
@@ -101,25 +113,29 @@ def test_identifiers_are_unique(page):
 
 def test_the_page_has_the_papers_pictures_and_tables(page):
     names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss", "sweep")
-    for name in (*names, "training"):
+    maps = ("pipkin_error", "pipkin_identifiability", "residual_map", "next_experiment")
+    for name in (*names, *maps, "training"):
         assert f'<figure id="{name}">' in page
     for text in ("penalised", "debiased", "95 % interval", "σ₁₂", "N₂", "not determined"):
         assert text in page
     assert "prefers-color-scheme: dark" in page
 
 
-def test_every_picture_is_well_formed_and_names_every_curve(comparison):
-    pictures, training = comparison_pictures(comparison)
-    for picture in [*pictures, *training]:
-        ElementTree.fromstring(picture.svg.split("?>", 1)[1].split(">", 1)[1])
-        assert picture.caption
-    for picture in pictures[:3]:
+def test_every_picture_is_well_formed_and_names_every_curve(folder, page):
+    pictures = {file.stem: file.read_text("utf-8") for file in (folder / "figures").glob("*.svg")}
+    assert len(pictures) >= 10
+    for svg in pictures.values():
+        ElementTree.fromstring(svg.split("?>", 1)[1].split(">", 1)[1])
+    assert "<figcaption></figcaption>" not in page
+    for name in ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2"):
         for label in ("truth", "before", "sparse regression", "neural network", "N₁", "σ₁₂"):
-            assert label in picture.svg
+            assert label in pictures[name]
+    for label in ("elastic Lissajous curve", "viscous Lissajous curve", "strain γ"):
+        assert label in pictures["flow_laos_3_1.5"]
 
 
 def test_pictures_are_the_same_bytes_every_time(comparison):
-    first, second = (comparison_pictures(comparison)[0][0].svg for _ in range(2))
+    first, second = (flow_picture(comparison, comparison.judged[0]).svg for _ in range(2))
     assert first == second
 
 
@@ -157,15 +173,144 @@ def test_a_curve_that_ran_away_is_left_out(comparison):
     labels = [label for label, _, _ in curves(without, flow)]
     assert "neural network" not in labels
     assert "sparse regression" in labels
-    comparison_pictures(without)
+    assert "neural network" not in flow_picture(without, flow).svg
+    everywhere = dict.fromkeys(outcome.predictions)
+    none = replace(outcome, predictions=everywhere)
+    without = replace(comparison, outcomes={**comparison.outcomes, "tbnn_ude": none})
+    assert "neural network" not in comparison_residual_map(without).svg
+    assert texts_of(error_map_picture(without).svg).count("–") == 3 * 16
 
 
 def test_the_verdict_says_what_was_found_and_what_is_not_known(comparison):
-    text = " ".join(comparison_verdict(comparison))
-    assert "exactly the terms" in text
-    assert "Not determined by these data: N2" in text
+    found, sure, following = comparison_verdict(comparison)
+    assert "exactly the terms" in found
+    assert "not determined by these data: N2" in sure
+    assert following.startswith("Measure σ12 and N2 in ")
+    assert "rule out the one rival law" in following
     wrong = replace(comparison, truth=())
-    assert "too many: σ·σ" in " ".join(comparison_verdict(wrong))
+    assert "too many: σ·σ" in comparison_verdict(wrong)[0]
+
+
+def test_without_a_rival_the_verdict_still_says_what_to_measure(comparison):
+    alone = replace(comparison, next_measurement=NextMeasurement())
+    assert comparison_verdict(alone)[2].startswith("Measure N2:")
+    sure = replace(alone, statements=())
+    assert comparison_verdict(sure)[2].endswith("a shear rate above 2.")
+
+
+def test_the_verdict_is_three_sentences(comparison):
+    for one in (comparison, replace(comparison, truth=()), replace(comparison, truth=None)):
+        sentences = comparison_verdict(one)
+        assert len(sentences) == len(QUESTIONS) == 3
+        for sentence in sentences:
+            assert not re.search(r"\.\s+[A-ZΑ-Ω]", sentence.replace("De = ", "")), sentence
+            assert sentence.endswith(".")
+
+
+def texts_of(svg):
+    return [html.unescape(text) for text in re.findall(r"<text[^>]*>([^<]*)</text>", svg)]
+
+
+def test_the_pipkin_map_of_error_holds_the_errors_of_the_result(comparison):
+    drawn = error_map_picture(comparison)
+    shown = texts_of(drawn.svg)
+    before = comparison.error_map("before")
+    assert len(before) == 16
+    for errors in before.values():
+        for value in errors.values():
+            assert percent(value).removesuffix(" %") in shown
+    # in the linear corner the known part is nearly enough, and it fails where the flow is strong
+    assert before[0.5, 2.0]["sigma12"] < 0.02
+    assert before[4.0, 0.25]["sigma12"] > 1.0
+    assert max(comparison.error_map("tensor_sindy")[4.0, 0.25].values()) < 1e-5
+    kept = comparison.to_json()["pipkin"]["before"]
+    assert {(row["Wi"], row["De"]): row["N1"] for row in kept} == {
+        place: errors["N1"] for place, errors in before.items()
+    }
+
+
+def test_the_pipkin_map_of_identifiability_says_that_only_n2_tells_the_twin(comparison):
+    cells = comparison.next_measurement.identifiability()
+    assert len(cells) == 3 * 16
+    for cell in cells:
+        assert cell.decides is (cell.observed == ("sigma12", "N2"))
+    shown = differences([c for c in cells if c.observed == ("sigma12",)], "sigma12")
+    assert set(shown.values()) == {0.0}
+    drawn = identifiability_picture(comparison)
+    apart = differences([c for c in cells if c.observed[-1] == "N2"], "N2")
+    assert min(apart.values()) > 0.05
+    assert {percent(value).removesuffix(" %") for value in apart.values()} <= set(
+        texts_of(drawn.svg)
+    )
+    assert "rule out every rival" in drawn.svg
+    alone = replace(comparison, next_measurement=NextMeasurement())
+    assert identifiability_picture(alone) is None
+
+
+def test_a_rival_that_runs_away_is_shown_as_such(comparison):
+    cell = comparison.next_measurement.identifiability()[0]
+    lost = replace(cell, difference={**cell.difference, "sigma12": None})
+    assert list(differences([lost], "sigma12").values()) == [np.inf]
+
+
+def test_strain_is_the_integral_of_the_rate(comparison):
+    flow = next(f for f in comparison.flows_of("training") if f.name == "laos_2_0.5")
+    wanted = 2.0 / 0.5 * np.sin(0.5 * flow.times)
+    np.testing.assert_allclose(flow.strain, wanted, atol=2e-2)  # 21 samples
+
+
+def without_text(page):
+    """Pictures of a page that say nothing to those who do not see them."""
+    pictures = re.findall(r"<(?:svg|img)\b[^>]*>", page)
+    return [p for p in pictures if not re.search(r'(?:aria-label|alt)="[^"]+"', p)]
+
+
+def test_every_picture_has_a_text_alternative(page):
+    assert "<svg" in page
+    assert without_text(page) == []
+    assert without_text('<svg role="img" aria-label="">') != []  # negative control
+
+
+def test_every_table_of_numbers_links_to_the_run_that_made_it(page):
+    tables = re.findall(r"<table.*?</table>", page, re.S)
+    numbers = [t for t in tables if re.search(r"<td>[^<]*\d", t) and "<code>" not in t]
+    assert len(numbers) == 4  # errors, terms, rivals, what to measure next
+    for table in numbers:
+        assert '<a href="#made">Made by run x</a>' in table, table[:200]
+    made = page[page.index('<h2 id="made"') :]
+    assert "discover compare" in made
+    assert "jax " in made
+
+
+def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, page):
+    table = page[page.index('<table id="error-table"') :]
+    table = table[: table.index("</table>")]
+    assert table.count("± ") == 9  # three flows, three quantities, one learner
+    flow = comparison.judged[0]
+    chosen = np.ones((flow.times.size, 3))
+    band = PredictionBand(flow.times, chosen, 0.9 * chosen, 1.1 * chosen, chosen, chosen, 0.0)
+    following = NextMeasurement(bands={flow.key: band})
+    row = _error_rows(replace(comparison, next_measurement=following))[0]["cells"]
+    widths = [cell["half_width"] for cell in row]
+    assert widths[:3] == widths[6:] == [None] * 3  # before, and one network
+    assert widths[3:6] == pytest.approx([0.1] * 3)
+
+
+def test_a_picture_by_itself_follows_light_and_dark(comparison):
+    drawn = training_picture(comparison)
+    text = drawn.adaptive
+    ElementTree.fromstring(text.split("?>", 1)[1].split(">", 1)[1])
+    assert "prefers-color-scheme: dark" in text
+    assert "var(--sparse)" in text
+    assert SPARSE not in text.replace(style_sheet(), "")
+    assert SPARSE in drawn.svg  # for programs that know no variables
+
+
+def test_the_script_of_the_readme_draws_what_the_comparison_says(comparison):
+    script = Path(__file__).parents[2] / "docs" / "picture.py"
+    drawn = runpy.run_path(str(script))["draw"](comparison)
+    assert drawn.name == "lissajous"
+    assert {"truth", "sparse regression", "neural network"} <= set(texts_of(drawn.svg))
 
 
 def test_an_ellipse_has_no_third_harmonic_and_a_distorted_wave_has():
@@ -188,6 +333,8 @@ def test_numbers_keep_what_tells_them_apart():
     assert percent(None) == significant(None) == interval(None) == "–"
     assert percent(0.1234) == "12 %"
     assert significant(-0.5) == "−0.5"
+    assert percent_range([0.01, 0.03]) == " (1 to 3 %)"
+    assert percent_range([0.01]) == percent_range(None) == ""
 
 
 def test_file_names_stay_in_the_folder():
@@ -200,77 +347,6 @@ def test_a_formula_that_cannot_be_set_is_shown_as_text():
     assert formula(r"\nonsense{<b>}", "b") == r"<code>\nonsense{&lt;b&gt;}</code>"
 
 
-def loop_result(held_out=0.2):
-    time = np.geomspace(0.01, 10.0, 40)
-    rate = np.ones(40)
-    records = []
-    for name, held in ((r"a<b>$\frac$.csv", False), ("c.csv", True)):
-        measured = 1.0 - np.exp(-time)
-        predicted = np.stack([1.4 * measured, 1.01 * measured])
-        errors = np.array([0.4, 0.01])
-        records.append(RunRecord(name, held, time, time, time, rate, measured, predicted, errors))
-    stage = Stage(
-        "stress_gain",
-        "signal",
-        {"gain": StageParameter(0.7, (0.69, 0.71), "")},
-        ("rate_gain",),
-        ErrorPair(0.01, held_out),
-        50.0,
-        r"\sigma \mathrel{+}= g\,\sigma",
-        "a source",
-        "a check",
-    )
-    candidate = CandidateScore(
-        effect="stress_gain", kind="signal", score=0.9, step=0.1, reduction=0.95, error=0.01,
-        left_out_error=None, aliases=("rate_gain",), evidence=50.0,
-    )  # fmt: skip
-    return LoopResult(
-        "effects_added", ErrorPair(0.4, 0.4), ErrorPair(0.01, held_out), 0.005, (stage,),
-        {"structured": False, "runs": ["a"]}, ((candidate,), (candidate,)), tuple(records),
-    )  # fmt: skip
-
-
-def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
-    folder = RunFolder(tmp_path, "x")
-    page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
-    assert stands_alone(page)
-    assert "<i>name" not in page
-    assert r"a&lt;b&gt;$\frac$.csv" in page
-    for name in ("waterfall", "runs", "residual", "reading", "run_errors", "ranking"):
-        assert f'<figure id="{name}">' in page
-        assert (tmp_path / "figures" / f"{name}.svg").is_file()
-    for text in ("cannot tell it from", "rate_gain", "held-out runs", "gain", "0.69 to 0.71"):
-        assert text in page
-    assert (tmp_path / "loop.json").is_file()
-    assert r"\begin{equation}" in (tmp_path / "equations.tex").read_text()
-
-
-def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
-    result = replace(
-        loop_result(), stages=(), error_before=ErrorPair(0.01, None),
-        error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
-    )  # fmt: skip
-    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
-    assert "no effect earned its place" in page
-
-
-def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):
-    result = replace(
-        loop_result(),
-        folds=(Fold("only.csv", "unexplained", ("tr(sigma)*sigma",), 0.7, 0.123),),
-        declared_parameters={"modulus_Pa": StageParameter(41.5, (41.0, 42.0), "Pa")},
-    )
-    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
-    for text in ("by a search that did not see it", "only.csv", "12 %", "tr(σ) σ"):
-        assert text in page
-    declared = page[page.index('<table id="declared"') :]
-    row = declared[: declared.index("</table>")]
-    assert all(text in row for text in ("modulus_Pa", "41.5", "41 to 42", ">Pa<"))
-    contents = json.loads((tmp_path / "loop.json").read_text())
-    assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
-    assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
-
-
 def test_a_comparison_shows_itself_as_tables(comparison):
     terms, errors = comparison.terms_table(), comparison.errors_table()
     assert terms.loc["sigma.sigma", ["truth", "tensor_sindy"]].tolist() == [0.2, 0.2]
@@ -279,17 +355,6 @@ def test_a_comparison_shows_itself_as_tables(comparison):
     assert errors.loc[(flow, "N1"), "before"] == wanted
     assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
     assert "<table" in comparison._repr_html_()
-
-
-def test_a_loop_shows_itself_as_tables():
-    result = loop_result()
-    line = result.table().iloc[0]
-    assert (line["effect"], line["value"], line["low"], line["high"]) == (
-        "stress_gain", 0.7, 0.69, 0.71,
-    )  # fmt: skip
-    assert result.ranking_table(1)["score"].tolist() == [0.9]
-    assert "stress_gain" in result._repr_html_()
-    assert "effects_added" in replace(result, stages=())._repr_html_()
 
 
 def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():

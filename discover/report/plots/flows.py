@@ -16,7 +16,9 @@ from discover.report.plots.style import (
     figure,
     legend_above,
     literal,
+    make_logarithmic,
     picture,
+    runs_through_decades,
 )
 
 SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
@@ -46,33 +48,41 @@ def curves(comparison: Comparison, flow: Flow):
 
 
 def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
-    """Return σ12, N1 and N2 in an oscillatory flow, against time and against the rate."""
+    """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
-    with figure(3, 2, height=2.1) as (drawing, axes):
-        last = _last_cycles(flow)
-        for row, quantity in enumerate(QUANTITIES):
-            in_time, lissajous = axes[row]
+    last = last_cycle(flow)
+    strain = flow.strain[last]
+    strain = strain - 0.5 * (strain.max() + strain.min())  # about the middle of the cycle
+    closed = {"elastic": (strain, "strain γ"), "viscous": (flow.shear_rate[last], rate_label)}
+    shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
+    with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
+        for row, quantity in zip(axes, shown, strict=True):
             for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
-                    in_time.plot(flow.times, stresses[quantity], label=label, **style)
-                    lissajous.plot(flow.shear_rate[last], stresses[quantity][last], **style)
-            _draw_band(in_time, comparison, flow, quantity, flow.times >= 0)
-            _mark_training(in_time, flow)
-            _frame(in_time, comparison, flow, quantity, flow.times >= 0)
-            _frame(lissajous, comparison, flow, quantity, last)
-            in_time.set_ylabel(SYMBOLS[quantity] + stress_unit)
-            in_time.set_xlabel(time_label if row == 2 else "")
-            lissajous.set_xlabel(f"shear rate {rate_label}" if row == 2 else "")
-        axes[0, 0].set_title(f"against time, {literal(flow.title)}")
-        axes[0, 1].set_title("viscous Lissajous curve, last cycle")
+                    row[0].plot(flow.times, stresses[quantity], label=label, **style)
+                    for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
+                        panel.plot(along, stresses[quantity][last], **style)
+            _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
+            _mark_training(row[0], flow)
+            _frame(row[0], comparison, flow, quantity, flow.times >= 0)
+            for panel in row[1:]:
+                _frame(panel, comparison, flow, quantity, last)
+            row[0].set_ylabel(SYMBOLS[quantity] + stress_unit)
+        axes[-1, 0].set_xlabel(time_label)
+        axes[0, 0].set_title(literal(flow.title))
+        for column, (kind, (_, label)) in enumerate(closed.items(), 1):
+            axes[0, column].set_title(f"{kind} Lissajous curve, last cycle")
+            axes[-1, column].set_xlabel(label)
         legend_above(drawing, axes)
         return picture(
             drawing,
             f"flow_{flow.name}",
             f"{flow.title}: {_seen(comparison, flow)} "
-            "Left, stresses against time; beyond the shaded times the prediction runs past the "
-            "length of the training series. Right, the same against the shear rate. "
-            "Curves of the known part alone may leave the frame.",
+            "Left, stresses against time; beyond the times shaded grey the prediction runs past "
+            "the length of the training series. Middle and right, the last cycle against strain "
+            "and against shear rate. Shaded in orange is what the data leave open: the 95 % "
+            "intervals of the parameters, and the rival laws. Curves of the known part alone may "
+            "leave the frame.",
         )
 
 
@@ -121,8 +131,8 @@ def training_picture(comparison: Comparison) -> Picture:
                         flow.times, prediction["sigma12"], label=LEARNER_TITLES[name], **style
                     )
             panel.set_title(literal(flow.title), fontsize=8)
-            if not flow.oscillatory and np.min(flow.times[1:]) * 30 < flow.times[-1]:
-                panel.set_xscale("log")
+            if runs_through_decades(flow.times, flow.shear_rate):
+                make_logarithmic(panel.xaxis)
         for panel in axes[-1]:
             panel.set_xlabel(time_label)
         for panel in axes[:, 0]:
@@ -179,7 +189,8 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
     panel.set_ylim(low - margin, high + margin)
 
 
-def _last_cycles(flow: Flow) -> np.ndarray:
+def last_cycle(flow: Flow) -> np.ndarray:
+    """Return which samples of a flow lie in its last cycle, a little more so that it closes."""
     frequencies = np.asarray(flow.protocol.frequencies)
     active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
     if active.size == 0 or np.min(active) <= 0:

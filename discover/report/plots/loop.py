@@ -1,7 +1,7 @@
 """Pictures of a closed loop: data and predictions, residuals, waterfall, ranking."""
 
 import numpy as np
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import EngFormatter
 
 from discover.closed_loop.reading import differences
 from discover.closed_loop.result import LoopResult, RunRecord
@@ -16,29 +16,19 @@ from discover.report.plots.style import (
     figure,
     legend_above,
     literal,
+    make_logarithmic,
     picture,
+    runs_through_decades,
 )
 from discover.report.wording import percent, spoken
 
 _FIT, _HELD = NETWORK, SPARSE
-_DECADES = 30.0
+_THOUSANDS = 1e4  # Pa, from which digits would crowd an axis
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
 
-def _is_start_up(record: RunRecord) -> bool:
-    """Whether the rate is constant, which makes log time the natural axis."""
-    return bool(np.ptp(record.shear_rate) <= 1e-6 * np.max(np.abs(record.shear_rate)))
-
-
-def _runs_through_decades(record: RunRecord) -> bool:
-    positive = record.time[record.time > 0]
-    return bool(positive.size and positive[-1] > _DECADES * positive[0])
-
-
-def _logarithmic(axis) -> None:
-    """Make an axis logarithmic, with labels at decades only."""
-    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
-    axis.set_minor_formatter(NullFormatter())
+def _through_decades(record: RunRecord) -> bool:
+    return runs_through_decades(record.time, record.shear_rate)
 
 
 def runs_picture(result: LoopResult) -> Picture:
@@ -69,9 +59,11 @@ def runs_picture(result: LoopResult) -> Picture:
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
             margin = 0.05 * (high - low) or 1.0
             panel.set_ylim(low - margin, high + margin)
-            if _is_start_up(record):
-                _logarithmic(panel.xaxis)
-            panel.set_title(_short(record), fontsize=8)
+            if _through_decades(record):
+                make_logarithmic(panel.xaxis)
+            if high > _THOUSANDS:
+                panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
+            panel.set_title(short_title(record), fontsize=8)
         for panel in axes[-1]:
             panel.set_xlabel("time (s)")
         for panel in axes[:, 0]:
@@ -84,7 +76,8 @@ def runs_picture(result: LoopResult) -> Picture:
         )
 
 
-def _short(record: RunRecord) -> str:
+def short_title(record: RunRecord) -> str:
+    """Return the name of a run with its errors before and after."""
     name = literal(record.name.removesuffix(".csv"))
     return f"{name}: {percent(record.errors[0])} → {percent(record.errors[-1])}"
 
@@ -106,8 +99,8 @@ def residual_picture(result: LoopResult) -> Picture:
                 axes[row, 1].plot(record.strain, relative, **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
-                if all(_is_start_up(record) for record in result.records):
-                    _logarithmic(panel.xaxis)
+                if all(map(_through_decades, result.records)):
+                    make_logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
@@ -204,6 +197,7 @@ def waterfall_picture(result: LoopResult) -> Picture:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
             panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
+            _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
         panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
         panel.set_yscale("log")
         heights = [100.0 * value for _, _, values, _ in series for value in values]
@@ -217,8 +211,18 @@ def waterfall_picture(result: LoopResult) -> Picture:
             drawing,
             "waterfall",
             "Error after each effect added: root mean square of prediction minus measurement over "
-            "the root-mean-square stress, mean over runs.",
+            "the root-mean-square stress, mean over runs. Lines: from the best run to the worst.",
         )
+
+
+def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> None:
+    """Draw the range over the runs behind each mean."""
+    errors = [r.errors for r in result.records if r.held_out is held_out]
+    if len(errors) < 2:
+        return
+    table = 100.0 * np.stack(errors)
+    places = np.arange(table.shape[1]) + shift - 0.16  # beside the label of the bar
+    panel.vlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
 def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:

@@ -36,7 +36,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
                 best.curves[0, :, column],
                 color=SPARSE,
                 linewidth=2.2,
-                label=f"chosen: {spoken(following.laws[0])}",
+                label=f"chosen: {_typeset(following.laws[0])}",
             )
             rivals = zip(following.laws[1:], best.curves[1:], strict=True)
             for i, (name, curve) in enumerate(rivals):
@@ -45,7 +45,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
                     curve[:, column],
                     color=_COLOURS[i % len(_COLOURS)],
                     linestyle=_DASHES[i % len(_DASHES)],
-                    label=spoken(name),
+                    label=_typeset(name),
                 )
             # a rival that runs away must not flatten the others
             low, high = best.curves[0, :, column].min(), best.curves[0, :, column].max()
@@ -60,3 +60,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
             f"The experiment proposed: {best.experiment.title}. The chosen law and its rivals, all "
             "of which the data at hand allow.",
         )
+
+
+def _typeset(law: str) -> str:
+    return spoken(law).replace("-", "−")

@@ -1,5 +1,6 @@
 """One look for all pictures, and SVG that follows the page between light and dark."""
 
+import html
 import io
 import re
 from collections.abc import Iterator
@@ -10,10 +11,15 @@ import matplotlib as mpl
 
 mpl.use("svg")
 import matplotlib.pyplot as plt
+import numpy as np
+from jaxtyping import Float
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
-# Okabe & Ito 2008: told apart with every common colour blindness. The stand-ins below are replaced
-# by CSS variables where a picture is part of a page.
+from discover.report.palette import style_sheet
+
+# Stand-ins, each a value of its own: CSS variables of the palette take their place where a picture
+# follows light and dark.
 TRUTH = "#101112"
 BEFORE = "#909192"
 SPARSE = "#d55e00"
@@ -27,18 +33,19 @@ GRID = "#d0d1d2"
 SHADE = "#e0e1e2"
 
 _VARIABLES = {
-    TRUTH: "--truth",
-    BEFORE: "--before",
-    SPARSE: "--sparse",
-    NETWORK: "--network",
-    MEASURED: "--measured",
-    GREEN: "--green",
-    PURPLE: "--purple",
-    YELLOW: "--yellow",
-    INK: "--ink",
-    GRID: "--grid",
-    SHADE: "--shade",
+    TRUTH: "truth",
+    BEFORE: "before",
+    SPARSE: "sparse",
+    NETWORK: "network",
+    MEASURED: "measured",
+    GREEN: "green",
+    PURPLE: "purple",
+    YELLOW: "yellow",
+    INK: "ink",
+    GRID: "grid",
+    SHADE: "shade",
 }
+_DECADES = 30.0
 
 LEARNER_STYLES = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
@@ -94,16 +101,34 @@ class Picture:
 
     @property
     def inline(self) -> str:
-        """The SVG for a page: colours by CSS variable, identifiers unique to this picture."""
-        text = self.svg[self.svg.index("<svg") :]
-        for colour, variable in _VARIABLES.items():
-            text = text.replace(colour, f"var({variable})")
+        """The SVG for a page: colours by CSS variable, identifiers unique to this picture.
+
+        For those who do not see it, it is an image named by its caption.
+        """
+        text = self._with_variables()
         prefix = re.sub(r"[^A-Za-z0-9]", "-", self.name)
         text = re.sub(r'\bid="', f'id="{prefix}-', text)
         text = text.replace("url(#", f"url(#{prefix}-").replace('href="#', f'href="#{prefix}-')
         text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
         # the page decides the width
-        return re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
+        text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
+        spoken = html.escape(self.caption or self.name, quote=True)
+        return text.replace("<svg ", f'<svg role="img" aria-label="{spoken}" ', 1)
+
+    @property
+    def adaptive(self) -> str:
+        """The SVG as a file that follows light and dark by itself, for pages of others."""
+        start = self.svg.index("<svg")
+        text = self._with_variables()
+        end = text.index(">") + 1
+        title = f"<title>{html.escape(self.caption)}</title>"
+        return f"{self.svg[:start]}{text[:end]}{title}<style>{style_sheet()}</style>{text[end:]}"
+
+    def _with_variables(self) -> str:
+        text = self.svg[self.svg.index("<svg") :]
+        for colour, variable in _VARIABLES.items():
+            text = text.replace(colour, f"var(--{variable})")
+        return text
 
 
 def _without_height(text: str) -> str:
@@ -156,3 +181,24 @@ def picture(drawing: Figure, name: str, caption: str) -> Picture:
     buffer = io.StringIO()
     drawing.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return Picture(name, caption, buffer.getvalue())
+
+
+def runs_through_decades(
+    times: Float[np.ndarray, " n"], shear_rate: Float[np.ndarray, " n"]
+) -> bool:
+    """Whether logarithmic time is the natural axis: one constant rate, sampled over decades.
+
+    Parameters
+    ----------
+    times, shear_rate
+        Of one run, in s and 1/s.
+    """
+    positive = times[times > 0]
+    constant = np.ptp(shear_rate) <= 1e-6 * np.max(np.abs(shear_rate))
+    return bool(constant and positive.size and positive[-1] > _DECADES * positive[0])
+
+
+def make_logarithmic(axis) -> None:
+    """Make an axis logarithmic, with labels at decades only."""
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_minor_formatter(NullFormatter())

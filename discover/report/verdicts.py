@@ -1,0 +1,207 @@
+"""The verdict of a report: what was found, how sure, what to measure next. One sentence each."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from discover.closed_loop.loop import ONLY_NOISE
+from discover.closed_loop.result import LoopResult, Stage
+from discover.comparison.comparison import Comparison
+from discover.comparison.next_measurement import NextMeasurement
+from discover.report.wording import (
+    LEARNERS,
+    SYMBOLS,
+    interval,
+    percent,
+    significant,
+    spoken,
+    terms_text,
+    worst,
+)
+
+QUESTIONS = ("What was found", "How sure", "What to measure next")
+"""What the three sentences of every verdict answer, in order."""
+
+KINDS = {
+    "constitutive": "in the fluid",
+    "kinematic": "in the flow that the fluid felt",
+    "signal": "in the instrument's signal",
+}
+_LOOP = {
+    "effects_added": "The declared model lacked something, and adding it explains the data",
+    "no_effect_needed": "The declared model explains the data; no effect earned its place",
+    "unexplained": "What is left still has structure that no candidate explains",
+}
+
+
+def comparison_verdict(comparison: Comparison) -> list[str]:
+    """Return the verdict on a comparison: three sentences, in the order of `QUESTIONS`."""
+    return [_found(comparison), _how_sure(comparison), _next(comparison)]
+
+
+def loop_verdict(result: LoopResult) -> list[str]:
+    """Return the verdict on a closed loop: three sentences, in the order of `QUESTIONS`."""
+    return [_loop_found(result), _loop_sure(result), _loop_next(result)]
+
+
+def _sentence(parts: Iterable[str]) -> str:
+    text = "; ".join(part for part in parts if part)
+    return text[:1].upper() + text[1:] + "."
+
+
+def _found(comparison: Comparison) -> str:
+    parts = []
+    sparse = comparison.outcomes.get("tensor_sindy")
+    if sparse is not None:
+        text = f"sparse regression found {terms_text(sparse)}"
+        if comparison.truth is not None:
+            wanted = {t.term for t in comparison.truth}
+            found = {t.term for t in sparse.terms}
+            text += ", exactly the terms of the law that made the data"
+            if found != wanted:
+                missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
+                extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
+                text = text.replace("exactly the terms of", "against")
+                text += f" missing: {missing}, and too many: {extra}"
+        parts.append(text)
+    network = comparison.outcomes.get("tbnn_ude")
+    if network is not None and network.terms:
+        largest = max(network.terms, key=lambda t: abs(t.coefficient))
+        parts.append(
+            f"put into words, the neural network's largest term is "
+            f"{significant(largest.coefficient)} {spoken(largest.term)}"
+        )
+    elif network is not None:
+        parts.append("put into words, the neural network found no term")
+    return _sentence(parts)
+
+
+def _how_sure(comparison: Comparison) -> str:
+    parts = []
+    judged = comparison.judged
+    for name in comparison.outcomes:
+        errors = {flow.name: comparison.errors(name, flow) for flow in judged}
+        said = [
+            f"{symbol} by {percent(value)}"
+            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            if (value := worst(errors, quantity.split()[0])) is not None
+        ]
+        if said:
+            flows = "flows" if len(judged) > 1 else "the flow"
+            missed = f"{LEARNERS[name].lower()} misses {', '.join(said)} at most"
+            parts.append(f"{missed} in {flows} that no fit saw")
+    if not parts:
+        parts.append("nothing was held out, so no prediction was put to the test")
+    if comparison.undetermined:
+        names = " and ".join(comparison.undetermined)
+        parts.append(
+            f"not determined by these data: {names}, shown as the choice of the simplest law that "
+            "fits"
+        )
+    for name, report in comparison.physics.items():
+        failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
+        if failed:
+            parts.append(
+                f"{LEARNERS[name].lower()}'s law fails {len(failed)} of the checks of physical "
+                f"soundness ({', '.join(failed)})"
+            )
+    return _sentence(parts)
+
+
+def _next(comparison: Comparison) -> str:
+    following = comparison.next_measurement
+    if following.proposals:
+        return _proposal(following)
+    if comparison.undetermined:
+        names = " and ".join(comparison.undetermined)
+        return f"Measure {names}: nothing else decides between laws that give the same σ12."
+    rates = [float(np.max(np.abs(f.shear_rate))) for f in comparison.flows_of("training")]
+    unit = "" if comparison.noise is not None else " 1/s"
+    return (
+        "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
+        f"a shear rate above {significant(max(rates), 3)}{unit}."
+    )
+
+
+def _proposal(following: NextMeasurement) -> str:
+    best = following.proposals[0]
+    n_rivals = len(following.laws) - 1
+    laws = "the one rival law" if n_rivals == 1 else f"the {n_rivals} rival laws"
+    leave = f"{laws} that these data leave"
+    if not best.falling:
+        return f"None of the experiments allowed is expected to rule out {leave}."
+    what = " and ".join(SYMBOLS[name] for name in best.observed)
+    fall = len(best.falling)
+    outcome = leave if fall == n_rivals else f"{fall} of {leave}"
+    return (
+        f"Measure {what} in {best.experiment.title}: at {percent(following.noise)} noise it is "
+        f"expected to rule out {outcome}."
+    )
+
+
+def _loop_found(result: LoopResult) -> str:
+    if result.verdict == "no_effect_needed" and result.error_after.fit > ONLY_NOISE:
+        return "The records hold hardly anything but noise, so they say nothing of any law."
+    parts = []
+    for i, stage in enumerate(result.stages):
+        values = ", ".join(
+            f"{name} = {significant(p.value, 3)} {p.unit}".rstrip() + f" (95 % {interval(p.ci95)})"
+            for name, p in stage.parameters.items()
+        )
+        added = "added " if i == 0 else ""
+        parts.append(f"{added}{KINDS[stage.kind]}: {spoken(stage.effect)}, {values}")
+    verdict = _LOOP[result.verdict]
+    if result.verdict == "unexplained":
+        return _sentence([*parts, verdict if not parts else verdict[:1].lower() + verdict[1:]])
+    return _sentence([verdict, *parts])
+
+
+def _loop_sure(result: LoopResult) -> str:
+    before, after = result.error_before, result.error_after
+    parts = []
+    if before.held_out is not None:
+        unseen = "on runs that no fit saw"
+        if result.folds:
+            unseen = "on each run, by a search that did not see it,"
+        parts.append(
+            f"{unseen} the error falls from {percent(before.held_out)} to {percent(after.held_out)}"
+        )
+    parts.append(
+        f"on the fitted runs from {percent(before.fit)} to {percent(after.fit)}, where noise "
+        f"explains {percent(result.noise_floor)}"
+    )
+    if before.held_out is None:
+        parts[0] = parts[0].replace("from", "the error falls from", 1)
+        parts.append("no run was held out to judge by")
+    for stage in result.stages:
+        if stage.aliases:
+            others = " or ".join(map(spoken, stage.aliases))
+            parts.append(f"these data cannot tell {spoken(stage.effect)} from {others}")
+    return _sentence(parts)
+
+
+def _loop_next(result: LoopResult) -> str:
+    doubtful = _most_doubtful(result.stages)
+    if doubtful is not None:
+        check = doubtful.check.rstrip(". ")
+        if not check[1:2].isdigit():  # N2 keeps its capital
+            check = check[:1].lower() + check[1:]
+        purpose = f"To tell {spoken(doubtful.effect)} from" if doubtful.aliases else "To confirm"
+        others = " and ".join(map(spoken, doubtful.aliases)) or spoken(doubtful.effect)
+        return f"{purpose} {others}: {check}."
+    if result.verdict == "unexplained":
+        return (
+            "Repeat one run with another geometry or instrument: what changes is the instrument's, "
+            "what stays is the fluid's."
+        )
+    rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
+    return (
+        "Nothing is missing in these flows, so what tests the model hardest is a faster one: a "
+        f"shear rate above {significant(max(rates, default=0.0), 3)} 1/s."
+    )
+
+
+def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:
+    """Return the stage to confirm first: one with aliases before one without."""
+    with_aliases = [stage for stage in stages if stage.aliases]
+    return next(iter([*with_aliases, *stages]), None)

@@ -1,0 +1,184 @@
+"""The report of a closed loop: what it contains, its verdict, that it stands alone."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discover.closed_loop import CandidateScore
+from discover.closed_loop.result import (
+    ErrorPair,
+    Fold,
+    LoopResult,
+    RunRecord,
+    Stage,
+    StageParameter,
+)
+from discover.report.loop_report import write_loop
+from discover.report.plots.loop_lissajous import last_cycle, lissajous_picture
+from discover.report.plots.residual_map import levels, loop_residual_map
+from discover.report.verdicts import QUESTIONS, loop_verdict
+from discover.study import RunFolder
+
+
+def loop_result(held_out=0.2):
+    time = np.geomspace(0.01, 10.0, 40)
+    rate = np.ones(40)
+    records = []
+    for name, held in ((r"a<b>$\frac$.csv", False), ("c.csv", True)):
+        measured = 1.0 - np.exp(-time)
+        predicted = np.stack([1.4 * measured, 1.01 * measured])
+        errors = np.array([0.4, 0.01])
+        records.append(RunRecord(name, held, time, time, time, rate, measured, predicted, errors))
+    stage = Stage(
+        "stress_gain",
+        "signal",
+        {"gain": StageParameter(0.7, (0.69, 0.71), "")},
+        ("rate_gain",),
+        ErrorPair(0.01, held_out),
+        50.0,
+        r"\sigma \mathrel{+}= g\,\sigma",
+        "a source",
+        "a check",
+    )
+    candidate = CandidateScore(
+        effect="stress_gain", kind="signal", score=0.9, step=0.1, reduction=0.95, error=0.01,
+        left_out_error=None, aliases=("rate_gain",), evidence=50.0,
+    )  # fmt: skip
+    return LoopResult(
+        "effects_added", ErrorPair(0.4, 0.4), ErrorPair(0.01, held_out), 0.005, (stage,),
+        {"structured": False, "runs": ["a"]}, ((candidate,), (candidate,)), tuple(records),
+    )  # fmt: skip
+
+
+def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
+    folder = RunFolder(tmp_path, "x")
+    page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
+    outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!#)([^"']*)""", page)
+    assert not outside
+    assert "<script" not in page
+    assert "<i>name" not in page
+    assert r"a&lt;b&gt;$\frac$.csv" in page
+    names = ("waterfall", "runs", "residual_map", "residual", "reading", "run_errors", "ranking")
+    for name in names:
+        assert f'<figure id="{name}">' in page
+        assert (tmp_path / "figures" / f"{name}.svg").is_file()
+    for text in ("cannot tell it from", "rate_gain", "held-out runs", "gain", "0.69 to 0.71"):
+        assert text in page
+    assert (tmp_path / "loop.json").is_file()
+    assert r"\begin{equation}" in (tmp_path / "equations.tex").read_text()
+
+
+def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
+    result = replace(
+        loop_result(), stages=(), error_before=ErrorPair(0.01, None),
+        error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
+    )  # fmt: skip
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    assert "no effect earned its place" in page
+
+
+def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):
+    result = replace(
+        loop_result(),
+        folds=(Fold("only.csv", "unexplained", ("tr(sigma)*sigma",), 0.7, 0.123),),
+        declared_parameters={"modulus_Pa": StageParameter(41.5, (41.0, 42.0), "Pa")},
+    )
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    for text in ("by a search that did not see it", "only.csv", "12 %", "tr(σ) σ"):
+        assert text in page
+    declared = page[page.index('<table id="declared"') :]
+    row = declared[: declared.index("</table>")]
+    assert all(text in row for text in ("modulus_Pa", "41.5", "41 to 42", ">Pa<"))
+    contents = json.loads((tmp_path / "loop.json").read_text())
+    assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
+    assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
+
+
+def test_a_loop_shows_itself_as_tables():
+    result = loop_result()
+    line = result.table().iloc[0]
+    assert (line["effect"], line["value"], line["low"], line["high"]) == (
+        "stress_gain", 0.7, 0.69, 0.71,
+    )  # fmt: skip
+    assert result.ranking_table(1)["score"].tolist() == [0.9]
+    assert "stress_gain" in result._repr_html_()
+    assert "effects_added" in replace(result, stages=())._repr_html_()
+
+
+def test_every_verdict_is_three_sentences_that_answer_three_questions():
+    aliased = loop_result()
+    verdicts = []
+    for verdict in ("effects_added", "unexplained", "no_effect_needed"):
+        for stages in (aliased.stages, ()):
+            verdicts.append(loop_verdict(replace(aliased, verdict=verdict, stages=stages)))
+    for sentences in verdicts:
+        assert len(sentences) == len(QUESTIONS) == 3
+        for sentence in sentences:
+            assert sentence.endswith(".")
+            # one sentence: no full stop before the last that a capital follows
+            assert not re.search(r"\.\s+[A-ZΑ-Ω]", sentence), sentence
+    assert "To tell stress_gain from rate_gain: a check." in loop_verdict(aliased)[2]
+    unaliased = replace(aliased.stages[0], aliases=())
+    confirm = loop_verdict(replace(aliased, stages=(unaliased,)))[2]
+    assert confirm == "To confirm stress_gain: a check."
+
+
+def test_the_verdict_of_an_unexplained_loop_does_not_end_on_what_was_added():
+    text = loop_verdict(replace(loop_result(), verdict="unexplained"))[0]
+    assert text.startswith("Added in the instrument's signal: stress_gain, gain = 0.7 (95 % 0.69")
+    assert text.endswith("what is left still has structure that no candidate explains.")
+
+
+def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path):
+    result = loop_result()
+    fitted = result.records[0]
+    worse = replace(fitted, name="worse.csv", errors=np.array([0.6, 0.03]))
+    result = replace(result, records=(*result.records, worse))
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    assert "<td>1 % (1 to 3 %)</td><td>20 %</td>" in page  # one held-out run has no range
+    runs = page[page.index('<h2 id="run-table"') : page.index('<h2 id="ranking-table"')]
+    assert runs.count("<tr><td>") == 3
+    assert '<td class="text">judge</td>' in runs
+
+
+def oscillating(name="wave.csv", held_out=False):
+    time = np.linspace(0.0, 20.0, 401)
+    rate = 2.0 * np.cos(time)
+    measured = np.sin(time + 0.5)
+    predicted = np.stack([1.3 * measured, measured])
+    errors = np.array([0.3, 0.0])
+    strain = 2.0 * np.sin(time)
+    return RunRecord(name, held_out, time, strain, time, rate, measured, predicted, errors)
+
+
+def test_oscillations_are_drawn_against_strain_and_rate_and_start_ups_are_not():
+    waves = replace(loop_result(), records=(oscillating(), oscillating("held.csv", True)))
+    drawn = lissajous_picture(waves)
+    assert drawn is not None
+    for text in ("elastic: σ₁₂ (Pa)", "viscous: σ₁₂ (Pa)", "strain γ", "γ̇ (1/s)", "held: 30 %"):
+        assert text in drawn.svg
+    assert lissajous_picture(loop_result()) is None
+
+
+def test_the_last_cycle_is_one_period_long():
+    record = oscillating()
+    shown = record.time[last_cycle(record, 1.0)]
+    assert shown[-1] - shown[0] == pytest.approx(2.0 * np.pi, rel=0.03)
+
+
+def test_levels_of_a_residual_map_keep_sign_and_order():
+    found = levels(np.array([-2.0, -0.25, 0.0, 0.004, 0.25, 1.0]), 1.0)
+    assert found.tolist() == [-6, -3, 0, 0, 3, 6]
+
+
+def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
+    drawn = loop_residual_map(loop_result())
+    # what a run is called is text, whatever stands in it
+    assert r"a&lt;b&gt;$\frac$" in drawn.svg
+    assert "c (held out)" in drawn.svg
+    assert "strain" in drawn.svg  # start-ups sampled over decades
+    assert "time (s)" in loop_residual_map(replace(loop_result(), records=(oscillating(),))).svg
+    assert drawn.svg.count("deepest at") == 2
