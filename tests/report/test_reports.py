@@ -278,7 +278,13 @@ def test_a_comparison_shows_itself_as_tables(comparison):
     wanted = comparison.errors("before", comparison.judged[0])["N1"]
     assert errors.loc[(flow, "N1"), "before"] == wanted
     assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
-    assert "<table" in comparison._repr_html_()
+    shown = comparison._repr_html_()
+    assert "<table" in shown
+    for statement in comparison.statements:
+        assert statement.quantity in shown
+    rivals = comparison.rivals_table()
+    assert len(rivals) == len(comparison.rivals)
+    assert set(rivals.columns) >= {"law", "told_by"} or not len(rivals)
 
 
 def test_a_loop_shows_itself_as_tables():
@@ -288,6 +294,11 @@ def test_a_loop_shows_itself_as_tables():
         "stress_gain", 0.7, 0.69, 0.71,
     )  # fmt: skip
     assert result.ranking_table(1)["score"].tolist() == [0.9]
+    runs = result.runs_table()
+    assert runs.index.tolist() == [record.name for record in result.records]
+    for record in result.records:
+        assert runs.loc[record.name, "declared"] == record.errors[0]
+    assert result.errors_table().loc["after", "fit"] == result.error_after.fit
     assert "stress_gain" in result._repr_html_()
     assert "effects_added" in replace(result, stages=())._repr_html_()
 
