@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -306,3 +308,13 @@ def test_a_loop_shows_itself_as_tables():
 def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
     said = spoken("0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.")
     assert said == "0.5 tr(σ·γ̇) I + σ·σ, whatever the law."
+
+
+def test_reports_leave_a_notebook_its_pictures():
+    """Reports once changed matplotlib's backend, and a notebook showed no picture from then on."""
+    code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison_report; "
+    code += "import discover.report.loop_report, discover.report.mathtext as m, sys; "
+    code += "assert '<svg' in m.formula('x^2', 'a'); print(matplotlib.get_backend()); "
+    code += "print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["agg", "False"]
