@@ -1,7 +1,7 @@
 """How the studies of a batch ended."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,7 @@ class BatchResult(NotebookView):
     """
 
     studies: tuple[StudyStatus, ...]
-    index: Path
+    index: Path = field(repr=False)
     rows: tuple[StudyRow, ...] = ()
 
     @property
