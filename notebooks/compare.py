@@ -20,10 +20,13 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
+from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 
 enable_x64()
+enable_compilation_cache()
 
 from discover.learners.tbnn_ude import TBNNUDE
 from discover.learners.tensor_sindy import TensorSINDy
@@ -40,9 +43,7 @@ data = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
 
 # %%
 sparse = TensorSINDy(max_terms=2).fit(data.runs)
-for term in sparse.terms_:
-    print(f"{term.coefficient:.4f} {term.term}   95 % interval {term.ci95}")
-print(sparse.result_.message)
+sparse.result_
 
 # %% [markdown]
 # ## A neural network inside the differential equation
@@ -51,9 +52,16 @@ print(sparse.result_.message)
 
 # %%
 network = TBNNUDE(quick=True).fit(data.runs)
-for term in network.terms_:
-    print(f"{term.coefficient:.4f} {term.term}")
-print(network.result_.message)
+network.result_
+
+# %% [markdown]
+# Put into words (projected on the library), its law is an expression like the other's.
+
+# %%
+network.result_.sympy()
+
+# %%
+print(sparse.result_.latex())
 
 # %% [markdown]
 # ## Start-up, which neither saw
@@ -75,10 +83,16 @@ figure.legend(loc="outside upper center", ncols=3)
 plt.show()
 
 # %%
-truth = stresses["truth"]
-for name in ("sparse", "network"):
-    difference = stresses[name].components - truth.components
-    print(
-        f"{name}: relative error of all stresses "
-        f"{np.linalg.norm(difference) / np.linalg.norm(truth.components):.2%}"
-    )
+quantities = ("shear_stress", "first_normal_stress_difference", "second_normal_stress_difference")
+
+
+def relative_error(name, quantity):
+    true = getattr(stresses["truth"], quantity)
+    return np.linalg.norm(getattr(stresses[name], quantity) - true) / np.linalg.norm(true)
+
+
+pd.DataFrame({n: {q: relative_error(n, q) for q in quantities} for n in ("sparse", "network")})
+
+# %% [markdown]
+# `discover compare study.toml` does all this for a study file, with rivals, twins and what to measure
+# next; `discover.comparison.compare` returns the same as an object that shows itself here.

@@ -20,13 +20,16 @@
 import matplotlib.pyplot as plt
 import numpy as np
 
+from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 
 enable_x64()
+enable_compilation_cache()
 
 from discover.identify import LawTerms, analyse_structure, find_rivals, find_twins
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.learners.tensor_sindy import TensorSINDy
+from discover.notebook_view import table_of
 from discover.protocols import oscillatory_shear
 from discover.simulate import simulate, synthetic_dataset
 from tensor_library import TermLibrary, build_library, parse_term
@@ -46,7 +49,9 @@ library = TermLibrary((*build_library().terms, *map(parse_term, extra)))
 
 # %%
 structure = analyse_structure(list(data), library)
-print(structure.text)
+structure
+
+# %%
 for law in structure.laws:
     print("\n" + law.name)
     print(law.text)
@@ -58,10 +63,8 @@ for law in structure.laws:
 
 # %%
 model = TensorSINDy(library, max_terms=3).fit(data)
-for term in model.terms_:
-    low, high = term.ci95
-    print(f"{term.coefficient:.4f} {term.term}, 95 % interval {low:.4f} to {high:.4f}")
 print(model.result_.details["noise"])
+model.result_
 
 # %% [markdown]
 # ## 3. Twins
@@ -74,6 +77,7 @@ found = LawTerms({term.term: term.coefficient for term in model.terms_})
 twins = find_twins(library, found)
 for twin in twins:
     print("-", twin.text)
+table_of(twins)
 
 # %% [markdown]
 # ## 4. Rivals at this noise
@@ -81,10 +85,7 @@ for twin in twins:
 # Other laws that were tried and that a test on the residuals could not rule out.
 
 # %%
-rivals = find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
-print(rivals.text)
-for rival in rivals.rivals:
-    print("-", rival.text)
+find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 
 # %% [markdown]
 # ## 5. What to measure next
@@ -108,6 +109,7 @@ print(f"Measure {' and '.join(best.observed)} in {best.experiment.title}.")
 print(f"Expected logarithm of the odds against the twin: {best.evidence['twin']:.0f}")
 shear_alone = next(p for p in proposals if p.observed == ("sigma12",))
 print(f"With σ12 alone: {shear_alone.evidence['twin']:.1g}")
+table_of(proposals[:5])
 
 # %%
 truth = Fluid.dimensionless(make_law("johnson_segalman", {"xi": 0.4}))
@@ -120,9 +122,7 @@ noise = {
 }
 rng = np.random.default_rng(0)
 measured = {q: exact[q] + noise[q] * rng.normal(size=exact[q].size) for q in best.observed}
-for weight in weigh(laws, maxwell, best.experiment, measured, noise):
-    verdict = "refuted" if weight.refuted else "stands"
-    print(f"{weight.name}: probability {weight.probability:.2g}, {verdict}")
+table_of(weigh(laws, maxwell, best.experiment, measured, noise))
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")

@@ -19,6 +19,14 @@ class Trace(sympy.Function):
     is_commutative = True
     nargs = 1
 
+    # SymPy has a Trace of its own, of matrices, and prints any class of that name as if it were it
+    def _latex(self, printer, exp=None):
+        text = rf"\operatorname{{tr}}\left({printer._print(self.args[0])}\right)"
+        return text if exp is None else rf"{text}^{{{exp}}}"
+
+    def _pretty(self, printer):
+        return printer._print_Function(self, func_name="tr")
+
 
 _TENSORS = (
     UNIT,
@@ -72,10 +80,6 @@ class RheologyLatexPrinter(LatexPrinter):
             UNIT: r"\boldsymbol{I}",
         }
         return special.get(expr) or super()._print_Symbol(expr)
-
-    def _print_Trace(self, expr, exp=None):
-        text = rf"\operatorname{{tr}}\left({self._print(expr.args[0])}\right)"
-        return text if exp is None else rf"{text}^{{{exp}}}"
 
     def _print_Pow(self, expr):
         if expr.base in (STRESS, RATE) and expr.exp.is_Integer:

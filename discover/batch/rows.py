@@ -130,21 +130,17 @@ def _loop(content: Mapping[str, Any]) -> StudyRow:
     )
 
 
-def results_table(names: Sequence[str], rows: Sequence[StudyRow]) -> pd.DataFrame:
-    """Return what the studies found as a table, one line each.
-
-    Nothing in it depends on when or how often a study was run.
+def results_table(rows: Sequence[StudyRow]) -> pd.DataFrame:
+    """Return what studies found as a table, one line each, without columns that nothing fills.
 
     Parameters
     ----------
-    names
-        Names of the studies.
     rows
-        Their rows.
+        What they found.
     """
     lines = []
-    for name, row in zip(names, rows, strict=True):
-        line: dict[str, Any] = {"study": name}
+    for row in rows:
+        line: dict[str, Any] = {}
         for learner, found in row.learners.items():
             line[f"{learner}_terms"] = found.text
             line |= {f"{learner}_{quantity}": error for quantity, error in found.errors.items()}

@@ -1,9 +1,12 @@
 """Many studies, one after the other or on a dask cluster."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
+from uuid import uuid4
 
+from discover.batch.progress import BatchProgress, now_and_then
 from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import Summary
 from discover.batch.tasks import Progress, run_close_loop, run_compare
@@ -50,16 +53,18 @@ def run_batch(
         for name, task in _tasks_of(path, name)
     ]
     summary = Summary(out, [(job[1], job[2]) for job in jobs])
-    if workers == 1 and scheduler is None:
-        for i, job in enumerate(jobs):
-
-            def inner(label: str, fraction: float, i: int = i, job=job) -> None:
-                progress(f"{job[1]}: {label}", (i + fraction) / len(jobs))
-
-            summary.add(i, run_one(*job, progress=inner))
-    else:
-        _run_on_cluster(jobs, workers, scheduler, summary, progress)
-    return summary.write()
+    so_far = BatchProgress([job[1] for job in jobs], progress)
+    try:
+        if workers == 1 and scheduler is None:
+            for i, job in enumerate(jobs):
+                status = run_one(*job, progress=partial(so_far.say, i))
+                summary.add(i, status)
+                so_far.end(i, status)
+        else:
+            _run_on_cluster(jobs, workers, scheduler, summary, so_far)
+    finally:
+        result = summary.write()  # what had ended before Ctrl-C is on the page too
+    return result
 
 
 def folder_names(paths: Sequence[Path]) -> list[str]:
@@ -123,7 +128,7 @@ def _run_on_cluster(
     workers: int,
     scheduler: str | None,
     summary: Summary,
-    progress: Callable[[str, float], None],
+    so_far: BatchProgress,
 ) -> None:
     try:
         from distributed import Client, LocalCluster, as_completed
@@ -142,29 +147,47 @@ def _run_on_cluster(
         )
         client = Client(cluster)
     try:
+        topic = f"discover-{uuid4()}"
+        client.subscribe_topic(topic, lambda event: so_far.say(*event[1]))
         # paths must mean the same in the workers as here
         futures = {}
         for i, (path, name, task, out, seed, overwrite) in enumerate(jobs):
             arguments = (str(Path(path).resolve()), name, task, str(Path(out).resolve()))
-            future = client.submit(run_one, *arguments, seed, overwrite, pure=False)
+            future = client.submit(
+                _run_on_worker, topic, i, *arguments, seed, overwrite, pure=False
+            )
             futures[future] = i
-        for done, future in enumerate(as_completed(futures), 1):
+        for future in as_completed(futures):
             i = futures[future]
             status = _status_of(future, jobs[i])
             summary.add(i, status)
-            progress(f"{jobs[i][1]}: {status.status}", done / len(jobs))
+            so_far.end(i, status)
     finally:
         client.close()
         if cluster is not None:
             cluster.close()
 
 
+def _run_on_worker(topic: str, position: int, *job) -> StudyStatus:
+    """Run one study in a dask worker, and send the scheduler word of how far it is."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    send = now_and_then(lambda text, f: worker.log_event(topic, (position, text, float(f))))
+    return run_one(*job, progress=send)
+
+
 def _status_of(future, job: tuple) -> StudyStatus:
     _, name, task, out, *_ = job
     error = future.exception()
     if error is not None:
-        reason = (str(error).splitlines() or [""])[0]
-        text = f"{type(error).__name__}: {reason}. What was finished is kept; run again to go on."
+        from distributed import KilledWorker
+
+        # dask's own words hold keys and addresses, which no two runs share
+        reason = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}."
+        if isinstance(error, KilledWorker):
+            reason = "Several workers died while they ran it; look at their memory and time limits."
+        text = f"{reason} What was finished is kept; run again to go on."
         return StudyStatus(name, task, "failed", text)
     status: StudyStatus = future.result()
     if status.status != "failed" and not (Path(out) / "report.html").is_file():

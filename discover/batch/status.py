@@ -1,12 +1,14 @@
 """How the studies of a batch ended."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from discover.batch.rows import StudyRow, results_table
+from discover.notebook_view import NotebookView
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,14 @@ class StudyStatus:
     input_error: bool = False
     seconds: float = 0.0
 
+    @property
+    def outcome(self) -> str:
+        """``result``, ``failed`` or ``waiting``: the status without when the result was made."""
+        return "result" if self.status in ("done", "complete") else self.status
+
 
 @dataclass(frozen=True)
-class BatchResult:
+class BatchResult(NotebookView):
     """How every study of a batch ended.
 
     Attributes
@@ -50,7 +57,7 @@ class BatchResult:
     """
 
     studies: tuple[StudyStatus, ...]
-    index: Path
+    index: Path = field(repr=False)
     rows: tuple[StudyRow, ...] = ()
 
     @property
@@ -59,15 +66,24 @@ class BatchResult:
         return [study for study in self.studies if study.status == "failed"]
 
     def table(self) -> pd.DataFrame:
-        """Return what the studies found as a table, one line each."""
-        return results_table([study.name for study in self.studies], self.rows)
+        """Return how the studies ended and what they found as a table, one line each.
 
-    def _repr_html_(self) -> str:
-        states = pd.DataFrame(
-            {"task": [s.task for s in self.studies], "status": [s.status for s in self.studies]}
-        )
-        both = pd.concat([states, self.table()], axis="columns")
-        return both.to_html(escape=True, float_format=lambda value: f"{value:.4g}", na_rep="–")
+        Nothing in it depends on when or how often a study was run: how long it took, and whether
+        its result was there already, is in `studies`.
+        """
+        states = {
+            "study": [study.name for study in self.studies],
+            "task": [study.task for study in self.studies],
+            "outcome": [study.outcome for study in self.studies],
+            "reason": [s.text if s.outcome == "failed" else "" for s in self.studies],
+        }
+        found = results_table(self.rows)
+        return pd.concat([pd.DataFrame(states), found], axis="columns")
+
+    def _shown(self) -> Iterable[Any]:
+        there = sum(study.outcome == "result" for study in self.studies)
+        yield f"{there} studies with a result, {len(self.failed)} failed."
+        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the contents of ``batch.json``."""

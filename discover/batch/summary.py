@@ -3,13 +3,13 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from time import perf_counter
+from threading import RLock, Timer
 
 from discover.batch.rows import StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
 from discover.study.atomic import write_text
 
-_PAUSE = 5.0  # seconds between two versions of the page while studies run
+_PAUSE = 5.0  # seconds for which news are gathered before the page is written again
 
 
 class Summary:
@@ -27,19 +27,30 @@ class Summary:
         self.out = out
         self._statuses = [StudyStatus(name, task, "waiting", "") for name, task in jobs]
         self._rows = [StudyRow() for _ in jobs]
-        self._written: float | None = None
+        self._timer: Timer | None = None
+        self._lock = RLock()
 
     def add(self, position: int, status: StudyStatus) -> None:
-        """Take note of a study that has ended."""
-        self._statuses[position] = status
-        if status.status != "failed":
-            self._rows[position] = read_row(self.out / status.name)
-        now = perf_counter()
-        if self._written is None or now - self._written > _PAUSE:
-            self.write()
+        """Take note of a study that has ended; it is on the page a few seconds later."""
+        row = StudyRow() if status.status == "failed" else read_row(self.out / status.name)
+        with self._lock:
+            self._statuses[position] = status
+            self._rows[position] = row
+            if self._timer is None:
+                # the next study may take hours, so the page cannot wait for it
+                self._timer = Timer(_PAUSE, self.write)
+                self._timer.daemon = True
+                self._timer.start()
 
     def write(self) -> BatchResult:
-        """Write everything and return how the studies ended."""
+        """Write everything now and return how the studies ended."""
+        with self._lock:
+            if self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+            return self._write()
+
+    def _write(self) -> BatchResult:
         from discover.report.batch_report import batch_page  # workers need no report
 
         result = BatchResult(tuple(self._statuses), self.out / "index.html", tuple(self._rows))
@@ -47,5 +58,4 @@ class Summary:
         table = result.table().to_csv(index=False, lineterminator="\n")
         write_text(self.out / "table.csv", table)
         write_text(result.index, batch_page(result.studies, result.rows))
-        self._written = perf_counter()
         return result

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +13,10 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.equations import Equation, equation_to_json
+from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.laws import Fluid
+from discover.notebook_view import NotebookView, table_of
 
 if TYPE_CHECKING:
     from discover.closed_loop.reading import Reading
@@ -104,6 +106,12 @@ class RunRecord:
     errors: Float[np.ndarray, " stages"]
     conditions: dict[str, float] = field(default_factory=dict)
 
+    def line(self) -> dict[str, Any]:
+        """Return the run as one line of a table: its errors, the declared model's first."""
+        stages = ["declared", *(f"stage_{i}" for i in range(1, len(self.errors)))]
+        errors = dict(zip(stages, map(float, self.errors), strict=True))
+        return {"run": self.name, "held_out": self.held_out, **errors}
+
     @property
     def residual(self) -> Float[np.ndarray, "stages n"]:
         """Prediction minus measurement in Pa, for each model."""
@@ -137,7 +145,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class LoopResult:
+class LoopResult(HasEquation, NotebookView):
     """The outcome of a closed loop.
 
     Attributes
@@ -223,15 +231,23 @@ class LoopResult:
         ]
         return pd.DataFrame(lines, columns=[*names, "aliases"])
 
-    def _repr_html_(self) -> str:
-        errors = pd.DataFrame(
-            {"before": asdict(self.error_before), "after": asdict(self.error_after)}
-        ).T
-        tables = "".join(
-            table.to_html(escape=True, float_format="{:.4g}".format, na_rep="–", index=index)
-            for table, index in ((errors, True), (self.table(), False))
-        )
-        return f"<p><b>{self.verdict}</b>, noise {self.noise_floor:.2g}</p>{tables}"
+    def runs_table(self) -> pd.DataFrame:
+        """Return the relative error of every run, by the declared model and after each stage."""
+        return table_of(self.records).set_index("run")
+
+    def errors_table(self) -> pd.DataFrame:
+        """Return the mean relative errors before and after, on fitted and on held-out runs."""
+        pairs = {"before": asdict(self.error_before), "after": asdict(self.error_after)}
+        return pd.DataFrame(pairs, dtype=float).T.rename_axis("error")
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.verdict}, noise {self.noise_floor:.2g}"
+        yield self.errors_table()
+        yield self.table()
+        try:
+            yield self.equation()
+        except InputError as error:
+            yield str(error)
 
     def _law(self) -> dict[str, Any]:
         try:

@@ -1,6 +1,6 @@
 """The result of comparing two learners on identical data."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.truth import TrueTerm
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
+from discover.notebook_view import NotebookView, table_of
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(NotebookView):
     """Both learners beside the known part alone, in the same flows.
 
     Attributes
@@ -155,13 +156,23 @@ class Comparison:
         table.index = pd.MultiIndex.from_tuples(lines, names=["flow", "quantity"])
         return table
 
-    def _repr_html_(self) -> str:
-        tables = (self.terms_table(), self.errors_table())
-        return "".join(
-            table.to_html(escape=True, float_format="{:.4g}".format, na_rep="–")
-            for table in tables
-            if len(table)
-        )
+    def rivals_table(self) -> pd.DataFrame:
+        """Return the laws that the data do not tell from the chosen one, and what would tell."""
+        return table_of(self.rivals)
+
+    def _shown(self) -> Iterable[Any]:
+        for name, outcome in self.outcomes.items():
+            yield f"{name}: {outcome.message}"
+            if self.known is not None:
+                yield self.equation(name)
+        yield self.terms_table()
+        yield self.errors_table()
+        for statement in self.statements:
+            left = "Not determined by these data" if statement.undetermined else "Assumed"
+            yield f"{left}: {statement.quantity}. {statement.text}"
+        if self.rivals:
+            yield "Laws that these data do not tell from the one found by sparse regression:"
+            yield self.rivals_table()
 
     def equation(self, learner: str) -> Equation:
         """Return the law that a learner found, with its modes and the box where it was tested."""

@@ -23,6 +23,7 @@ from discover.identify import (
     find_twins,
 )
 from discover.identify.physics import mean_relaxation_time
+from discover.identify.relations import spell
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners.result import RecoveredTerm
@@ -71,6 +72,13 @@ class Rival:
     reason: str = ""
     errors_to_chosen: Mapping[str, float | None] = field(default_factory=dict)
     separated_by: Mapping[str, str] | None = None
+
+    def line(self) -> dict[str, Any]:
+        """Return the rival as one line of a table: its law, how far it is off, what would tell."""
+        apart = {f"{name}_apart": error for name, error in self.errors_to_chosen.items()}
+        separated = dict(self.separated_by or {})
+        told_by = " in ".join(separated[key] for key in ("quantity", "protocol") if separated)
+        return {"law": spell(self.terms), **apart, "told_by": told_by}
 
     def to_json(self) -> dict[str, Any]:
         """Return the rival as the contract spells it."""

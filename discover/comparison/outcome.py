@@ -10,10 +10,11 @@ from jaxtyping import Real
 from discover.comparison.flows import Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.term_tables import TermTables
 
 
 @dataclass(frozen=True)
-class LearnerOutcome:
+class LearnerOutcome(TermTables):
     """A learner's result with its predictions in every flow of the comparison.
 
     Attributes

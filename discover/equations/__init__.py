@@ -2,6 +2,7 @@
 
 from discover.equations.equation import Box, Equation, EquationTerm, Tested
 from discover.equations.from_law import combined, effect_terms, law_terms
+from discover.equations.has_equation import HasEquation
 from discover.equations.json_format import equation_from_json, equation_to_json
 from discover.equations.rheotool_reader import read_rheotool
 from discover.equations.write import FORMATS, write_equation
@@ -11,6 +12,7 @@ __all__ = [
     "Box",
     "Equation",
     "EquationTerm",
+    "HasEquation",
     "Tested",
     "combined",
     "effect_terms",

@@ -1,14 +1,16 @@
 """A law as it leaves this package: terms, modes, and where it was tested."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
+import pandas as pd
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion, law_of_terms
 from discover.laws.multimode import Fluid
+from discover.notebook_view import NotebookView
 from tensor_library.terms import parse_term
 
 if TYPE_CHECKING:
@@ -113,7 +115,7 @@ class Tested:
 
 
 @dataclass(frozen=True)
-class Equation:
+class Equation(NotebookView):
     """A fluid in words: λ dσ/dt = Gλγ̇ + λ(L·σ + σ·Lᵀ) − σ − G h(σ/G, λγ̇) for every mode.
 
     Attributes
@@ -206,10 +208,23 @@ class Equation:
 
         return law_latex(self.terms, self.linear_relaxation)
 
+    def modes_table(self) -> pd.DataFrame:
+        """Return G_k in Pa and λ_k in s, one line for each mode."""
+        return pd.DataFrame({"G_Pa": self.modulus, "lambda_s": self.relaxation_time})
+
     def _repr_html_(self) -> str:
         from discover.equations.mathml import law_element
 
-        return law_element(self.terms, self.linear_relaxation)
+        # markup of this package, not a sentence to be escaped
+        return law_element(self.terms, self.linear_relaxation) + super()._repr_html_()
+
+    def _shown(self) -> Iterable[Any]:
+        if (self.modulus, self.relaxation_time) != ((1.0,), (1.0,)):
+            yield self.modes_table()
+        if self.solvent_viscosity:
+            yield f"Solvent viscosity {self.solvent_viscosity:.4g} Pa s."
+        yield from () if self.tested is None else self.tested.lines
+        yield from self.notes
 
 
 def mean_relaxation_time(modulus: Sequence[float], relaxation_time: Sequence[float]) -> float:

@@ -147,7 +147,7 @@ def rheotool_text(
     model = rheotool_model(equation, tolerance)
     lines = [f"// {line}" for line in ("Written by discover.", *header_lines(equation))]
     lines += [f"// {note}" for note in model.notes]
-    lines.append(f"// The density {density_kg_m3:g} kg/m3 was given, not measured.")
+    lines.append(f"// Nobody measured the density, {density_kg_m3:g} kg/m3: set it to the fluid's.")
     lines += ["FoamFile", "{", "    version     2.0;", "    format      ascii;"]
     lines += ["    class       dictionary;", "    object      constitutiveProperties;", "}", ""]
     lines += ["parameters", "{"]

@@ -60,6 +60,11 @@ class Proposal:
         """Rivals against which it is expected to decide."""
         return tuple(name for name, value in self.evidence.items() if value >= DECISIVE)
 
+    def line(self) -> dict[str, Any]:
+        """Return the proposal as one line of a table: expected logarithms of odds by rival."""
+        what = " and ".join(self.observed)
+        return {"measure": what, "in": self.experiment.title, **self.evidence}
+
     def to_json(self) -> dict[str, Any]:
         """Return the proposal without its curves."""
         return {

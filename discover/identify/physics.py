@@ -4,13 +4,14 @@ None of them uses data. A law that fails one may still fit; it should not be car
 simulation of other flows without a second thought.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 
 from discover.equations.equation import mean_relaxation_time as mean_of_modes
 from discover.identify.physics_flows import Trajectories, cycles, trajectories
@@ -21,6 +22,7 @@ from discover.identify.steady_states import (
     steady_uniaxial_extension,
 )
 from discover.laws.multimode import Fluid
+from discover.notebook_view import NotebookView, table_of
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.grid import IntegrationGrid
 
@@ -64,6 +66,10 @@ class PhysicsCheck:
     where: str
     text: str
 
+    def line(self) -> dict[str, Any]:
+        """Return the check as one line of a table."""
+        return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
+
     def to_json(self) -> dict[str, Any]:
         """Return the check as JSON-able values."""
         return {
@@ -76,7 +82,7 @@ class PhysicsCheck:
 
 
 @dataclass(frozen=True)
-class PhysicsReport:
+class PhysicsReport(NotebookView):
     """All checks of a law.
 
     Attributes
@@ -97,6 +103,14 @@ class PhysicsReport:
         if not failed:
             return "The law passes every check of physical soundness that could be made."
         return "The law fails: " + ", ".join(failed) + "."
+
+    def table(self) -> pd.DataFrame:
+        """Return the checks, one line each."""
+        return table_of(self.checks)
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""

@@ -11,17 +11,19 @@ be the simplest: fewest terms, then lowest complexity, then fewest invariants, t
 library; `RivalTable.simplest` says whether it is.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from discover.identify.evidence import LEVEL, Evidence, compare_residuals
 from discover.identify.lanes import LawTerms
 from discover.identify.relations import spell
 from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
+from discover.notebook_view import NotebookView, table_of
 
 MOST_RIVALS = 8
 
@@ -71,6 +73,17 @@ class FittedRival:
             f"{self.evidence.effective_samples:.0f} independent residuals)."
         )
 
+    def line(self) -> dict[str, Any]:
+        """Return the rival as one line of a table."""
+        return {
+            "law": spell(self.law.coefficients),
+            "misfit": self.misfit,
+            "difference": self.difference,
+            "test": self.evidence.test,
+            "p_value": self.evidence.p_value,
+            "simpler": self.simpler,
+        }
+
     def to_json(self) -> dict[str, Any]:
         """Return the rival as JSON-able values that `from_json` undoes."""
         return {
@@ -89,7 +102,7 @@ class FittedRival:
 
 
 @dataclass(frozen=True)
-class RivalTable:
+class RivalTable(NotebookView):
     """Every law met that the data cannot tell from the chosen one.
 
     Attributes
@@ -123,6 +136,14 @@ class RivalTable:
         return text + (
             "; the chosen law is the simplest of them." if self.simplest else "; one is simpler."
         )
+
+    def table(self) -> pd.DataFrame:
+        """Return the rivals, one line each, closest predictions first."""
+        return table_of(self.rivals)
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the table as JSON-able values."""

@@ -7,7 +7,7 @@ first order around the law; whether a direction stays invisible at finite size i
 arithmetic where the law is a polynomial.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -15,6 +15,7 @@ from typing import Any, Literal
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.run import ShearRun
@@ -28,6 +29,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.tensor_sindy.problem import TrajectoryProblem, make_problem
 from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.notebook_view import NotebookView, table_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -77,9 +79,13 @@ class QuantityVerdict:
         """Whether the observed stresses leave the quantity open."""
         return self.verdict in ("undetermined", "assumed")
 
+    def line(self) -> dict[str, Any]:
+        """Return the verdict as one line of a table."""
+        return {"quantity": self.quantity, "verdict": self.verdict, "why": self.text}
+
 
 @dataclass(frozen=True)
-class LawStructure:
+class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
     Attributes
@@ -118,6 +124,20 @@ class LawStructure:
         """Return the verdict on N1 or N2."""
         return next(q.verdict for q in self.quantities if q.quantity == quantity)
 
+    def line(self) -> dict[str, Any]:
+        """Return the law as one line of a table: combinations that no datum sees, and verdicts."""
+        verdicts = {q.quantity: q.verdict for q in self.quantities}
+        unseen = {"unseen": len(self.exact), "unseen_with_N1": self.n_exact_with_N1}
+        return {"law": self.name, **unseen, **verdicts, "N2_with_N1": self.N2_with_N1}
+
+    def table(self) -> pd.DataFrame:
+        """Return the verdicts on N1 and N2, one line each."""
+        return table_of(self.quantities)
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"Around {self.name}:"
+        yield self.table()
+
     def to_json(self) -> dict[str, Any]:
         """Return the structure as JSON-able values."""
         return {
@@ -137,7 +157,7 @@ class LawStructure:
 
 
 @dataclass(frozen=True)
-class Structure:
+class Structure(NotebookView):
     """What an experiment can determine of a library.
 
     Attributes
@@ -162,6 +182,14 @@ class Structure:
             f"Of the {self.n_terms} coefficients of the library these flows leave unseen, however "
             f"small the noise, this many combinations: {counts}."
         )
+
+    def table(self) -> pd.DataFrame:
+        """Return how many combinations stay unseen, and the verdicts, one line for each law."""
+        return table_of(self.laws)
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the structure as ``comparison.json`` holds it."""

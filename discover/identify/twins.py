@@ -15,7 +15,7 @@ histories
 Every twin is also simulated in random histories before it is reported.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
@@ -32,6 +32,7 @@ from discover.identify.relations import feels_33, spell, term_relations
 from discover.identify.separation import Separation, separations
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.notebook_view import NotebookView
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -45,7 +46,7 @@ INVISIBLE_SIZE = 0.05
 
 
 @dataclass(frozen=True)
-class Twin:
+class Twin(NotebookView):
     """A law that no shear stress tells from another.
 
     Attributes
@@ -97,6 +98,20 @@ class Twin:
         if self.separated_by:
             text += "; " + " or ".join(s.text for s in self.separated_by) + " would tell"
         return text + "."
+
+    def line(self) -> dict[str, Any]:
+        """Return the twin as one line of a table: by how much it differs, what would tell."""
+        return {
+            "law": spell(self.law.coefficients),
+            "proof": self.proof,
+            "sigma12_apart": self.difference.sigma12,
+            "N1_apart": self.difference.N1,
+            "N2_apart": self.difference.N2,
+            "told_by": " or ".join(experiment.text for experiment in self.separated_by),
+        }
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
 
     def to_json(self) -> dict[str, Any]:
         """Return the twin as JSON-able values."""

@@ -1,7 +1,8 @@
 """Laws weighed against an experiment that none of them was fitted to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -41,6 +42,10 @@ class Weight:
     def refuted(self) -> bool:
         """Whether the experiment speaks against the law."""
         return self.probability < REFUTED
+
+    def line(self) -> dict[str, Any]:
+        """Return the law as one line of a table."""
+        return {**asdict(self), "refuted": self.refuted}
 
 
 def weigh(

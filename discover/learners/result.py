@@ -1,18 +1,15 @@
 """What a learner hands on: the same kind of result from both."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float, Num
 
-from discover.equations import Equation, EquationTerm, combined, law_terms
+from discover.equations import Equation, EquationTerm, HasEquation, combined, law_terms
 from discover.laws.base import AbstractConstitutiveLaw
-
-if TYPE_CHECKING:
-    import sympy
+from discover.learners.term_tables import TermTables
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class RecoveredTerm:
 
 
 @dataclass(frozen=True)
-class LearnerResult:
+class LearnerResult(HasEquation, TermTables):
     """A learned law and how it was learned.
 
     Attributes
@@ -95,30 +92,7 @@ class LearnerResult:
             linear_relaxation=self.law.linear_relaxation,
         )
 
-    def sympy(self) -> "sympy.Expr":
-        """Return the extra term h as a SymPy expression over non-commuting tensors."""
-        return self.equation().sympy()
-
-    def latex(self) -> str:
-        """Return the dimensionless law as one LaTeX equation."""
-        return self.equation().latex()
-
-    def table(self) -> pd.DataFrame:
-        """Return the terms with their coefficients and 95 % intervals, one line each."""
-        columns = ["term", "coefficient", "low", "high", "penalised", "inner"]
-        lines = []
-        for t in self.terms:
-            low, high = (None, None) if t.ci95 is None else t.ci95
-            inner = ", ".join(f"{name} = {value:.6g}" for name, value in t.inner.items())
-            lines.append((t.term, t.coefficient, low, high, t.coefficient_penalised, inner))
-        return pd.DataFrame(lines, columns=columns)
-
-    def _repr_html_(self) -> str:
-        import html
-
-        table = self.table().dropna(axis="columns", how="all")
-        return (
-            f"<p><b>{html.escape(self.learner)}</b>: {html.escape(self.message)}</p>"
-            f"{self.equation()._repr_html_()}"
-            f"{table.to_html(index=False, escape=True, float_format='{:.4g}'.format)}"
-        )
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.learner}: {self.message}"
+        yield self.equation()
+        yield self.table()

@@ -3,7 +3,10 @@
 import html
 import io
 
-from discover.report.plots.style import INK, Picture, plt
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from discover.report.plots.style import INK, Picture
 
 _REPLACEMENTS = (
     (r"\mathrel{+}=", r"\,+\!=\,"),
@@ -33,11 +36,11 @@ def formula(latex: str, name: str) -> str:
     text = latex.strip().strip("$")
     for old, new in _REPLACEMENTS:
         text = text.replace(old, new)
-    drawing = plt.figure(figsize=(0.01, 0.01))
+    drawing = Figure(figsize=(0.01, 0.01))
     try:
         drawing.text(0, 0, f"${text}$", fontsize=12, color=INK)
         buffer = io.StringIO()
-        with plt.rc_context({"svg.fonttype": "path", "svg.hashsalt": "discover"}):
+        with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "discover"}):
             drawing.savefig(
                 buffer,
                 format="svg",
@@ -48,8 +51,6 @@ def formula(latex: str, name: str) -> str:
             )
     except (ValueError, RuntimeError):
         return f"<code>{html.escape(latex)}</code>"
-    finally:
-        plt.close(drawing)
     picture = Picture(name, latex, buffer.getvalue())
     height = picture.svg.split('height="')[1].split('"')[0]
     return picture.inline.replace("<svg ", f'<svg class="formula" style="height:{height}" ', 1)

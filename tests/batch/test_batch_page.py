@@ -2,10 +2,11 @@
 
 import json
 import re
+import time
 
 import pytest
 
-from discover.batch.rows import LearnerRow, StudyRow, read_row, results_table
+from discover.batch.rows import LearnerRow, StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import Summary
 from discover.report.batch_report import batch_page
@@ -99,8 +100,12 @@ def test_the_page_needs_no_network_and_its_rows_no_script(rows):
     assert 'data-value="0.03"' in tables
 
 
-def test_the_table_does_not_depend_on_times(rows):
-    table = results_table([s.name for s in statuses()], rows)
+def test_the_table_does_not_depend_on_times_and_holds_the_reason_of_a_failure(rows, tmp_path):
+    table = BatchResult(statuses(), tmp_path / "index.html", rows).table()
+    assert table["study"].tolist() == ["good", "loop", "<script>x", "later"]
+    # done now or complete before: the same line
+    assert table["outcome"].tolist() == ["result", "result", "failed", "waiting"]
+    assert table["reason"].tolist() == ["", "", "a <b>reason</b>", ""]
     assert table.loc[0, "tensor_sindy_terms"] == "0.2 sigma.sigma"
     assert table.loc[0, "tensor_sindy_sigma12"] == 0.03
     assert table.loc[1, "effects"] == "rate_gain"
@@ -121,9 +126,14 @@ def test_a_damaged_result_is_an_empty_row(tmp_path, text):
     assert read_row(tmp_path) == StudyRow()
 
 
-def test_the_page_is_there_while_studies_still_run(tmp_path):
+def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr("discover.batch.summary._PAUSE", 0.01)
     summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    end = time.monotonic() + 60.0
+    while not (tmp_path / "index.html").exists():
+        assert time.monotonic() < end
+        time.sleep(0.01)
     page = (tmp_path / "index.html").read_text("utf-8")
     assert "the reason" in page
     assert "1 not run yet" in page

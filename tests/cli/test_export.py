@@ -138,6 +138,8 @@ def loop_result(*added):
 def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
     result = loop_result(("ptt_linear", 0.3), ("giesekus_mobility", 0.05), ("rate_gain", 0.1))
     result.write_json(tmp_path / "loop.json")
+    assert str(result.sympy()) == "0.3*Trace(sigma)*sigma + 0.15*sigma**2"
+    assert result.latex() == result.equation().latex()
     done = invoke("export", tmp_path, "--format", "json")
     assert done.exit_code == 0, done.output
     content = json.loads(done.stdout)
@@ -157,6 +159,7 @@ def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, case):
     result = loop_result(("yield_stress", 0.1))
     if case == "state":
         result = replace(loop_result(("thixotropy", 0.1, 2.0)), fluid=None)
+    assert "cannot be written out" in result._repr_html_().replace("&#x27;", "'")
     result.write_json(tmp_path / "loop.json")
     done = invoke("export", tmp_path)
     assert done.exit_code == 2

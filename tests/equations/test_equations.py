@@ -130,6 +130,15 @@ def test_json_gives_back_the_same_equation():
     assert write_equation(again, "json") == text
 
 
+def test_what_json_and_rheotool_give_back_simulates_what_the_package_simulates(simulated):
+    from_json = equation_from_json(json.loads(write_equation(MIXED, "json")))
+    assert agree(by_stress_rate(from_json.fluid()), simulated)
+    known = Equation((EquationTerm("sigma.sigma", 0.2),), (9.0, 3.0), (0.5, 5.0), True, 1.5)
+    again = read_rheotool(write_equation(known, "rheotool"))
+    stress = simulate(known.fluid(), start_up(RATE), TIMES)
+    assert agree(by_stress_rate(again.fluid())[0], stress.shear_stress)
+
+
 def read_latex(text):
     """Read the law and its modes from LaTeX that `equation_latex` wrote."""
     number = r"([\d.]+)(?: \\times 10\^\{(-?\d+)\})?"

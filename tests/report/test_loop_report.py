@@ -104,6 +104,11 @@ def test_a_loop_shows_itself_as_tables():
         "stress_gain", 0.7, 0.69, 0.71,
     )  # fmt: skip
     assert result.ranking_table(1)["score"].tolist() == [0.9]
+    runs = result.runs_table()
+    assert runs.index.tolist() == [record.name for record in result.records]
+    for record in result.records:
+        assert runs.loc[record.name, "declared"] == record.errors[0]
+    assert result.errors_table().loc["after", "fit"] == result.error_after.fit
     assert "stress_gain" in result._repr_html_()
     assert "effects_added" in replace(result, stages=())._repr_html_()
 

@@ -3,6 +3,8 @@
 import html
 import re
 import runpy
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -354,9 +356,25 @@ def test_a_comparison_shows_itself_as_tables(comparison):
     wanted = comparison.errors("before", comparison.judged[0])["N1"]
     assert errors.loc[(flow, "N1"), "before"] == wanted
     assert errors.loc[(flow, "N1"), "tensor_sindy"] < wanted
-    assert "<table" in comparison._repr_html_()
+    shown = comparison._repr_html_()
+    assert "<table" in shown
+    for statement in comparison.statements:
+        assert statement.quantity in shown
+    rivals = comparison.rivals_table()
+    assert len(rivals) == len(comparison.rivals)
+    assert set(rivals.columns) >= {"law", "told_by"} or not len(rivals)
 
 
 def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
     said = spoken("0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.")
     assert said == "0.5 tr(σ·γ̇) I + σ·σ, whatever the law."
+
+
+def test_reports_leave_a_notebook_its_pictures():
+    """Reports once changed matplotlib's backend, and a notebook showed no picture from then on."""
+    code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison_report; "
+    code += "import discover.report.loop_report, discover.report.mathtext as m, sys; "
+    code += "assert '<svg' in m.formula('x^2', 'a'); print(matplotlib.get_backend()); "
+    code += "print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["agg", "False"]

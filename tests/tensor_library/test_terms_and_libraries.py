@@ -93,6 +93,13 @@ def test_sympy_form_evaluates_to_the_term():
         np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-10)
 
 
+def test_sympy_s_own_printers_know_our_trace():
+    """A notebook shows expressions with them."""
+    expression = tl.parse_term("tr(sigma)^2*gammadot").sympy()
+    assert r"\operatorname{tr}\left(\sigma\right)^{2}" in sympy.latex(expression)
+    assert "tr (σ)" in sympy.pretty(expression, use_unicode=True)
+
+
 def test_latex_marks_tensors_and_contractions():
     text = tl.parse_term("tr(sigma)*sigma.sigma").latex()
     assert r"\boldsymbol{\sigma} \cdot \boldsymbol{\sigma}" in text

@@ -8,9 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import matplotlib as mpl
-
-mpl.use("svg")
-import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
@@ -137,7 +134,9 @@ def _without_height(text: str) -> str:
 
 @contextmanager
 def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> Iterator[tuple]:
-    """Yield a figure and its axes, shape (rows, columns); closed afterwards.
+    """Yield a figure and its axes, shape (rows, columns).
+
+    The figure is not pyplot's: a notebook that writes a report keeps its own pictures and backend.
 
     Parameters
     ----------
@@ -146,14 +145,9 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
     width, height
         Of the whole figure and of one row, in inches.
     """
-    with plt.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType]
-        drawing, axes = plt.subplots(
-            rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained"
-        )
-        try:
-            yield drawing, axes
-        finally:
-            plt.close(drawing)
+    with mpl.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType]
+        drawing = Figure(figsize=(width, height * rows), layout="constrained")
+        yield drawing, drawing.subplots(rows, columns, squeeze=False)
 
 
 def legend_above(drawing: Figure, axes, columns: int = 4) -> None:

@@ -1,0 +1,79 @@
+"""What a learner found and how it chose, as tables."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from discover.notebook_view import NotebookView
+
+if TYPE_CHECKING:
+    from discover.learners.result import RecoveredTerm
+
+
+class TermTables(NotebookView):
+    """Tables of a learner's `terms` and `details`, for a fresh result and for one that was kept."""
+
+    learner: str
+    terms: "tuple[RecoveredTerm, ...]"
+    details: Mapping[str, Any]
+    message: str
+
+    def table(self) -> pd.DataFrame:
+        """Return the terms with their coefficients and 95 % intervals, one line each."""
+        columns = ["term", "coefficient", "low", "high", "penalised", "inner"]
+        lines = []
+        for t in self.terms:
+            low, high = (None, None) if t.ci95 is None else t.ci95
+            inner = ", ".join(f"{name} = {value:.6g}" for name, value in t.inner.items())
+            lines.append((t.term, t.coefficient, low, high, t.coefficient_penalised, inner))
+        return pd.DataFrame(lines, columns=columns)
+
+    def path_table(self) -> pd.DataFrame:
+        """Return the best law of each size, from no term on; empty where the learner has no path.
+
+        Columns: relative misfit on all runs, relative misfit on runs left out of the refit
+        (``held_out``), extended BIC, and which rules choose the law.
+        """
+        lines = []
+        for member in self.details.get("path", ()):
+            by = [rule for rule, terms in self._chosen().items() if set(terms) == _support(member)]
+            lines.append(
+                {
+                    "size": member["size"],
+                    "terms": ", ".join(member["support"]) or "no term",
+                    **{name: member[name] for name in ("misfit", "held_out", "bic")},
+                    "chosen_by": ", ".join(by),
+                }
+            )
+        return pd.DataFrame(lines)
+
+    def selectors_table(self) -> pd.DataFrame:
+        """Return the terms that each rule for choosing a law takes; empty where there is no path.
+
+        A column for each term that some rule takes, and whether the rule takes it.
+        """
+        chosen = self._chosen()
+        terms = list(dict.fromkeys(term for support in chosen.values() for term in support))
+        lines = {rule: [term in support for term in terms] for rule, support in chosen.items()}
+        table = pd.DataFrame.from_dict(lines, orient="index", columns=terms, dtype=bool)
+        return table.rename_axis("rule")
+
+    def stability_table(self) -> pd.DataFrame:
+        """Return how often each term is chosen from halves of the data, the most often first.
+
+        ``with_twins`` counts the halves in which the term, or one that these runs do not tell from
+        it, was chosen. Empty where halves were not looked at.
+        """
+        return pd.DataFrame(list(self.details.get("selection_frequency", ())))
+
+    def _chosen(self) -> Mapping[str, Sequence[str]]:
+        return (self.details.get("selectors") or {}).get("chosen") or {}
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.learner}: {self.message}"
+        yield self.table()
+
+
+def _support(member: Mapping[str, Any]) -> set[str]:
+    return set(member["support"])

@@ -1,0 +1,130 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Many studies
+#
+# How much noise does a closed loop bear? One study for each level of noise answers that, and one of
+# them cannot run at all. From a terminal the same is `discover batch studies/*.toml --out results`.
+
+# %%
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pandas as pd
+
+from discover.batch.run import run_batch
+
+STUDY = """
+[data]
+synthetic = {{ law = "giesekus", parameters = {{ alpha = {alpha} }}, noise = {noise}, samples = 51 }}
+held_out = ["laos_2_1", "laos_2_0.5"]
+[loop]
+max_effects = 1
+effects = ["giesekus_mobility", "non_affine_motion", "stress_gain", "stress_offset"]
+"""
+
+folder = Path(tempfile.mkdtemp())
+studies = []
+for noise in (0.01, 0.1, 0.5):
+    path = folder / f"noise_{100 * noise:02.0f}.toml"
+    path.write_text(STUDY.format(alpha=0.3, noise=noise))
+    studies.append(path)
+# a mobility beyond one is no Giesekus fluid
+broken = folder / "mobility.toml"
+broken.write_text(STUDY.format(alpha=2.0, noise=0.01))
+studies = [studies[0], broken, *studies[1:]]
+
+# %% [markdown]
+# ## It is stopped half-way
+#
+# Somebody presses Ctrl-C, the lights go out, the cluster's time is up. Here the progress function,
+# which hears what is going on and the fraction done, stops the batch once two studies have ended.
+
+
+# %%
+def stop_after_two(label, fraction):
+    if label.startswith("2 of 4 ended"):
+        raise KeyboardInterrupt
+
+
+out = folder / "results"
+try:
+    run_batch(studies, out, progress=stop_after_two)
+except KeyboardInterrupt:
+    print("stopped")
+pd.read_csv(out / "table.csv")[["study", "outcome", "reason"]]
+
+# %% [markdown]
+# The page and the table are kept up to date while studies run. The failed study says what to mend,
+# and the rest went on without it.
+#
+# ## It goes on
+#
+# The same call again. What is finished is not touched (`complete`), the rest is done now, and the
+# results are byte for byte those of a batch that nobody disturbed.
+
+# %%
+before = (out / "noise_01" / "loop.json").stat().st_mtime_ns
+result = run_batch(studies, out)
+assert (out / "noise_01" / "loop.json").stat().st_mtime_ns == before
+for study in result.studies:
+    print(f"{study.status:<9}{study.name}: {study.text}")
+
+# %% [markdown]
+# ## The table
+#
+# One line for each study. `result.index` is a page that sorts by any column; `table.csv` can be read
+# without this software. Studies that compare two learners fill further columns: the terms of each,
+# its errors, what every rule for choosing a law took, rivals, and what is not determined.
+
+# %%
+result
+
+# %%
+table = pd.read_csv(out / "table.csv")
+table.loc[table["outcome"] == "failed", ["study", "reason"]]
+
+# %% [markdown]
+# From here on it is pandas. With more noise the error that is left on the held-out runs is the noise
+# itself; what the loop adds to the declared Maxwell fluid is visible as long as the first stands
+# above the second.
+
+# %%
+done = table[table["outcome"] == "result"].set_index("study")
+done[["effects", "verdict", "error_before", "error_after"]]
+
+# %%
+axis = done[["error_before", "error_after"]].plot.bar(figsize=(6, 3), rot=0)
+axis.set(xlabel="", ylabel="error on held-out runs")
+plt.show()
+
+# %% [markdown]
+# ## One study again
+#
+# Every study has a folder of its own, with a report, and the law with the flows in which it was
+# tested. It can be read back and simulated.
+
+# %%
+from discover.equations.read import choose_law, read_result_laws
+
+law = choose_law(read_result_laws(out / "noise_10"))
+law
+
+# %%
+law.sympy()
+
+# %% [markdown]
+# `run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
+# that a cluster has room for; `docs/batches.md` says how to get one under SLURM. A worker that dies
+# loses nothing either.

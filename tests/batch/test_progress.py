@@ -1,0 +1,49 @@
+"""How far a batch is: in a terminal, from studies that run here or in workers."""
+
+import pytest
+
+from discover.batch.progress import BatchProgress, now_and_then
+from discover.batch.status import StudyStatus
+
+
+def ended(status):
+    return StudyStatus("x", "compare", status, "")
+
+
+@pytest.fixture
+def said():
+    return []
+
+
+def test_studies_side_by_side_add_up(said):
+    progress = BatchProgress(["a", "b"], lambda *line: said.append(line))
+    progress.say(0, "fitting", 0.5)
+    progress.say(1, "loading", 0.25)
+    progress.end(0, ended("done"))
+    progress.say(0, "news that came late", 0.75)
+    progress.end(1, ended("failed"))
+    assert said == [
+        ("0 of 2 ended; a: fitting", 0.25),
+        ("0 of 2 ended; b: loading", 0.375),
+        ("1 of 2 ended; a: done", 0.625),
+        ("2 of 2 ended; b: failed", 1.0),
+    ]
+
+
+def test_results_that_were_there_do_not_make_the_rest_look_short(said):
+    progress = BatchProgress(list("abcd"), lambda *line: said.append(line))
+    for i in range(3):
+        progress.end(i, ended("complete"))
+    progress.say(3, "fitting", 0.1)
+    assert [fraction for _, fraction in said] == pytest.approx([0.0, 0.0, 0.0, 0.1])
+    progress.end(3, ended("complete"))
+    assert said[-1][1] == 1.0
+
+
+def test_a_worker_sends_word_now_and_then_and_not_at_every_step(said):
+    often = now_and_then(lambda *line: said.append(line), pause=60.0)
+    always = now_and_then(lambda *line: said.append(line), pause=0.0)
+    for say in (often, always):
+        say("one", 0.1)
+        say("two", 0.2)
+    assert said == [("one", 0.1), ("one", 0.1), ("two", 0.2)]

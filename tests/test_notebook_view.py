@@ -1,0 +1,127 @@
+"""Results in a notebook: every one shows its sentences, law and tables, and escapes its text."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from discover.comparison.outcome import LearnerOutcome
+from discover.equations import Box, Equation, EquationTerm
+from discover.equations import Tested as WhereTested
+from discover.identify import (
+    Difference,
+    Evidence,
+    FittedRival,
+    HiddenStresses,
+    LawTerms,
+    RivalTable,
+    Twin,
+)
+from discover.identify.physics import PhysicsCheck, PhysicsReport
+from discover.identify.structure import LawStructure, QuantityVerdict, Structure
+from discover.identify.weigh import Weight
+from discover.learners.result import RecoveredTerm
+from discover.notebook_view import NotebookView, as_html, table_of
+
+LAW = LawTerms({"sigma.sigma": 0.2, "gammadot": -0.01})
+
+
+class Spoken(NotebookView):
+    def _shown(self):
+        yield "1 < 2"
+        yield ""
+        yield pd.DataFrame({"x": ["<b>"], "y": [None]})
+
+
+def test_parts_are_shown_in_their_order_and_escaped():
+    shown = Spoken()._repr_html_()
+    assert shown.startswith("<p>1 &lt; 2</p><table")
+    assert "&lt;b&gt;" in shown
+    assert "<th>y</th>" not in shown  # nothing in that column
+    assert as_html(Spoken()) == shown
+    assert as_html(pd.DataFrame()) == ""
+
+
+def test_a_named_index_is_shown_and_a_counted_one_is_not():
+    counted = pd.DataFrame({"x": [1.0, np.nan]})
+    assert "<th>1</th>" not in as_html(counted)
+    assert "–" in as_html(counted)
+    assert "before" in as_html(pd.DataFrame({"x": [1.0]}, index=["before"]))
+
+
+def structure():
+    hidden = HiddenStresses(np.zeros((0, 3)), {"N1": True, "N2": True})
+    verdict = QuantityVerdict("N2", "undetermined", "N2 is <not> determined.")
+    law = LawStructure("the law found", LAW, hidden, (), (), (verdict,), 1, "undetermined")
+    return Structure((law,), (), 8)
+
+
+RIVAL = FittedRival(LAW, 0.02, 0.001, Evidence(False, "vuong", 0.4, 100.0))
+TWIN = Twin(LAW, "series", True, Difference(0.0, 0.0, 0.2), order=8)
+CHECK = PhysicsCheck("dissipation", False, -0.1, "in <start-up>", "It makes energy.")
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (RivalTable((RIVAL,), 3), ["3 other laws tried", "0.2 sigma.sigma", "vuong"]),
+        (RivalTable((), 3), ["rule out every one"]),
+        (TWIN, ["0.2 sigma.sigma − 0.01 gammadot gives the same σ12 and the same N1"]),
+        (structure(), ["Of the 8 coefficients", "the law found", "undetermined"]),
+        (structure().laws[0], ["N2 is &lt;not&gt; determined."]),
+        (PhysicsReport((CHECK,)), ["The law fails: dissipation", "It makes energy."]),
+    ],
+    ids=lambda x: type(x).__name__,
+)
+def test_what_was_found_out_about_a_law_shows_itself(result, words):
+    shown = result._repr_html_()
+    for word in words:
+        assert word in shown
+
+
+def test_lists_of_findings_become_tables():
+    assert table_of([TWIN]).loc[0, ["proof", "N2_apart"]].tolist() == ["series", 0.2]
+    weights = table_of([Weight("a", 10.0, 10, 0.5), Weight("b", 99.0, 10, 0.0)])
+    assert weights["refuted"].tolist() == [False, True]
+    assert table_of([]).empty
+
+
+def test_an_equation_shows_modes_and_where_it_was_tested():
+    tested = WhereTested(Box((1.0, 2.0), (0.25, 1.0)), None)
+    terms = (EquationTerm("sigma.sigma", 0.2),)
+    shown = Equation(terms, (120.0, 30.0), (0.7, 2.5), tested=tested)._repr_html_()
+    assert "<math" in shown
+    assert "<th>G_Pa</th>" in shown
+    assert "Learned in Wi 1 to 2, De 0.25 to 1." in shown
+    # a dimensionless law has no modes to speak of
+    assert "G_Pa" not in Equation(terms)._repr_html_()
+
+
+PATH = [
+    {"size": 0, "support": [], "misfit": 0.3, "held_out": 0.4, "bic": -10.0},
+    {"size": 1, "support": ["sigma.sigma"], "misfit": 0.02, "held_out": None, "bic": -90.0},
+]
+CHOSEN = {"bic": ["sigma.sigma"], "stability": []}
+
+
+def outcome(**details):
+    term = RecoveredTerm("sigma.sigma", 0.2, ci95=(0.19, 0.21))
+    history = (np.zeros(1), np.zeros(1))
+    return LearnerOutcome("tensor_sindy", (term,), 1.0, history, details, "ended")
+
+
+def test_the_path_says_which_rule_chooses_what():
+    table = outcome(path=PATH, selectors={"chosen": CHOSEN}).path_table()
+    assert table["terms"].tolist() == ["no term", "sigma.sigma"]
+    assert table["chosen_by"].tolist() == ["stability", "bic"]
+    rules = outcome(selectors={"chosen": CHOSEN}).selectors_table()
+    assert rules.loc["bic", "sigma.sigma"]
+    assert not rules.loc["stability", "sigma.sigma"]
+    often = outcome(selection_frequency=[{"term": "sigma.sigma", "frequency": 0.9}])
+    assert often.stability_table()["frequency"].tolist() == [0.9]
+
+
+def test_a_learner_without_a_path_has_empty_tables():
+    without = outcome()
+    for table in (without.path_table(), without.selectors_table(), without.stability_table()):
+        assert table.empty
+    assert "sigma.sigma" in without._repr_html_()
