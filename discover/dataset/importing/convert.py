@@ -72,7 +72,7 @@ def import_files(
         for number, block in blocks:
             name = f"{_plain(path.stem)}{f'-{number}' if len(blocks) > 1 else ''}.csv"
             found = _needed(guess_columns(block, given, sweep=False), block, mapping.geometry)
-            if not _is_run(found, mapping.geometry):
+            if _lacking(found, mapping.geometry):
                 folder.said.append(
                     f"{path.name}, block {number} {block.name}: not a run (columns "
                     f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
@@ -88,13 +88,16 @@ def import_files(
             used += 1
             folder.said.append(_summary(name, path.name, block, found, run, dropped))
         if not used:
-            raise InputError(_no_run(path, blocks))
+            raise InputError(_no_run(path, blocks, given, mapping.geometry))
         sources.append(_source(path, False))
     if sweep is not None:
         folder.files[SWEEP_FILE] = _sweep(sweep, mapping, folder.said, seen)
         sources.append(_source(sweep, True))
     if not index:
-        raise InputError("No file to import was given. Name one or more exports.")
+        raise InputError(
+            "No run to import was given. Name one or more exports, or list them under [[source]] "
+            "in the mapping file."
+        )
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([("file", "source_file", "source_block"), *index])
@@ -154,13 +157,12 @@ def _needed(found: dict[str, int], block: Block, geometry: Geometry | None) -> d
     }
 
 
-def _is_run(found: dict[str, int], geometry: Geometry | None) -> bool:
-    motion = {"shear_rate", "strain"} & set(found)
-    force = "stress" in found
+def _lacking(found: dict[str, int], geometry: Geometry | None) -> list[str]:
+    """Return what a block lacks to be a run, each as the quantities of which one would do."""
+    wanted = ["time", "shear_rate or strain", "stress"]
     if geometry is not None:
-        motion |= {"angular_velocity", "angle"} & set(found)
-        force |= "torque" in found
-    return "time" in found and bool(motion) and force
+        wanted[1:] = ["shear_rate, strain, angular_velocity or angle", "stress or torque"]
+    return [names for names in wanted if not set(re.split(", | or ", names)) & set(found)]
 
 
 def _values(
@@ -247,14 +249,30 @@ def _summary(
     return text + (f", {dropped} without all these numbers left out" if dropped else "") + "."
 
 
-def _no_run(path: Path, blocks: list[tuple[int, Block]]) -> str:
-    names = {shown(name): None for _, block in blocks for name, _ in block.columns if name}
-    listed = ", ".join(list(names)[:15])
-    return (
-        f"No block of {path.name} has time, a stress and a shear rate or strain. Its columns are "
-        f'{listed}. Name them, as in --column stress="Shear stress"; torque, angular_velocity and '
-        "angle need --geometry."
+def _no_run(
+    path: Path,
+    blocks: list[tuple[int, Block]],
+    given: dict[str, str],
+    geometry: Geometry | None,
+) -> str:
+    """Say what the block that is nearest to a run has, and what it lacks."""
+
+    def known(block: Block) -> dict[str, int]:
+        return _needed(guess_columns(block, given, sweep=False), block, geometry)
+
+    number, best = max(blocks, key=lambda pair: len(known(pair[1])))
+    has = [f"{key} = {shown(best.columns[at][0])}" for key, at in known(best).items()]
+    lacks = _lacking(known(best), geometry)
+    names = list(dict.fromkeys(shown(name) for name, _ in best.columns if name))
+    where = f"block {number} (numbers from line {best.line})" if len(blocks) > 1 else "its block"
+    text = (
+        f"{path.name} holds no run: {where} has {' and '.join(has) or 'nothing known'}, but no "
+        f"column of numbers for {' and none for '.join(lacks)}. Its columns are "
+        f"{', '.join(names[:15])}. Name the right one, as in --column "
+        f'{re.split(", | or ", lacks[0])[0]}="{names[-1]}"'
     )
+    tools = "" if geometry else "; torque, angular_velocity and angle need --geometry as well"
+    return f"{text}{tools}."
 
 
 def _source(path: Path, sweep: bool) -> Source:
