@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import typer
 
+from discover.cli.console import say_error
 from discover.errors import InputError
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
@@ -47,7 +48,5 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _fail(message: str, code: int) -> None:
-    # a message may quote a file: one line, and nothing that a terminal would obey
-    plain = "".join(c if c.isprintable() else " " for c in " ".join(message.split()))
-    typer.echo(f"discover: {plain}", err=True)
+    say_error(message)
     raise typer.Exit(code)
