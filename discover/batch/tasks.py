@@ -135,8 +135,8 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {model.law_name}, {modes}."
-    )
+        f"Declared model: {model.law_name}, {modes}. {data_of_study.dataset.thinned}"
+    ).strip()
     write_loop(result, folder, study.name, summary, study.text)
     text = "\n".join(loop_verdict(result))
     folder.save("verdict", {"text": text})

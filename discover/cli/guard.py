@@ -3,6 +3,7 @@
 0 done; 2 the user's input is wrong; 1 anything else.
 """
 
+import errno
 import functools
 import os
 from collections.abc import Callable
@@ -14,6 +15,9 @@ from discover.errors import InputError
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
 """Environment variable that lets tracebacks through, for those who mend the software."""
+
+
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -33,7 +37,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
             place = f" ({error.filename})" if error.filename else ""
-            _fail(f"{error.strerror or error}{place}", 1)
+            full = "; make room and run again, what was finished is kept"
+            _fail(f"{error.strerror or error}{place}{full if error.errno in _FULL else ''}", 1)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise

@@ -235,7 +235,9 @@ def _summary(data: StudyData, study: Study) -> str:
     runs = f"σ12 of {len(data.fit)} runs ({samples} samples)"
     made = study.data.synthetic
     if made is None:
-        return f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        kept = data.dataset.thinned.removesuffix(".")
+        text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        return f"{text}. {kept}" if kept else text
     values = ", ".join(f"{key} = {value:g}" for key, value in made.parameters.items())
     law = LAWS[made.law].title + (f" ({values})" if values else "")
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"

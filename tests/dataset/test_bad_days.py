@@ -248,6 +248,10 @@ def test_links_out_of_the_folder_are_refused_and_links_within_followed(tmp_path)
     (inside / "lve.csv").unlink()
     (inside / "lve.csv").symlink_to(outside / "secret.csv")
     assert "lve.csv is a link to outside" in str(use(inside))
+    (inside / "lve.csv").unlink()
+    (outside / "diary.md").write_text("mine")
+    (inside / "PROVENANCE.md").symlink_to(outside / "diary.md")
+    assert load_dataset(inside).provenance == ""
 
 
 def test_folders_pipes_and_forbidden_files_are_refused_without_waiting(tmp_path, monkeypatch):

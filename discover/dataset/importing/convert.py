@@ -102,7 +102,7 @@ def import_files(
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([("file", "source_file", "source_block"), *index])
     folder.files[INDEX_FILE] = text.getvalue()
-    unmatched = set(given) - set(seen) - (set() if sweep else {"omega", "Gp", "Gpp"})
+    unmatched = set(given) - set(seen) - (set() if sweep else set(_SWEEP))
     if unmatched:
         key = sorted(unmatched)[0]
         raise InputError(
@@ -137,6 +137,7 @@ def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     return chosen
 
 
+_SWEEP = ("omega", "Gp", "Gpp")
 _INSTRUMENT = {
     "torque": "stress",
     "angular_velocity": "shear_rate",
@@ -212,10 +213,10 @@ def _sweep(path: Path, mapping: Mapping, said: list[str], seen: dict[str, set[st
     given = {str(key): name for key, name in mapping.columns.items()}
     for _, block in _blocks(path, mapping.model_copy(update={"blocks": None})):
         found = guess_columns(block, given, sweep=True)
-        if {"omega", "Gp", "Gpp"} <= set(found):
+        if set(_SWEEP) <= set(found):
             values, dropped = _values(block, found, mapping, path.name)
             _note_names(seen, block, found)
-            table = {QUANTITIES[key].column: values[key] for key in ("omega", "Gp", "Gpp")}
+            table = {QUANTITIES[key].column: values[key] for key in _SWEEP}
             said.append(_summary(SWEEP_FILE, path.name, block, found, table, dropped))
             return _csv(table)
     raise InputError(
@@ -255,24 +256,35 @@ def _no_run(
     given: dict[str, str],
     geometry: Geometry | None,
 ) -> str:
-    """Say what the block that is nearest to a run has, and what it lacks."""
+    """Say what the block that is nearest to a run has, what it lacks, and what to do."""
 
     def known(block: Block) -> dict[str, int]:
         return _needed(guess_columns(block, given, sweep=False), block, geometry)
 
     number, best = max(blocks, key=lambda pair: len(known(pair[1])))
-    has = [f"{key} = {shown(best.columns[at][0])}" for key, at in known(best).items()]
+    where = f"block {number} (numbers from line {best.line})" if len(blocks) > 1 else "its block"
     lacks = _lacking(known(best), geometry)
     names = list(dict.fromkeys(shown(name) for name, _ in best.columns if name))
-    where = f"block {number} (numbers from line {best.line})" if len(blocks) > 1 else "its block"
     text = (
-        f"{path.name} holds no run: {where} has {' and '.join(has) or 'nothing known'}, but no "
-        f"column of numbers for {' and none for '.join(lacks)}. Its columns are "
-        f"{', '.join(names[:15])}. Name the right one, as in --column "
-        f'{re.split(", | or ", lacks[0])[0]}="{names[-1]}"'
+        f"{path.name} holds no run: {where} has no column of numbers known as "
+        f"{', nor as '.join(lacks)}. Its columns are {', '.join(names[:15])}."
     )
-    tools = "" if geometry else "; torque, angular_velocity and angle need --geometry as well"
-    return f"{text}{tools}."
+    if set(_SWEEP) <= set(guess_columns(best, given, sweep=True)):
+        return f"{text} They look like a linear sweep: give the file with --lve, beside runs."
+    raw = [f"{best.columns[at][0]} is {key}" for key, at in _raw(best, given).items()]
+    if raw and geometry is None:
+        return (
+            f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
+            "in --geometry cone_plate:radius_mm=25,angle_deg=1."
+        )
+    first = re.split(", | or ", lacks[0])[0]
+    return f'{text} Name the right one, as in --column {first}="name of the column".'
+
+
+def _raw(block: Block, given: dict[str, str]) -> dict[str, int]:
+    """Return the columns from which stress and rate can be made, by the geometry of the tool."""
+    found = guess_columns(block, given, sweep=False)
+    return {key: at for key, at in found.items() if key in ("torque", "angular_velocity", "angle")}
 
 
 def _source(path: Path, sweep: bool) -> Source:

@@ -27,7 +27,8 @@ _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the dura
 
 def _is_start_up(record: RunRecord) -> bool:
     """Whether the rate is constant, which makes log time the natural axis."""
-    return bool(np.ptp(record.shear_rate) <= 1e-6 * np.max(np.abs(record.shear_rate)))
+    size = np.max(np.abs(record.shear_rate))
+    return bool(size > 0 and np.ptp(record.shear_rate) <= 1e-6 * size)
 
 
 def _runs_through_decades(record: RunRecord) -> bool:
@@ -91,6 +92,7 @@ def _short(record: RunRecord) -> str:
 
 def residual_picture(result: LoopResult) -> Picture:
     """Return the residual against time and strain, before and after."""
+    start_ups = all(_is_start_up(record) for record in result.records)
     with figure(2, 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
             limit = 0.0
@@ -103,10 +105,12 @@ def residual_picture(result: LoopResult) -> Picture:
                     "label": "held out" if record.held_out else "fitted",
                 }
                 axes[row, 0].plot(record.time, relative, **style)
-                axes[row, 1].plot(record.strain, relative, **style)
+                # a logarithmic axis has no place for strains against the positive direction
+                strain = np.abs(record.strain) if start_ups else record.strain
+                axes[row, 1].plot(strain, relative, **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
-                if all(_is_start_up(record) for record in result.records):
+                if start_ups:
                     _logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
