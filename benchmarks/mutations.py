@@ -81,8 +81,8 @@ def mutate_text(text: str, source: random.Random) -> bytes:
 
 def mutate_values(content: Any, source: random.Random) -> Any:
     """Return a copy of nested lists and dictionaries with one to three entries wronged."""
-    content = json.loads(json.dumps(content))
     for _ in range(source.randint(1, 3)):
+        content = json.loads(json.dumps(content))  # a copy, in which no two places are one
         places = list(_places(content))
         if not places:
             break
@@ -100,7 +100,7 @@ def mutate_values(content: Any, source: random.Random) -> Any:
                 holder[key] = [holder[key]] * source.choice((1, 2, 50))
             case _:
                 holder[key] = source.choice(VALUES)
-    return content
+    return json.loads(json.dumps(content))
 
 
 def _places(content: Any):
