@@ -1,6 +1,7 @@
 """Double precision, strict types and shapes for every test."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,9 @@ install_import_hook(["tensor_library", "discover"], "beartype.beartype")
 
 from discover.compilation_cache import enable_compilation_cache  # noqa: E402
 from discover.precision import enable_x64  # noqa: E402
+
+# the mutations of files are the benchmark's
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 enable_x64()
 # shared by the workers of one test run, and by the next run

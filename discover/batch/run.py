@@ -75,7 +75,7 @@ def folder_names(paths: Sequence[Path]) -> list[str]:
     InputError
         If two studies still have one name.
     """
-    stems = [path.stem for path in paths]
+    stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     names = [
         stem if stems.count(stem) == 1 else f"{path.resolve().parent.name}-{stem}"
         for path, stem in zip(paths, stems, strict=True)

@@ -94,6 +94,7 @@ class BatchResult(NotebookView):
         lines = []
         for study in self.studies:
             first = (study.text.splitlines() or [""])[0]
-            lines.append(f"{study.status:<9}{study.name} ({study.task}): {first}")
+            reason = "" if study.status == "failed" else f": {first}"  # a command says these itself
+            lines.append(f"{study.status:<9}{study.name} ({study.task}){reason}")
         lines.append(f"Summary: {self.index.resolve()}")
         return "\n".join(lines)

@@ -62,7 +62,7 @@ def run_compare(
     study = read_study(path)
     folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "comparison.json"
-    if folder.complete and page.is_file() and data.is_file():
+    if folder.complete and folder.holds(page.name, data.name):
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
     from discover.comparison.run_comparison import compare
@@ -71,7 +71,7 @@ def run_compare(
 
     comparison = compare(study, seed, progress, folder, settle=fit_declared)
     text = "\n".join(comparison_verdict(comparison))
-    write_comparison(comparison, folder, study.model.known_relaxation, path.read_text("utf-8"))
+    write_comparison(comparison, folder, study.model.known_relaxation, study.text)
     folder.save("verdict", {"text": text})
     folder.finish()
     return TaskResult(page, data, text, False)
@@ -89,7 +89,7 @@ def run_close_loop(
     study = read_study(path)
     folder = RunFolder(out, fingerprint(study, "close-loop", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "loop.json"
-    if folder.complete and page.is_file() and data.is_file():
+    if folder.complete and folder.holds(page.name, data.name):
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
     from discover.closed_loop import run_loop, run_loop_on_each
@@ -136,9 +136,9 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {model.law_name}, {modes}."
-    )
-    write_loop(result, folder, study.name, summary, path.read_text("utf-8"))
+        f"Declared model: {model.law_name}, {modes}. {data_of_study.dataset.thinned}"
+    ).strip()
+    write_loop(result, folder, study.name, summary, study.text)
     text = "\n".join(loop_verdict(result))
     folder.save("verdict", {"text": text})
     folder.finish()

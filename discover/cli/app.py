@@ -1,5 +1,7 @@
 """All commands in one place; nothing heavy is imported before a command runs."""
 
+import io
+import sys
 from typing import Annotated
 
 import typer
@@ -50,4 +52,8 @@ app.add_typer(data_app, name="data")
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        # σ12 on a terminal that knows no Greek, or half a character in a file's name
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     app()

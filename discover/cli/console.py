@@ -1,9 +1,29 @@
-"""Progress on standard error, with an estimate of the time left."""
+"""What a terminal shows: lines that it cannot obey, and progress with the time left."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import typer
+
 Report = Callable[[str, float], None]
+
+
+_LONGEST = 400  # characters of a word, such as a path, that a message repeats
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print lines that may quote files: without characters that a terminal would obey."""
+    typer.echo("\n".join(map(_plain, text.split("\n"))), err=err)
+
+
+def say_error(message: str) -> None:
+    """Print one line on standard error, as every failure of a command ends."""
+    words = (word if len(word) <= _LONGEST else f"{word[:_LONGEST]}…" for word in message.split())
+    say(f"discover: {' '.join(words)}", err=True)
+
+
+def _plain(line: str) -> str:
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 @contextmanager

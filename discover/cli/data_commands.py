@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import JsonOption, OverwriteOption
 from discover.errors import InputError
@@ -43,10 +44,10 @@ def list_data(as_json: JsonOption = False) -> None:
         typer.echo(json.dumps(rows, indent=2))
         return
     if not rows:
-        typer.echo(f"No data folder under {root}: none of its folders has a {INDEX_FILE}.")
+        say(f"No data folder under {root}: none of its folders has a {INDEX_FILE}.")
     for row in rows:
         sweep = "linear sweep" if row["lve"] else "no linear sweep"
-        typer.echo(f"{row['name']:<24} {row['runs']:>4} runs  {sweep}")
+        say(f"{row['name']:<24} {row['runs']:>4} runs  {sweep}")
 
 
 @data_app.command("show")
@@ -77,13 +78,13 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
             json.dumps({"name": dataset.name, "runs": rows, "lve_points": n_sweep}, indent=2)
         )
         return
-    typer.echo(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
+    say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
     typer.echo(
         f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  also"
     )
     for row in rows:
         also = " ".join(key for key in ("N1", "N2") if row[key])
-        typer.echo(
+        say(
             f"{row['run']:<32}{row['samples']:>8}{row['duration_s']:>12.4g}"
             f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {also}"
         )
@@ -113,12 +114,12 @@ def check(
         typer.echo(json.dumps({"folder": folder, **lists}, indent=2))
     else:
         for finding in findings:
-            typer.echo(f"{finding.severity}: {finding}", err=finding.severity == "error")
+            say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         counts = ", ".join(
             f"{len(found)} {key}{'' if len(found) == 1 else 's'}"
             for key, found in by_severity.items()
         )
-        typer.echo(f"{folder}: {counts}." if findings else f"{folder}: nothing wrong was found.")
+        say(f"{folder}: {counts}." if findings else f"{folder}: nothing wrong was found.")
     if by_severity["error"]:
         raise typer.Exit(2)
 
@@ -206,9 +207,9 @@ def import_data(
         typer.echo(json.dumps(content, indent=2))
     else:
         for line in said:
-            typer.echo(line)
+            say(line)
         for finding in findings:
-            typer.echo(f"{finding.severity}: {finding}", err=finding.severity == "error")
-        typer.echo(f"{out}: {len(imported.files) + 1} files written.")
+            say(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        say(f"{out}: {len(imported.files) + 1} files written.")
     if errors:
         raise typer.Exit(2)

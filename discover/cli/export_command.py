@@ -1,10 +1,12 @@
 """The command that writes a law out in a form that other programs take."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from discover.cli.console import say
 from discover.cli.guard import guarded
 
 
@@ -51,10 +53,10 @@ def export(
     if out is None:
         typer.echo(text, nl=False)
         return
-    if out.is_dir():
+    if os.path.isdir(out):
         raise InputError(f"{out} is a folder; give the name of a file.")
-    if out.exists() and not overwrite:
+    if os.path.lexists(out) and not overwrite:
         raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
     make_folder(out.parent)
     write_text(out, text)
-    typer.echo(f"{out} written.")
+    say(f"{out} written.")

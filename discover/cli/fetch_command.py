@@ -1,11 +1,13 @@
 """The command that fetches a public data set on the user's own machine."""
 
+import os
 import tempfile
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import OverwriteOption
 from discover.errors import InputError
@@ -40,7 +42,7 @@ def fetch_data(
     if out is None:
         raise InputError("Say where the data folder goes: --out FOLDER.")
     make_folder(out)
-    if (out / INDEX_FILE).exists() and not overwrite:
+    if os.path.lexists(out / INDEX_FILE) and not overwrite:
         raise InputError(
             f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
             "another --out."
@@ -51,4 +53,4 @@ def fetch_data(
     # the index comes last, so that a folder that has it is whole
     for file in sorted(files, key=lambda file: file == INDEX_FILE):
         write_text(out / file, files[file])
-    typer.echo(f"{out}: {len(files)} files written, every source file as its hash says.")
+    say(f"{out}: {len(files)} files written, every source file as its hash says.")

@@ -3,16 +3,21 @@
 0 done; 2 the user's input is wrong; 1 anything else.
 """
 
+import errno
 import functools
 import os
 from collections.abc import Callable
 
 import typer
 
+from discover.cli.console import say_error
 from discover.errors import InputError
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
 """Environment variable that lets tracebacks through, for those who mend the software."""
+
+
+_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -32,7 +37,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
             place = f" ({error.filename})" if error.filename else ""
-            _fail(f"{error.strerror or error}{place}", 1)
+            full = "; make room and run again, what was finished is kept"
+            _fail(f"{error.strerror or error}{place}{full if error.errno in _FULL else ''}", 1)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
@@ -47,7 +53,5 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def _fail(message: str, code: int) -> None:
-    # a message may quote a file: one line, and nothing that a terminal would obey
-    plain = "".join(c if c.isprintable() else " " for c in " ".join(message.split()))
-    typer.echo(f"discover: {plain}", err=True)
+    say_error(message)
     raise typer.Exit(code)

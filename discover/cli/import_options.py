@@ -87,9 +87,10 @@ def sources_of(
         return list(files), sweep, []
     runs: list[Path] = []
     changed = []
+    remedy = f"Correct [[source]] in {path.name}, or put the file there."
     for source in mapping.source:
         file = path.parent / source.file
-        digest = hashlib.sha256(read_bytes(file, source.file)).hexdigest()
+        digest = hashlib.sha256(read_bytes(file, source.file, remedy)).hexdigest()
         if source.sha256 is not None and digest != source.sha256:
             changed.append(f"{source.file} has changed since it was imported before.")
         if source.sweep:

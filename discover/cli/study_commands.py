@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from discover.cli.console import progress_bar
+from discover.cli.console import progress_bar, say, say_error
+from discover.cli.folders import tell_of_folders
 from discover.cli.guard import guarded
 from discover.cli.options import (
     JsonOption,
@@ -67,12 +68,15 @@ def batch(
     from discover.batch.run import run_batch
 
     folder = out or Path("results") / "batch"
+    tell_of_folders(studies)
     with progress_bar(quiet) as report:
         result = run_batch(studies, folder, workers, scheduler, seed, overwrite, report)
     if as_json:
         typer.echo(json.dumps(result.to_json(), indent=2))
     elif not quiet:
-        typer.echo(result.text())
+        say(result.text())
+    for study in result.failed:
+        say_error(f"{study.name} ({study.task}): {study.text}")
     if result.failed:
         raise typer.Exit(2 if all(s.input_error for s in result.failed) else 1)
 
@@ -93,14 +97,17 @@ def demo(
         pages = run_demo(out, seed, overwrite, report)
     if not quiet:
         for title, page in pages.items():
-            typer.echo(f"{title}: {page.resolve()}")
+            say(f"{title}: {page.resolve()}")
         typer.echo("Open them in a browser.")
 
 
 def _run_task(
     task, study: Path, out: Path | None, seed: int | None, quiet: bool, as_json: bool, over: bool
 ) -> None:
-    folder = out or Path("results") / study.stem
+    from discover.batch.run import folder_names
+
+    folder = out or Path("results") / folder_names([study])[0]
+    tell_of_folders([study])
     with progress_bar(quiet) as report:
         result = task(study, folder, seed, over, report)
     if as_json:
@@ -109,6 +116,6 @@ def _run_task(
     if quiet:
         return
     if result.was_complete:
-        typer.echo(f"{folder} is complete; use --overwrite to start afresh.")
-    typer.echo(result.text)
-    typer.echo(f"Report: {result.report.resolve()}")
+        say(f"{folder} is complete; use --overwrite to start afresh.")
+    say(result.text)
+    say(f"Report: {result.report.resolve()}")

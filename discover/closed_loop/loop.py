@@ -224,9 +224,9 @@ def _require_samples(runs: Sequence[ShearRun], declared: DeclaredModel) -> None:
     count, constants = sum(len(run) for run in runs), len(declared.free_positions)
     if count < FEWEST_SAMPLES + constants:
         raise InputError(
-            f"The fitted runs hold {count} samples in all, for {constants} constants to be fitted; "
-            f"at least {FEWEST_SAMPLES + constants} are needed to tell a law from another. Sample "
-            "more often, or declare the constants."
+            f"The runs to fit ([data] fit) hold {count} samples in all, for {constants} constants "
+            f"to be fitted; at least {FEWEST_SAMPLES + constants} are needed to tell a law from "
+            "another. Sample more often, or declare the constants."
         )
 
 

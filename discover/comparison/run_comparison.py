@@ -25,7 +25,7 @@ from discover.comparison.training import (
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.dataset.run import ShearDataset
 from discover.errors import InputError
-from discover.laws.registry import LAWS
+from discover.laws.registry import LAWS, make_law
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -61,6 +61,8 @@ def compare(
     options = study.compare
     data = load_study_data(study, seed)
     _require_plain_runs(data)
+    _require_teacher(study)
+    sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset)
     model = declared if settle is None else settle(declared, data.fit)
     require_numbers(model)
@@ -70,7 +72,6 @@ def compare(
     )
     flows = comparison_flows(data, options.high_deborah, list(grid))
     learner_seed = options.seed if seed is None else seed
-    sweep = _sweep_studies(study)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
     done = 0
 
@@ -172,10 +173,11 @@ def _sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
         if sweep.parameter not in LAWS[law].parameters:
             wanted = ", ".join(LAWS[law].parameters) or "none"
             raise InputError(
-                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}; its "
-                f"parameters are: {wanted}."
+                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}. "
+                f"Write one of its parameters: {wanted}."
             )
         for value in sweep.values:
+            make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
             made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
             data = study.data.model_copy(update={"synthetic": made})
             studies.append((law, value, study.model_copy(update={"data": data})))
@@ -185,11 +187,8 @@ def _sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
 def _distil(study: Study, data: StudyData, store: RunFolder | None, progress: Progress):
     if not study.compare.distillation:
         return []
-    if data.truth is None or study.data.synthetic is None:
-        raise InputError(
-            "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
-            "{...}. Use discover distil for laws by name."
-        )
+    assert data.truth is not None
+    assert study.data.synthetic is not None
     kept = None if store is None else store.load("distillation")
     if kept is not None:
         return kept["rows"]
@@ -213,6 +212,14 @@ def _truth(study: Study, model: DeclaredModel) -> tuple[TrueTerm, ...] | None:
     return true_terms(synthetic.law, synthetic.parameters, study.model.known_relaxation)
 
 
+def _require_teacher(study: Study) -> None:
+    if study.compare.distillation and study.data.synthetic is None:
+        raise InputError(
+            "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
+            "{...}. Use discover distil for laws by name."
+        )
+
+
 def _require_plain_runs(data: StudyData) -> None:
     """Refuse what only the closed loop can do."""
     if data.each:
@@ -233,7 +240,9 @@ def _summary(data: StudyData, study: Study) -> str:
     runs = f"σ12 of {len(data.fit)} runs ({samples} samples)"
     made = study.data.synthetic
     if made is None:
-        return f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        kept = data.dataset.thinned.removesuffix(".")
+        text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        return f"{text}. {kept}" if kept else text
     values = ", ".join(f"{key} = {value:g}" for key, value in made.parameters.items())
     law = LAWS[made.law].title + (f" ({values})" if values else "")
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"

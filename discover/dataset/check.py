@@ -20,7 +20,7 @@ from discover.dataset.load import (
     read_run,
     resolve_folder,
 )
-from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.run import LinearSweep, ShearRun, require_signal
 from discover.dataset.table import Table, read_table
 from discover.errors import InputError
 
@@ -186,11 +186,7 @@ def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]
                 "run proves nothing: remove one.",
             )
         seen.setdefault(key, run.name)
-    if runs and not any(np.any(run.shear_rate) for run in runs):
-        yield Finding(
-            "error",
-            "rate",
-            "",
-            "The shear rate is zero in every run, so there is nothing to learn a law from. Add "
-            "runs with flow.",
-        )
+    try:
+        require_signal(runs)
+    except InputError as error:
+        yield Finding("error", "signal", "", str(error))

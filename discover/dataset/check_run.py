@@ -47,7 +47,7 @@ def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
         yield warn(
             "samples", f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
         )
-    if not np.any(run.shear_rate):
+    if not run.flows:
         yield warn(
             "rate",
             f"The shear rate in {run.name} is zero throughout, so nothing flows. Leave the run "

@@ -21,6 +21,7 @@ DATA_VARIABLE = "DISCOVER_DATA"
 
 INDEX_FILE = "runs.csv"
 SWEEP_FILE = "lve.csv"
+PROVENANCE_FILE = "PROVENANCE.md"
 
 # A rate column is a command, repeated, if it varies no more than rounding to text does
 _CONSTANT = 1e-6
@@ -30,6 +31,17 @@ _CONSTANT = 1e-6
 _WRONG_SIGN = -0.5
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def folder_roots(base: str | Path | None = None) -> list[Path]:
+    """Return the folders in which a data folder is looked for, in their order.
+
+    Parameters
+    ----------
+    base
+        Folder of the study file, if there is one.
+    """
+    return [Path(root) for root in (base, os.environ.get(DATA_VARIABLE), ".") if root]
 
 
 def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
@@ -52,9 +64,7 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
         path = Path(folder).expanduser()
     except RuntimeError:
         raise InputError(f"{str(folder)!r} names a user who is not known here.") from None
-    data = os.environ.get(DATA_VARIABLE)
-    roots = [Path(root) for root in (base, data, ".") if root]
-    candidates = [path] if path.is_absolute() else [root / path for root in roots]
+    candidates = [path] if path.is_absolute() else [root / path for root in folder_roots(base)]
     # os.path answers False where Path raises: no permission, names too long, zero bytes
     for candidate in candidates:
         if os.path.isfile(candidate / INDEX_FILE):
@@ -74,7 +84,11 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
                 f"{str(folder)!r} is a file. Name the folder that holds {INDEX_FILE}; for a single "
                 "file make one with: discover data import."
             )
-    hint = "" if data else f" The environment variable {DATA_VARIABLE} is not set."
+    hint = (
+        ""
+        if os.environ.get(DATA_VARIABLE)
+        else f" The environment variable {DATA_VARIABLE} is not set."
+    )
     raise InputError(
         f"There is no data folder {str(folder)!r}. Give its path, absolute or relative to the "
         f"study file or to {DATA_VARIABLE}.{hint}"
@@ -132,17 +146,19 @@ def load_dataset(
     )
     if sequence is not None:
         runs = in_sequence(runs, read_column(index, "sequence", sequence))
-    provenance = root / "PROVENANCE.md"
     return ShearDataset(
         name=root.resolve().name,
         runs=runs,
         linear_sweep=find_sweep(root),
-        provenance=(
-            read_bytes(provenance, provenance.name).decode("utf-8", "replace")
-            if provenance.is_file()
-            else ""
-        ),
+        provenance=_provenance(root),
     )
+
+
+def _provenance(root: Path) -> str:
+    path = root / PROVENANCE_FILE
+    if not (os.path.isfile(path) and _is_inside(root, PROVENANCE_FILE)):
+        return ""
+    return read_bytes(path, path.name).decode("utf-8", "replace")
 
 
 def read_index(root: Path) -> Table:
@@ -166,7 +182,9 @@ def read_index(root: Path) -> Table:
                 f"Line {line} of {INDEX_FILE} names no file. Name one, or remove the line."
             )
         if not name.isprintable():
-            raise InputError(f"Line {line} of {INDEX_FILE} names {name!r}; no file is named so.")
+            raise InputError(
+                f"Line {line} of {INDEX_FILE} names {name!r}; no file is named so. Correct it."
+            )
         if name in seen:
             raise InputError(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
         seen.add(name)
@@ -238,7 +256,7 @@ def read_run(
         If its file is missing or wrong.
     """
     name = index.columns["file"][row]
-    table = read_table(root / name, name)
+    table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
     time = _checked_time(table)
     metadata = _metadata(index, row)
     strain = table.quantity(units.STRAIN)

@@ -9,6 +9,9 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.protocols.shear import ShearProtocol
 
+SLOWEST_RATE = 1e-12
+"""In 1/s; slower is rest, for any instrument and any experimenter."""
+
 
 @dataclass(frozen=True)
 class ShearRun:
@@ -102,6 +105,11 @@ class ShearRun:
     def __len__(self) -> int:
         return self.time.shape[0]
 
+    @property
+    def flows(self) -> bool:
+        """Whether anything flows in the run, or did just before it."""
+        return bool(max(np.max(np.abs(self.shear_rate)), abs(self.rate_before)) > SLOWEST_RATE)
+
     def window(self, keep: np.ndarray) -> "ShearRun":
         """Return the run with only the samples where the boolean array `keep` holds.
 
@@ -119,6 +127,27 @@ class ShearRun:
             first_normal_stress_difference=cut(self.first_normal_stress_difference),
             second_normal_stress_difference=cut(self.second_normal_stress_difference),
             strain=cut(self.strain),
+        )
+
+
+def require_signal(runs: Sequence[ShearRun]) -> None:
+    """Refuse runs of which none can teach a law.
+
+    Raises
+    ------
+    InputError
+        If nothing flows in any of them, or no stress is anything but zero.
+    """
+    names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")
+    if runs and not any(run.flows for run in runs):
+        raise InputError(
+            f"The shear rate is zero in every run ({names}), so there is nothing to learn a law "
+            "from. Add runs with flow, or check the unit of the column."
+        )
+    if runs and not any(np.any(run.shear_stress) for run in runs):
+        raise InputError(
+            f"The stress is zero throughout in every run ({names}), so there is nothing to learn a "
+            "law from. Check the column."
         )
 
 
@@ -186,6 +215,12 @@ class ShearDataset:
     def names(self) -> tuple[str, ...]:
         """Names of the runs."""
         return tuple(run.name for run in self.runs)
+
+    @property
+    def thinned(self) -> str:
+        """Which runs were thinned when they were read, in sentences; empty if none was."""
+        runs = [run for run in self.runs if "thinned" in run.metadata]
+        return " ".join(f"{run.name}: {run.metadata['thinned']}." for run in runs)
 
     def select(self, names: Sequence[str]) -> "ShearDataset":
         """Return the data set of the named runs, in the order given.

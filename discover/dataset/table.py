@@ -119,14 +119,31 @@ class Table:
         return values
 
 
-def read_bytes(path: Path, name: str) -> bytes:
+def read_bytes(
+    path: Path,
+    name: str,
+    if_missing: str = "Check its path.",
+    largest: int = LARGEST_FILE,
+    too_large: str = "Keep fewer samples of it.",
+) -> bytes:
     """Return the content of a regular file of reasonable size.
+
+    Parameters
+    ----------
+    path
+        The file.
+    name
+        Its name in messages.
+    if_missing
+        Remedy where there is no such file.
+    largest, too_large
+        Bytes that it may have, and the remedy where it has more.
 
     Raises
     ------
     InputError
         If it is missing, cannot be read, is no regular file (a pipe would never end), or is larger
-        than `LARGEST_FILE`.
+        than it may be.
     """
     try:
         status = os.stat(path)
@@ -134,19 +151,18 @@ def read_bytes(path: Path, name: str) -> bytes:
             raise InputError(f"{name} is a folder; a file is wanted there. Name the file itself.")
         if not stat.S_ISREG(status.st_mode):
             raise InputError(f"{name} is a pipe or device, not a file. Save the data in a file.")
-        if status.st_size > LARGEST_FILE:
+        if status.st_size > largest:
             raise InputError(
-                f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {LARGEST_FILE / 1e6:.0f} "
-                "MB. Keep fewer samples of it."
+                f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. "
+                f"{too_large}"
             )
         return Path(path).read_bytes()
     except InputError:
         raise
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(
-            f"There is no file {name} in {path.parent.name or path.parent}. Add it, or take its "
-            "line out of runs.csv."
-        ) from None
+        folder = path.parent.name
+        place = f" in {folder}" if folder and str(path) != name else ""
+        raise InputError(f"There is no file {name}{place}. {if_missing}") from None
     except OSError as error:
         raise InputError(
             f"{name} cannot be read: {error.strerror or error}. Check the file and who may read it."
@@ -155,7 +171,7 @@ def read_bytes(path: Path, name: str) -> bytes:
         raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
 
 
-def read_table(path: Path, name: str | None = None) -> Table:
+def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
     """Return a CSV file with a header line as text.
 
     A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
@@ -167,6 +183,8 @@ def read_table(path: Path, name: str | None = None) -> Table:
         The file.
     name
         Its name in messages; the file's own by default.
+    if_missing
+        Remedy where there is no such file.
 
     Raises
     ------
@@ -174,7 +192,7 @@ def read_table(path: Path, name: str | None = None) -> Table:
         If the file is missing, empty or not a table.
     """
     name = path.name if name is None else name
-    text = _decode(read_bytes(path, name), name)
+    text = _decode(read_bytes(path, name, if_missing), name)
     reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
     header: list[str] = []
     rows: list[list[str]] = []

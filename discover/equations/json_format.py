@@ -2,10 +2,11 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from discover.equations.equation import Box, Equation, EquationTerm, Tested
 from discover.errors import InputError
+from discover.validation import validated
 
 FORMAT = "discover law 1"
 
@@ -98,9 +99,13 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
     InputError
         If something in it is missing, unknown or no number; names the key.
     """
+    again = "Write the results again with --overwrite."
     try:
-        law = _Law.model_validate(content)
-        tested = law.tested
+        law = validated(_Law, content, where)
+    except InputError as error:
+        raise InputError(f"{error} {again}") from None
+    tested = law.tested
+    try:
         return Equation(
             terms=tuple(EquationTerm(t.term, t.coefficient, t.inner, t.ci95) for t in law.terms),
             modulus=tuple(mode.modulus_Pa for mode in law.modes),
@@ -117,14 +122,8 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
                 tested.worst_errors,
             ),
         )
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        key = ".".join(str(part) for part in first["loc"]) or "the law"
-        raise InputError(
-            f"{where}: {key[:120]}: {first['msg']}. Write the results again with --overwrite."
-        ) from None
     except ValueError as error:
-        raise InputError(f"{where}: {error} Write the results again with --overwrite.") from None
+        raise InputError(f"{where}: {error} {again}") from None
 
 
 def _box(box: Box) -> dict[str, list[float]]:

@@ -1,6 +1,7 @@
 """The laws that a folder of results holds."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,9 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     if path.suffix == ".json":
         return _laws(_read_json(path), path.name)
     for name in (COMPARISON, LOOP):
-        if (path / name).is_file():
+        if os.path.isfile(path / name):  # Path.is_file raises where a name is too long
             return _laws(_read_json(path / name), name)
-    if (path / BATCH).is_file():
+    if os.path.isfile(path / BATCH):
         raise InputError(
             f"{path} holds a batch. Give the folder of one study in it, such as {path / 'STUDY'}."
         )

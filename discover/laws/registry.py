@@ -55,12 +55,15 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
     if unknown:
         wanted = ", ".join(entry.parameters) or "none"
         raise InputError(
-            f"The law {name!r} has no parameter {unknown[0]!r}; its parameters are: {wanted}."
+            f"The law {name!r} has no parameter {unknown[0]!r}. Write one of its parameters: "
+            f"{wanted}."
         )
     values = []
     for key, (low, high) in entry.parameters.items():
         if key not in parameters:
-            raise InputError(f"The law {name!r} needs its parameter {key!r} ({low:g} to {high:g}).")
+            raise InputError(
+                f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to {high:g}."
+            )
         value = parameters[key]
         if (
             not isinstance(value, int | float)

@@ -25,6 +25,8 @@ def write_text(path: str | Path, text: str) -> Path:
 
     Raises
     ------
+    InputError
+        If a folder has the file's name.
     OSError
         If the disk is full, say; names the file. What the file held before is still there.
     """
@@ -42,6 +44,10 @@ def write_text(path: str | Path, text: str) -> Path:
     except BaseException as error:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
+        if isinstance(error, IsADirectoryError):
+            raise InputError(
+                f"{path} is a folder, but a file is to be written there. Remove or rename it."
+            ) from None
         if isinstance(error, OSError) and error.errno is not None and error.filename is None:
             # a full disk is reported without a name
             raise OSError(error.errno, os.strerror(error.errno), str(path)) from error

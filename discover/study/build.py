@@ -6,7 +6,7 @@ import numpy as np
 
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
-from discover.dataset.run import LinearSweep, ShearDataset
+from discover.dataset.run import SLOWEST_RATE, LinearSweep, ShearDataset, require_signal
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
@@ -91,7 +91,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     Raises
     ------
     InputError
-        If a file is wrong or a named run does not exist.
+        If a file is wrong, a named run does not exist, or the runs to fit hold no signal.
     """
     data = study.data
     if data.synthetic is not None:
@@ -125,7 +125,9 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             f'held_out = "each" needs at least 2 runs, one to leave out and one to fit; got '
             f"{len(fit_names)}. Leave held_out out."
         )
-    return StudyData(dataset, dataset.select(fit_names), held_out, each)
+    fit = dataset.select(fit_names)
+    require_signal(fit.runs)
+    return StudyData(dataset, fit, held_out, each)
 
 
 def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
@@ -216,8 +218,10 @@ def _linear_start(dataset: ShearDataset) -> dict[str, float]:
     time = 0.1 * float(np.median([run.time[-1] for run in dataset]))
     viscosity = np.median(
         [
-            np.max(np.abs(run.shear_stress)) / max(float(np.max(np.abs(run.shear_rate))), 1e-300)
+            np.max(np.abs(run.shear_stress)) / np.max(np.abs(run.shear_rate))
             for run in dataset
+            if np.max(np.abs(run.shear_rate)) > SLOWEST_RATE and np.any(run.shear_stress)
         ]
+        or [1.0]
     )
     return {"modulus_Pa": float(viscosity / max(time, 1e-300)), "relaxation_time_s": time}

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from discover.dataset.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import PART_SUFFIX, make_folder, write_text
 from discover.study.lock import lock_folder
@@ -86,6 +87,14 @@ class RunFolder:
         """Write one of the results."""
         return write_text(self.path / name, text)
 
+    def holds(self, *names: str) -> bool:
+        """Return whether results of these names are there, those in JSON undamaged."""
+        return all(
+            (self.path / name).is_file()
+            and (not name.endswith(".json") or _read_json(self.path / name) is not None)
+            for name in names
+        )
+
     def finish(self) -> None:
         """Mark the study as complete; called last."""
         self._write_state(True)
@@ -129,7 +138,7 @@ def _sweep_up(folder: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        content = json.loads(path.read_text("utf-8"))
+        content = json.loads(read_bytes(path, path.name))
     except (OSError, ValueError, RecursionError):
         return None  # absent or damaged: computed again
     return content if isinstance(content, dict) else None

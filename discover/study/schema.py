@@ -167,11 +167,17 @@ class Study(_Section):
     loop: Loop = Loop()
     compare: Compare = Compare()
     _path: Path | None = PrivateAttr(default=None)
+    _text: str = PrivateAttr(default="")
 
     @property
     def path(self) -> Path | None:
         """The file that the study was read from."""
         return self._path
+
+    @property
+    def text(self) -> str:
+        """The text of that file when it was read; it may be edited while the study runs."""
+        return self._text
 
     @property
     def name(self) -> str:

@@ -187,7 +187,7 @@ def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
 
 
 def test_a_folder_without_flow_is_an_error(folder):
-    assert "rate" in subjects(check_folder(folder(start_up(0.0))), "error")
+    assert "signal" in subjects(check_folder(folder(start_up(0.0))), "error")
 
 
 def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
@@ -216,3 +216,38 @@ def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measu
     normal = {f.file for f in findings if f.subject == "N1"}
     assert {"pi_Tm10_rate0p01.csv", "pi_Tm10_rate0p03.csv"} <= normal
     assert "pi_Tm10_rate0p1.csv" not in normal
+
+
+def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(tmp_path):
+    from discover.errors import InputError
+    from discover.study import read_study
+    from discover.study.build import declared_model, load_study_data
+
+    times = np.arange(1.0, 13.0)
+
+    def write(name, rate, stress):
+        rows = zip(times.tolist(), rate.tolist(), stress.tolist(), strict=True)
+        text = "\n".join(f"{t!r},{r!r},{s!r}" for t, r, s in rows)
+        (tmp_path / name).write_text("time_s,shear_rate_1_s,stress_Pa\n" + text)
+
+    (tmp_path / "runs.csv").write_text("file\na.csv\nb.csv\n")
+    (tmp_path / "s.toml").write_text(
+        '[data]\nfolder = "."\n[model]\nmodulus_Pa = "fit"\nrelaxation_time_s = "fit"\n'
+    )
+    study = read_study(tmp_path / "s.toml")
+    flow, stress = np.ones(12), 1 - np.exp(-times)
+    for rate, force, word in (
+        (0 * flow, stress, "shear rate is zero"),
+        (1e-300 * flow, stress, "shear rate is zero"),
+        (flow, 0 * stress, "stress is zero"),
+    ):
+        write("a.csv", rate, force)
+        write("b.csv", rate, force)
+        with pytest.raises(InputError, match=word):
+            load_study_data(study)
+        assert any(f.severity == "error" and word in f.text for f in check_folder(tmp_path))
+    # one run at rest beside one that flows says nothing of the constants to start from
+    write("a.csv", flow, stress)
+    write("b.csv", 0 * flow, 1e-3 * stress)
+    model = declared_model(study, load_study_data(study).dataset)
+    assert 0.01 < model.modulus[0] < 100

@@ -1,6 +1,7 @@
 """Public data sets: fetched by the user's installer, checked by hash, never part of the project."""
 
 import hashlib
+import os
 import subprocess
 import zipfile
 from dataclasses import replace
@@ -103,11 +104,15 @@ def test_a_file_that_is_not_the_known_one_is_refused_and_nothing_written(package
     assert list((tmp_path / "pi").iterdir()) == []
 
 
-@pytest.mark.parametrize("case", ["no_zip", "missing", "twice", "absent"])
+@pytest.mark.parametrize("case", ["no_zip", "missing", "twice", "absent", "pipe", "folder"])
 def test_a_package_that_does_not_hold_the_set_is_the_users_mistake(package, tmp_path, case):
     other = tmp_path / "other.whl"
     if case == "no_zip":
         other.write_text("no archive")
+    elif case == "pipe":
+        os.mkfifo(other)  # reading it would wait for ever
+    elif case == "folder":
+        other.mkdir()
     elif case != "absent":
         with zipfile.ZipFile(other, "w") as archive:
             for name, content in list(FILES.items())[: 3 if case == "twice" else 1]:

@@ -224,6 +224,25 @@ def test_wrong_options_are_one_line_and_write_nothing(tmp_path, case):
     assert not (tmp_path / "data" / "runs.csv").exists()
 
 
+UNHELPED = {
+    "torque without a tool": ("Step time,Torque,Velocity\ns,uN.m,rad/s", "--geometry cone_plate"),
+    "a sweep for a run": ("Angular frequency,Storage modulus,Loss modulus\nrad/s,Pa,Pa", "--lve"),
+    "no names": ("0,0,0", "add a line such as time_s"),
+    "a name not known": ("Time,Shear rate,Ausgang\ns,1/s,Pa", "known as stress"),
+}
+
+
+@pytest.mark.parametrize("case", UNHELPED)
+def test_an_export_without_a_run_says_what_it_lacks_and_what_to_do(tmp_path, case):
+    head, words = UNHELPED[case]
+    rows = [f"{i}.5,{i + 1}.25,{i}.75" for i in range(12)]
+    (tmp_path / "a.csv").write_text("\n".join([head, *rows]))
+    result = invoke(tmp_path / "a.csv", "--out", tmp_path / "data")
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert "a.csv" in result.stderr
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"\x00\x01\x02", b"PK\x03\x04", b"a;b\n", b"\xff\xfe", b'"', b"1,2\n3,4\n"]
 )

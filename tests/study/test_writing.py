@@ -147,6 +147,13 @@ class _FullDisk:
         return False
 
 
+def test_a_folder_in_the_place_of_a_result_is_the_users_to_remove(tmp_path):
+    (tmp_path / "part.json").mkdir()
+    with pytest.raises(InputError, match=r"part\.json is a folder"):
+        write_text(tmp_path / "part.json", "x")
+    assert [path.name for path in tmp_path.iterdir()] == ["part.json"]
+
+
 def test_an_interrupt_while_writing_keeps_what_was_there(tmp_path, monkeypatch):
     folder = RunFolder(tmp_path, "one")
     folder.save("part", {"x": 1})

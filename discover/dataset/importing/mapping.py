@@ -2,14 +2,13 @@
 
 import json
 import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from discover.dataset.table import read_bytes
-from discover.errors import InputError
+from discover.dataset.toml_file import read_toml
+from discover.validation import validated
 
 MAPPING_FILE = "import.toml"
 
@@ -100,7 +99,7 @@ class Mapping(_Section):
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    blocks: tuple[Annotated[int, Field(ge=1)], ...] | None = None
+    blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
 
 
@@ -112,16 +111,7 @@ def make_mapping(content: dict, where: str) -> Mapping:
     InputError
         If a key is unknown or a value is wrong; names it.
     """
-    try:
-        return Mapping.model_validate(content)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"]) or "the mapping"
-        known = ""
-        if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
-            known = f" Known keys are {', '.join(Mapping.model_fields)}."
-        reason = first["msg"].removeprefix("Value error, ")
-        raise InputError(f"{where}: {place}: {reason}. Correct it.{known}") from None
+    return validated(Mapping, content, where)
 
 
 def read_mapping(path: Path) -> Mapping:
@@ -132,12 +122,7 @@ def read_mapping(path: Path) -> Mapping:
     InputError
         If it cannot be read or is wrong.
     """
-    try:
-        content = tomllib.loads(read_bytes(path, path.name).decode("utf-8-sig"))
-    except InputError:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path.name} is not valid TOML: {error}. Mend that line.") from None
+    content, _ = read_toml(path, "mapping file", f"Write it like the {MAPPING_FILE} of an import.")
     return make_mapping(content, path.name)
 
 

@@ -106,8 +106,9 @@ def read_blocks(
         i = end
     if not blocks:
         raise InputError(
-            f"{path.name} holds no lines of numbers under a line of names. Say where the names are "
-            "with --header-row, and check --delimiter."
+            f"{path.name} holds no lines of numbers under a line of names. If it has no names, add "
+            "a line such as time_s,shear_rate_1_s,stress_Pa; else say where they are with "
+            "--header-row, and check --delimiter."
         )
     return blocks
 

@@ -84,6 +84,7 @@ def short_title(record: RunRecord) -> str:
 
 def residual_picture(result: LoopResult) -> Picture:
     """Return the residual against time and strain, before and after."""
+    start_ups = all(map(_through_decades, result.records))
     with figure(2, 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
             limit = 0.0
@@ -96,10 +97,12 @@ def residual_picture(result: LoopResult) -> Picture:
                     "label": "held out" if record.held_out else "fitted",
                 }
                 axes[row, 0].plot(record.time, relative, **style)
-                axes[row, 1].plot(record.strain, relative, **style)
+                # a logarithmic axis has no place for strains against the positive direction
+                strain = np.abs(record.strain) if start_ups else record.strain
+                axes[row, 1].plot(strain, relative, **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
-                if all(map(_through_decades, result.records)):
+                if start_ups:
                     make_logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)

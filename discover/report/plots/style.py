@@ -188,7 +188,8 @@ def runs_through_decades(
         Of one run, in s and 1/s.
     """
     positive = times[times > 0]
-    constant = np.ptp(shear_rate) <= 1e-6 * np.max(np.abs(shear_rate))
+    size = np.max(np.abs(shear_rate))
+    constant = size > 0 and np.ptp(shear_rate) <= 1e-6 * size
     return bool(constant and positive.size and positive[-1] > _DECADES * positive[0])
 
 

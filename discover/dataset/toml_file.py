@@ -1,0 +1,46 @@
+"""TOML files that users write by hand: studies and mappings."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from discover.dataset.table import read_bytes
+from discover.errors import InputError
+
+LARGEST_FILE = 1_000_000
+"""Bytes; what is written by hand is a page of text."""
+
+
+def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]:
+    """Return the content of a TOML file, and its text.
+
+    Parameters
+    ----------
+    path
+        The file.
+    kind
+        What it should be, for messages, such as "study file".
+    example
+        What to do instead of giving a file of another kind, as a sentence.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is no text or no TOML; says on which line.
+    """
+    raw = read_bytes(
+        path, str(path), f"Check the path of the {kind}.", largest=LARGEST_FILE, too_large=example
+    )
+    try:
+        # editors on Windows write a byte order mark, which TOML does not know
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{path} is not UTF-8 text, so it is not a {kind}. Save it as UTF-8."
+        ) from None
+    try:
+        return tomllib.loads(text), text
+    except RecursionError:
+        raise InputError(f"{path} is nested too deeply to be a {kind}. {example}") from None
+    except ValueError as error:  # TOML's own error, or a number of thousands of digits
+        raise InputError(f"{path} is not valid TOML: {error}. Mend that line.") from None

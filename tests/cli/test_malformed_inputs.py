@@ -1,0 +1,143 @@
+"""A deterministic slice of ``benchmarks/malformed_inputs.py``: whatever the command line reads."""
+
+import io
+import os
+import tempfile
+from pathlib import Path
+
+import malformed_inputs
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from malformed_inputs import KINDS, Case, Outcome, attempt, complaint
+
+from discover import cli
+from discover.batch.run import folder_names
+
+CASE = Case(["close-loop", "s.toml"], ("s.toml",))
+CLEAR = "discover: s.toml: model.law: unknown law 'x'; write one of ucm.\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_is_computed():
+    with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as scratch:
+        patch.delenv("DISCOVER_DATA", raising=False)
+        patch.chdir(scratch)  # where commands put results by default
+        with malformed_inputs.stopped_at_the_first_computation():
+            yield
+
+
+@settings(max_examples=120, deadline=None, derandomize=True, database=None)
+@given(kind=st.sampled_from(list(KINDS)), seed=st.integers(0, 10**6))
+def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
+    with tempfile.TemporaryDirectory() as root:
+        _, outcome, wrong = attempt(kind, seed, Path(root))
+    assert wrong is None, (wrong, outcome)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("package", "options")])
+def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(malformed_inputs, "mutate_text", lambda text, source: text.encode())
+    monkeypatch.setattr(malformed_inputs, "mutate_values", lambda content, source: content)
+    monkeypatch.setattr(malformed_inputs, "spoil_file", lambda path, source: None)
+    for seed in range(3):
+        (tmp_path / str(seed)).mkdir()
+        _, outcome, _ = attempt(kind, seed, tmp_path / str(seed))
+        assert outcome.code in (0, None), outcome
+
+
+@pytest.mark.parametrize(
+    ("code", "stdout", "stderr", "wrong"),
+    [
+        (2, "", CLEAR, None),
+        (0, "done", "", None),
+        (None, "", "", None),
+        (1, "", CLEAR, "ends with 1"),
+        (124, "", "", "takes too long"),
+        (2, "", "", "says nothing"),
+        (2, "", "discover: Correct it.", "names no place"),
+        (2, "", "discover: s.toml is wrong.", "names no remedy"),
+        (2, "", CLEAR + "\x1b[2J", "prints what a terminal would obey"),
+        (2, "", "Traceback (most recent call last):", "fails in the software"),
+        (1, "", "discover: KeyError: 3 (not your input's fault; ...)", "fails in the software"),
+        (2, "", f"discover: s.toml: correct {'x' * 2000}", "says too much"),
+    ],
+)
+def test_the_judge_tells_bad_endings_from_good_ones(code, stdout, stderr, wrong):
+    assert complaint(CASE, Outcome(code, stdout, stderr, 0.1)) == wrong
+
+
+def test_a_reader_that_waits_for_ever_would_be_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(malformed_inputs, "LIMIT", 0.2)
+    os.mkfifo(tmp_path / "pipe")
+    monkeypatch.setattr("discover.cli.main", lambda: (tmp_path / "pipe").read_text())
+    assert complaint(CASE, malformed_inputs.run(["demo"])) == "takes too long"
+
+
+def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, monkeypatch):
+    (tmp_path / "runs.csv").write_text("file\na.csv\n")
+    (tmp_path / "a.csv").write_text("time_s,shear_rate_1_s,stress_Pa\n0,1,0\n1,1,1\n")
+    (tmp_path / "b\x1b[2J.csv").write_text("")
+    Path(os.fsdecode(bytes(tmp_path) + b"/c\xff.csv")).write_text("")
+    outcome = malformed_inputs.run(["data", "check", str(tmp_path)])
+    assert outcome.code == 0, outcome
+    assert "c" in outcome.stdout
+    assert all(c.isprintable() or c == "\n" for c in outcome.stdout)
+    stream = io.TextIOWrapper(io.BytesIO(), "ascii", errors="strict")
+    monkeypatch.setattr("sys.stdout", stream)
+    monkeypatch.setattr("sys.argv", ["discover", "data", "show", "--help"])
+    with pytest.raises(SystemExit):
+        cli.main()
+    print("σ12", file=stream, flush=True)  # as the table of distil says it
+    assert b"\\u03c312" in stream.buffer.getvalue()
+
+
+def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
+    malformed_inputs._complete_results(tmp_path)
+    again = ["close-loop", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--json"]
+    assert malformed_inputs.run(again).code == 0
+    (tmp_path / "out" / "loop.json").write_bytes(b"\x90")
+    assert malformed_inputs.run(again).code is None  # it computes
+
+
+def test_a_batch_says_its_failures_on_standard_error_however_quiet(tmp_path):
+    (tmp_path / "s.toml").write_text("[data]\n")
+    outcome = malformed_inputs.run(
+        ["batch", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--quiet"]
+    )
+    assert outcome.code == 2
+    assert outcome.stdout == ""
+    assert outcome.stderr.startswith("discover: s (compare): ")
+
+
+def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
+    mine, other = tmp_path / "mine", tmp_path / "other"
+    for folder in (mine, other):
+        folder.mkdir()
+        malformed_inputs._write(folder, malformed_inputs.FOLDER)
+    for path, told in ((".", False), ("../other", True), (str(other), True)):
+        (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
+        outcome = malformed_inputs.run(
+            ["close-loop", str(mine / "s.toml"), "--out", str(tmp_path / "out"), "--overwrite"]
+        )
+        assert outcome.code is None
+        assert (str(other) in outcome.stderr) is told, outcome
+
+
+def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():
+    assert folder_names([Path("...toml"), Path("a.toml")]) == ["study", "a"]
+
+
+def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
+    for section in (
+        "distillation = true",
+        'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
+    ):
+        synthetic = "sweep" in section
+        malformed_inputs._write(tmp_path, malformed_inputs.FOLDER)
+        data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
+        (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
+        outcome = malformed_inputs.run(
+            ["compare", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--overwrite"]
+        )
+        assert outcome.code == 2, outcome
