@@ -120,6 +120,7 @@ def run_close_loop(
         "noise": study.loop.noise,
         "most_samples": study.loop.most_samples,
         "progress": say,
+        "store": folder,
     }
     if each:
         result = run_loop_on_each(data_of_study.dataset, declared, **options)

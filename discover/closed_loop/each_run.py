@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.kept_search import Store
 from discover.closed_loop.loop import MOST_SAMPLES, run_loop
 from discover.closed_loop.result import ErrorPair, Fold, LoopResult
 from discover.dataset import ShearDataset
@@ -23,6 +24,7 @@ def run_loop_on_each(
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
     progress: Callable[[str], None] | None = None,
+    store: Store | None = None,
 ) -> LoopResult:
     """Close the loop on all runs, and judge it by loops that each leave one run out.
 
@@ -33,7 +35,7 @@ def run_loop_on_each(
 
     Parameters
     ----------
-    dataset, declared, effects, max_effects, strain, noise, most_samples, progress
+    dataset, declared, effects, max_effects, strain, noise, most_samples, progress, store
         As in `run_loop`.
     fit
         Names of the runs; by default all.
@@ -63,6 +65,9 @@ def run_loop_on_each(
             noise=noise,
             most_samples=most_samples,
             progress=lambda line: say(f"{prefix}: {line}"),
+            store=store,
+            # the number of the run and not its name, which may hold anything
+            name=f"search_{names.index(held_out[0])}" if held_out else "search",
         )
 
     whole = loop(names, (), "all runs")

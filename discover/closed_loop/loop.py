@@ -17,6 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
+from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.residual import STRUCTURE, Expectation, fast_part, summarise
 from discover.closed_loop.result import ErrorPair, LoopResult, Stage, StageParameter, Verdict
@@ -77,6 +78,8 @@ def run_loop(
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
     progress: Callable[[str], None] | None = None,
+    store: Store | None = None,
+    name: str = "search",
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
 
@@ -113,6 +116,10 @@ def run_loop(
         one with little noise fewer, but no fewer than 150.
     progress
         Called with a line of text now and then.
+    store
+        Where the search is kept after each stage, so that it goes on there when it was interrupted.
+    name
+        Of this search among others in the store.
 
     Raises
     ------
@@ -138,10 +145,14 @@ def run_loop(
         len(candidates),
         _admission(fitted_runs, held_runs),
         expectation,
+        Keeper(store, name),
     )
-    say(f"declared model on {len(fitted_runs)} runs")
-    search.start()
-    _settle(search, fitted_runs, max_effects, say)
+    if search.resume():
+        say(f"going on from what was kept: {', '.join(search.active)}")
+    else:
+        say(f"declared model on {len(fitted_runs)} runs")
+        search.start()
+        _settle(search, fitted_runs, max_effects, say)
     search.run(max_effects, say)
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
@@ -286,11 +297,15 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
             small.append(run.window(keep))
     if len(small) < 2 or max_effects == 0:
         return
-    linear = search.restricted(make_batch(small), lambda effect: effect.kind != "constitutive")
-    linear.start()
+    linear = search.restricted(
+        make_batch(small), lambda effect: effect.kind != "constitutive", "at_small_strain"
+    )
+    if not linear.resume():
+        linear.start()
     linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
     if linear.active and linear.explained:
         search.adopt(linear)
+        search.keeper.save(search)
 
 
 def _stage(search: Search, name: str, bounds, error) -> Stage:

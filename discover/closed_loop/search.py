@@ -17,6 +17,7 @@ from discover.closed_loop.augment import (
     simplest,
 )
 from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.kept_search import Keeper
 from discover.closed_loop.least_squares import (
     NO_PRIOR,
     Fit,
@@ -64,6 +65,8 @@ class Search:
         Which effects are candidates.
     expectation
         What a complete model may leave of the data.
+    keeper
+        Keeps the search after each stage; by default nothing is kept.
 
     Attributes
     ----------
@@ -83,6 +86,8 @@ class Search:
         Effects established at small strain.
     known
         Mean and standard deviation of parameters determined there, by position.
+    rounds
+        How often the whole was examined again.
     """
 
     def __init__(
@@ -93,7 +98,10 @@ class Search:
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
         expectation: Expectation | None = None,
+        keeper: Keeper | None = None,
     ):
+        self.keeper = keeper or Keeper(None, "")
+        self.rounds = 0
         self.model, self.batch, self.held_batch = model, batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
         self.expectation = expectation or Expectation()
@@ -134,9 +142,18 @@ class Search:
         """Whether what is left is what a complete model may leave."""
         return self.expectation.explains(self.fit.residual, np.asarray(self.batch.weight))
 
-    def restricted(self, batch: RunBatch, admitted: Callable[[AbstractEffect], bool]) -> "Search":
-        """Return a new search on other samples among fewer candidates."""
-        return Search(self.model, batch, None, self.n_candidates, admitted, self.expectation)
+    def restricted(
+        self, batch: RunBatch, admitted: Callable[[AbstractEffect], bool], name: str
+    ) -> "Search":
+        """Return a new search on other samples among fewer candidates, kept under its own name."""
+        keeper = Keeper(self.keeper.store, f"{self.keeper.name}_{name}")
+        return Search(
+            self.model, batch, None, self.n_candidates, admitted, self.expectation, keeper
+        )
+
+    def resume(self) -> bool:
+        """Go on from the last stage that was kept, and return whether there was one."""
+        return self.keeper.restore(self)
 
     def start(self) -> None:
         """Fit the declared model; an unknown relaxation time from several starts.
@@ -167,7 +184,7 @@ class Search:
 
     def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
         """Add effects until none earns its place, and see that each still deserves its own."""
-        for _ in range(_ROUNDS):
+        while self.rounds < _ROUNDS:
             while len(self.active) < max_effects:
                 name = self.advance()
                 if name is None and look_ahead and not self.explained:
@@ -176,9 +193,12 @@ class Search:
                     say("no further candidate earns its place")
                     break
                 say(f"{name}: error {self.error:.4f}, runs left out {self.left_out:.4f}")
+                self.keeper.save(self)
+            self.rounds += 1
             if not self.reexamine():
                 break
             say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
+            self.keeper.save(self)
 
     def look_ahead(self, max_effects: int) -> str | None:
         """Add several effects at once that only together earn their places; return their names.

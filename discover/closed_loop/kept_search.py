@@ -1,0 +1,115 @@
+"""A search that was interrupted goes on where it was: its state after each stage, as JSON.
+
+Nothing in a search is random, so one that goes on from a stage ends where an undisturbed one does.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.least_squares import Fit
+
+if TYPE_CHECKING:
+    from discover.closed_loop.search import Search
+
+
+@runtime_checkable
+class Store(Protocol):
+    """Where finished parts of long work are kept; `discover.study.RunFolder` is one."""
+
+    def load(self, part: str) -> dict[str, Any] | None:
+        """Return a part, or None if it has to be computed."""
+        ...
+
+    def save(self, part: str, content: Mapping[str, Any]) -> None:
+        """Keep a part."""
+        ...
+
+
+class Keeper:
+    """Keeps one search in a store.
+
+    Parameters
+    ----------
+    store
+        Where; None to keep nothing.
+    name
+        Of this search among others in the store.
+    """
+
+    def __init__(self, store: Store | None, name: str):
+        self.store, self.name = store, name
+
+    def save(self, search: "Search") -> None:
+        """Keep the state of a search between two stages."""
+        if self.store is not None:
+            self.store.save(self.name, _state(search))
+
+    def restore(self, search: "Search") -> bool:
+        """Bring a search to the state that was kept, and return whether there was one."""
+        state = self.store.load(self.name) if self.store is not None else None
+        if state is None or state.get("model") != _model_of(search):
+            return False
+        _set(search, state)
+        return True
+
+
+def _model_of(search: "Search") -> list[str]:
+    """Return what the positions in a parameter vector mean."""
+    return [effect.name for effect in search.model.effects]
+
+
+def _state(search: "Search") -> dict[str, Any]:
+    fit = search.fit
+    return {
+        "model": _model_of(search),
+        "fit": {
+            "theta": fit.theta.tolist(),
+            "free": [int(position) for position in fit.free],
+            "residual": fit.residual.tolist(),
+            "jacobian": fit.jacobian.tolist(),
+        },
+        "active": search.active,
+        "settled": search.settled,
+        "rounds": search.rounds,
+        "path": [np.asarray(theta).tolist() for theta in search.path],
+        "rankings": [
+            [asdict(score) | {"start": np.asarray(score.start).tolist()} for score in ranking]
+            for ranking in search.rankings
+        ],
+        "aliases": search.aliases,
+        "support": search.support,
+        "left_out": search.left_out,
+        "known": [[at, *pair] for at, pair in search.known.items()],
+    }
+
+
+def _set(search: "Search", state: dict[str, Any]) -> None:
+    fit = state["fit"]
+    search.fit = Fit(
+        np.array(fit["theta"]),
+        tuple(fit["free"]),
+        np.array(fit["residual"]),
+        # no parameter is free where a law is declared whole: the shape would be lost
+        np.array(fit["jacobian"]).reshape(len(fit["free"]), *np.shape(fit["residual"])),
+    )
+    search.active = list(state["active"])
+    search.settled = tuple(state["settled"])
+    search.rounds = state["rounds"]
+    search.path = [np.array(theta) for theta in state["path"]]
+    search.rankings = [
+        tuple(
+            CandidateScore(
+                **{**score, "aliases": tuple(score["aliases"]), "start": np.array(score["start"])}
+            )
+            for score in ranking
+        )
+        for ranking in state["rankings"]
+    ]
+    search.aliases = {name: tuple(others) for name, others in state["aliases"].items()}
+    search.support = dict(state["support"])
+    search.left_out = state["left_out"]
+    search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}
