@@ -120,9 +120,9 @@ def _initial(
 
 
 @eqx.filter_jit
-def _begin(laws, clouds, problem, tensors, strengths):
+def _begin(laws, clouds, tensors, strengths):
     def one(law, cloud, strength):
-        rebuild = Rebuild.with_network(law, tensors, constant_scale(cloud))
+        rebuild = Rebuild.with_network(law, np.array(tensors), constant_scale(cloud))
         prior = reweighted(law, cloud, strength)
         return (rebuild, cloud, prior), rebuild.start
 
@@ -156,7 +156,7 @@ def _round(
     n = laws.constants.shape[0]
     strengths = jnp.asarray(np.broadcast_to(strength, (n,)).astype(float))
     clouds = _stack([sample_states(member_of(laws, i), problem) for i in range(n)])
-    parts, weights = _begin(laws, clouds, problem, jnp.asarray(tensors), strengths)
+    parts, weights = _begin(laws, clouds, tuple(map(bool, tensors)), strengths)
     best = np.array(weights)
     stopping, going = [Stopping(target) for _ in range(n)], np.ones(n, bool)
     misfits = np.full(n, np.inf)

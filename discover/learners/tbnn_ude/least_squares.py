@@ -27,7 +27,7 @@ _AMPLIFICATION = 30.0
 _PATIENCE = 4
 _LEAST_PROGRESS = 1e-3
 _MOST_REJECTED = 8
-_FAIR_STEPS = 5
+_FAIR_STEPS = 4
 _FAR_BEHIND = 5.0
 
 Callback = Callable[[float], None]

@@ -1,5 +1,7 @@
 """The numbers of a law that a round of training moves, as one well-scaled vector."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -24,6 +26,17 @@ def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisN
 def weights_of(law: TensorBasisNetwork) -> Float[Array, " p"]:
     """Return all trainable numbers of a law: those of the network, then the eight constants."""
     return ravel_pytree(split_law(law)[0])[0]
+
+
+def places_of(law: TensorBasisNetwork) -> TensorBasisNetwork:
+    """Return the law with every trainable number replaced by its place in `weights_of`."""
+    leaves, structure = jax.tree.flatten(split_law(law)[0])
+    ends = np.cumsum([leaf.size for leaf in leaves])
+    # on the host, so that it is known while a program is traced
+    return structure.unflatten(
+        np.arange(end - leaf.size, end).reshape(leaf.shape)
+        for end, leaf in zip(ends, leaves, strict=True)
+    )
 
 
 class Rebuild(eqx.Module):
@@ -85,14 +98,21 @@ class Rebuild(eqx.Module):
         moving: Bool[ArrayLike, "8"],
         scale: Float[ArrayLike, "8"],
     ) -> "Rebuild":
-        """Return the vector of all weights of the network, then the eight constants.
+        """Return the vector of the network's weights, then the eight constants.
 
-        Parameters as in `of_constants`.
+        Output weights of tensors that do not move act on nothing and are left out, so the length
+        depends on how many move, not on which.
+
+        Parameters as in `of_constants`; `moving` must be known when a program is compiled.
         """
-        network = np.ones(weights_of(law).shape[0] - N_COEFFICIENTS)
+        moving = np.asarray(moving)
+        last: Any = places_of(law).network.layers[-1]  # its bias is there: it was made with one
+        idle = np.append(last.weight[~moving], last.bias[~moving])
+        positions = np.setdiff1d(np.arange(weights_of(law).shape[0]), idle)
+        network = np.ones(positions.size - N_COEFFICIENTS)
         return cls(
             law,
-            jnp.arange(network.size + N_COEFFICIENTS),
+            jnp.asarray(positions),
             jnp.concatenate([jnp.asarray(network, bool), jnp.asarray(moving)]),
             jnp.concatenate([jnp.asarray(network), jnp.asarray(scale)]),
         )
