@@ -131,6 +131,7 @@ def _run_on_cluster(
     so_far: BatchProgress,
 ) -> None:
     try:
+        import dask
         from distributed import Client, LocalCluster, as_completed
     except ImportError:
         raise InputError(
@@ -142,9 +143,11 @@ def _run_on_cluster(
         except (OSError, TimeoutError, ValueError) as error:
             raise InputError(f"No dask scheduler answers at {scheduler!r} ({error}).") from None
     else:
-        cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=":0", host="127.0.0.1"
-        )
+        # looking at every thread's stack a hundred times a second is paid for by the work
+        with dask.config.set({"distributed.worker.profile.enabled": False}):
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", host="127.0.0.1"
+            )
         client = Client(cluster)
     try:
         topic = f"discover-{uuid4()}"
