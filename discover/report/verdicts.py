@@ -57,11 +57,12 @@ def _found(comparison: Comparison) -> str:
         if comparison.truth is not None:
             wanted = {t.term for t in comparison.truth}
             found = {t.term for t in sparse.terms}
-            text += ", exactly the terms of the law that made the data"
-            if found != wanted:
+            if found == wanted:
+                text += ", exactly the terms of the law that made the data"
+            else:
                 missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
                 extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
-                text = text.replace("exactly the terms of", "against")
+                text += ", against the law that made the data"
                 text += f" missing: {missing}, and too many: {extra}"
         parts.append(text)
     network = comparison.outcomes.get("tbnn_ude")
@@ -158,20 +159,20 @@ def _loop_found(result: LoopResult) -> str:
 
 def _loop_sure(result: LoopResult) -> str:
     before, after = result.error_before, result.error_after
-    parts = []
+    parts, falls = [], "the error falls "
     if before.held_out is not None:
         unseen = "on runs that no fit saw"
         if result.folds:
             unseen = "on each run, by a search that did not see it,"
         parts.append(
-            f"{unseen} the error falls from {percent(before.held_out)} to {percent(after.held_out)}"
+            f"{unseen} {falls}from {percent(before.held_out)} to {percent(after.held_out)}"
         )
+        falls = ""
     parts.append(
-        f"on the fitted runs from {percent(before.fit)} to {percent(after.fit)}, where noise "
-        f"explains {percent(result.noise_floor)}"
+        f"on the fitted runs {falls}from {percent(before.fit)} to {percent(after.fit)}, where "
+        f"noise explains {percent(result.noise_floor)}"
     )
     if before.held_out is None:
-        parts[0] = parts[0].replace("from", "the error falls from", 1)
         parts.append("no run was held out to judge by")
     for stage in result.stages:
         if stage.aliases:

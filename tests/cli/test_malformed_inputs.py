@@ -5,11 +5,13 @@ import os
 import tempfile
 from pathlib import Path
 
+import malformed_cases
 import malformed_inputs
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from malformed_inputs import KINDS, Case, Outcome, attempt, complaint
+from malformed_cases import KINDS, Case
+from malformed_inputs import Outcome, attempt, complaint
 
 from discover import cli
 from discover.batch.run import folder_names
@@ -37,9 +39,9 @@ def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("package", "options")])
 def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(malformed_inputs, "mutate_text", lambda text, source: text.encode())
-    monkeypatch.setattr(malformed_inputs, "mutate_values", lambda content, source: content)
-    monkeypatch.setattr(malformed_inputs, "spoil_file", lambda path, source: None)
+    monkeypatch.setattr(malformed_cases, "mutate_text", lambda text, source: text.encode())
+    monkeypatch.setattr(malformed_cases, "mutate_values", lambda content, source: content)
+    monkeypatch.setattr(malformed_cases, "spoil_file", lambda path, source: None)
     for seed in range(3):
         (tmp_path / str(seed)).mkdir()
         _, outcome, _ = attempt(kind, seed, tmp_path / str(seed))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from malformed_cases import FOLDER, RUN
 from mutations import TOKENS, mutate_text
 from typer.testing import CliRunner
 
@@ -20,17 +21,11 @@ from discover.errors import InputError
 from discover.study import RunFolder, fingerprint, read_study
 from discover.study.build import declared_model, load_study_data
 
-RUN = "time_s,shear_rate_1_s,stress_Pa,N1_Pa\n" + "".join(
-    f"{0.1 * i:.1f},0.5,{2 * (1 - 0.9**i):.6f},{0.1 * i:.2f}\n" for i in range(14)
-)
 LAOS = "time_ms,strain,stress_kPa\n" + "".join(
     f"{i},{np.sin(0.3 * i):.6f},{np.cos(0.3 * i - 0.3):.6f}\n" for i in range(24)
 )
-FILES = {
-    "runs.csv": "file,factor,label\na.csv,2.0,first\nb.csv,4.0,second\n",
-    "a.csv": RUN,
+FILES = FOLDER | {
     "b.csv": LAOS,
-    "lve.csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n10,50,5\n1,25,25\n0.1,1,5\n",
     "study.toml": """[data]
 folder = "."
 fit = ["a.csv"]

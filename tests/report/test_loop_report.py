@@ -17,7 +17,8 @@ from discover.closed_loop.result import (
     StageParameter,
 )
 from discover.report.loop_report import write_loop
-from discover.report.plots.loop_lissajous import last_cycle, lissajous_picture
+from discover.report.plots.cycles import in_last_cycle
+from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
 from discover.report.verdicts import QUESTIONS, loop_verdict
 from discover.study import RunFolder
@@ -170,7 +171,7 @@ def test_oscillations_are_drawn_against_strain_and_rate_and_start_ups_are_not():
 
 def test_the_last_cycle_is_one_period_long():
     record = oscillating()
-    shown = record.time[last_cycle(record, 1.0)]
+    shown = record.time[in_last_cycle(record.time, 1.0)]
     assert shown[-1] - shown[0] == pytest.approx(2.0 * np.pi, rel=0.03)
 
 

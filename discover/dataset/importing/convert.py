@@ -158,12 +158,16 @@ def _needed(found: dict[str, int], block: Block, geometry: Geometry | None) -> d
     }
 
 
-def _lacking(found: dict[str, int], geometry: Geometry | None) -> list[str]:
+def _lacking(found: dict[str, int], geometry: Geometry | None) -> list[tuple[str, ...]]:
     """Return what a block lacks to be a run, each as the quantities of which one would do."""
-    wanted = ["time", "shear_rate or strain", "stress"]
+    wanted = [("time",), ("shear_rate", "strain"), ("stress",)]
     if geometry is not None:
-        wanted[1:] = ["shear_rate, strain, angular_velocity or angle", "stress or torque"]
-    return [names for names in wanted if not set(re.split(", | or ", names)) & set(found)]
+        wanted[1:] = [("shear_rate", "strain", "angular_velocity", "angle"), ("stress", "torque")]
+    return [names for names in wanted if not set(names) & set(found)]
+
+
+def _or(names: tuple[str, ...]) -> str:
+    return " or ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)
 
 
 def _values(
@@ -267,7 +271,7 @@ def _no_run(
     names = list(dict.fromkeys(shown(name) for name, _ in best.columns if name))
     text = (
         f"{path.name} holds no run: {where} has no column of numbers known as "
-        f"{', nor as '.join(lacks)}. Its columns are {', '.join(names[:15])}."
+        f"{', nor as '.join(map(_or, lacks))}. Its columns are {', '.join(names[:15])}."
     )
     if set(_SWEEP) <= set(guess_columns(best, given, sweep=True)):
         return f"{text} They look like a linear sweep: give the file with --lve, beside runs."
@@ -277,14 +281,13 @@ def _no_run(
             f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
             "in --geometry cone_plate:radius_mm=25,angle_deg=1."
         )
-    first = re.split(", | or ", lacks[0])[0]
-    return f'{text} Name the right one, as in --column {first}="name of the column".'
+    return f'{text} Name the right one, as in --column {lacks[0][0]}="name of the column".'
 
 
 def _raw(block: Block, given: dict[str, str]) -> dict[str, int]:
     """Return the columns from which stress and rate can be made, by the geometry of the tool."""
     found = guess_columns(block, given, sweep=False)
-    return {key: at for key, at in found.items() if key in ("torque", "angular_velocity", "angle")}
+    return {key: at for key, at in found.items() if key in _INSTRUMENT}
 
 
 def _source(path: Path, sweep: bool) -> Source:

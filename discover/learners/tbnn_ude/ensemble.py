@@ -162,7 +162,9 @@ def _round(
     misfits = np.full(n, np.inf)
     linearised = _linearised(weights, parts, problem)
     state = _first_states(linearised)
-    for _ in range(steps):
+    for step in range(steps):
+        if step:
+            linearised = _linearised(state.y_eval, parts, problem)
         weights, state = _next_states(weights, linearised, state)
         costs = np.asarray(_costs(state))
         for i in np.flatnonzero(going):
@@ -173,7 +175,6 @@ def _round(
         callback(misfits)
         if not np.any(going):
             break
-        linearised = _linearised(state.y_eval, parts, problem)
     return _laws(parts, jnp.asarray(best))
 
 

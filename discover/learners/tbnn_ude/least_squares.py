@@ -219,7 +219,9 @@ def minimise(
     linearised = linearise(weights, objective)
     state = first_state(linearised)
     best, stopping = weights, Stopping(target, pace)
-    for _ in range(steps):
+    for step in range(steps):
+        if step:
+            linearised = linearise(state.y_eval, objective)
         weights, state = next_state(weights, linearised, state)
         misfit = norm_of_cost(float(state.f_info.as_min()))
         if np.isfinite(misfit):
@@ -228,7 +230,6 @@ def minimise(
             callback(misfit)
         if stopping.done(misfit):
             break
-        linearised = linearise(state.y_eval, objective)
     return best
 
 

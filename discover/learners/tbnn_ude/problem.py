@@ -51,12 +51,13 @@ class TrainingProblem(eqx.Module):
         def one(protocol, grid):
             return solve_on_grid(fluid, protocol, grid, adjoint)[:, 3]
 
-        predicted = jax.vmap(one)(self.protocols, self.grids)
-        return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
+        return self._missed_by(jax.vmap(one)(self.protocols, self.grids))
 
     def misses(self, states: Float[Array, "runs n k 4"]) -> Float[Array, "runs n"]:
         """Return predicted minus measured σ12 from the stresses of the modes at the samples."""
-        predicted = jnp.tensordot(states[..., 3], self.modulus, axes=1)
+        return self._missed_by(jnp.tensordot(states[..., 3], self.modulus, axes=1))
+
+    def _missed_by(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
         return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
 
     def mean_squared_errors(

@@ -143,7 +143,7 @@ def _sweep(optimizer, matrix, right, max_terms):
 
 
 def _fitted(optimiser, matrix, right, history):
-    # what is checked here was made here; the checks of thousands of small fits took half their time
+    # what is checked here was made here; checking thousands of small fits took a third of the time
     unchecked = config_context(assume_finite=True, skip_parameter_validation=True)
     with unchecked, warnings.catch_warnings():
         # "eliminated all coefficients" and "did not converge" are ordinary ends of a sweep

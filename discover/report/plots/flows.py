@@ -4,6 +4,7 @@ import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
+from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.style import (
     BEFORE_STYLE,
     LEARNER_STYLES,
@@ -51,8 +52,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
-    strain = flow.strain[last]
-    strain = strain - 0.5 * (strain.max() + strain.min())  # about the middle of the cycle
+    strain = about_middle(flow.strain, last)[last]
     closed = {"elastic": (strain, "strain γ"), "viscous": (flow.shear_rate[last], rate_label)}
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
     with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
@@ -195,4 +195,4 @@ def last_cycle(flow: Flow) -> np.ndarray:
     active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
     if active.size == 0 or np.min(active) <= 0:
         return np.ones(flow.times.size, dtype=bool)
-    return flow.times >= flow.times[-1] - 2.0 * np.pi / float(np.min(active)) * 1.02
+    return in_last_cycle(flow.times, float(np.min(active)))

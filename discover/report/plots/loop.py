@@ -22,6 +22,9 @@ from discover.report.plots.style import (
 )
 from discover.report.wording import percent, spoken
 
+Samples = slice | np.ndarray
+"""Which samples of a run, as an index."""
+
 _FIT, _HELD = NETWORK, SPARSE
 _THOUSANDS = 1e4  # Pa, from which digits would crowd an axis
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
@@ -41,19 +44,7 @@ def runs_picture(result: LoopResult) -> Picture:
             panel.set_visible(False)
         for panel, record in zip(axes.ravel(), records, strict=False):
             every = max(1, record.time.size // 60)
-            measured = record.measured[::every]
-            panel.plot(
-                record.time[::every], measured, "o", ms=2.5, mfc="none", color=TRUTH,
-                mew=0.7, label="measured",
-            )  # fmt: skip
-            panel.plot(
-                record.time, record.predicted[0], "-.", lw=1.1, color=BEFORE,
-                label="declared model",
-            )  # fmt: skip
-            panel.plot(
-                record.time, record.predicted[-1], lw=1.5, color=_HELD if record.held_out else _FIT,
-                label="augmented, held out" if record.held_out else "augmented, fitted",
-            )  # fmt: skip
+            draw_run(panel, record, record.time, slice(None, None, every), slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -74,6 +65,35 @@ def runs_picture(result: LoopResult) -> Picture:
             "runs",
             "Every run in the window of the loop. Runs in orange were held out: no fit saw them.",
         )
+
+
+def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
+    """Draw the measured stress, the declared and the augmented model of one run.
+
+    Parameters
+    ----------
+    panel
+        Axes of matplotlib.
+    record
+        The run.
+    along
+        What the stress is drawn against, shape (n,).
+    marked, shown
+        Which samples are marked as measured, and between which the models are drawn.
+    """
+    panel.plot(
+        along[marked], record.measured[marked], "o", ms=2.5, mfc="none", mew=0.7, color=TRUTH,
+        label="measured",
+    )  # fmt: skip
+    panel.plot(
+        along[shown], record.predicted[0][shown], "-.", lw=1.1, color=BEFORE,
+        label="declared model",
+    )  # fmt: skip
+    panel.plot(
+        along[shown], record.predicted[-1][shown], lw=1.5,
+        color=_HELD if record.held_out else _FIT,
+        label="augmented, held out" if record.held_out else "augmented, fitted",
+    )  # fmt: skip
 
 
 def short_title(record: RunRecord) -> str:
