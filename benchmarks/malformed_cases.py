@@ -155,7 +155,7 @@ class Case:
     names: tuple[str, ...]
 
 
-def _write(root: Path, files: dict[str, str]) -> None:
+def write_files(root: Path, files: dict[str, str]) -> None:
     for name, text in files.items():
         (root / name).write_text(text, encoding="utf-8")
 
@@ -180,7 +180,7 @@ def _keys(content: object) -> Iterator[str]:
 
 def data_folder(root: Path, source: random.Random) -> Case:
     """Spoil a file of a data folder, and look at the folder."""
-    _write(root, FOLDER)
+    write_files(root, FOLDER)
     _spoil(root, source.choice(list(FOLDER)), source)
     command = source.choice(("check", "check", "show"))
     factor = ["--clock-factor", "factor"] if command == "check" else []
@@ -198,10 +198,10 @@ def _study(root: Path, content: dict, source: random.Random, name: str) -> None:
 
 def loop_study(root: Path, source: random.Random) -> Case:
     """Mutate a study of measured runs, or a run of it, and close the loop."""
-    _write(root, FOLDER)
+    write_files(root, FOLDER)
     _study(root, STUDY, source, "study.toml")
     if source.random() < 0.3:
-        _write(root, {"study.toml": to_toml(STUDY)})
+        write_files(root, {"study.toml": to_toml(STUDY)})
         _spoil(root, source.choice(["study.toml", *FOLDER]), source)
     out = str(root / "out")
     return Case(
@@ -219,10 +219,10 @@ def compare_study(root: Path, source: random.Random) -> Case:
     )
 
 
-def _complete_results(root: Path) -> None:
+def complete_results(root: Path) -> None:
     from discover.study import RunFolder, fingerprint, read_study
 
-    _write(root, {**FOLDER, "study.toml": to_toml(STUDY)})
+    write_files(root, {**FOLDER, "study.toml": to_toml(STUDY)})
     name = fingerprint(read_study(root / "study.toml"), "close-loop", None)
     folder = RunFolder(root / "out", name)
     folder.write("report.html", "<p>a report</p>")
@@ -233,7 +233,7 @@ def _complete_results(root: Path) -> None:
 
 def resumed(root: Path, source: random.Random) -> Case:
     """Damage a folder of results, and run the same study into it again, alone or in a batch."""
-    _complete_results(root)
+    complete_results(root)
     files = ("report.html", "loop.json", "state/study.json", "state/verdict.json")
     for name in source.sample(files, source.randint(1, 2)):
         path = root / "out" / name
@@ -254,7 +254,7 @@ def exported(root: Path, source: random.Random) -> Case:
     if source.random() < 0.6:
         (root / name).write_text(json.dumps(mutate_values(RESULTS[name], source)), "utf-8")
     else:
-        _write(root, {name: text})
+        write_files(root, {name: text})
         _spoil(root, name, source)
     form = source.choice(("python", "sympy", "latex", "json", "rheotool"))
     out = source.choice(([], ["--out", str(root / "law.txt")]))
@@ -263,7 +263,7 @@ def exported(root: Path, source: random.Random) -> Case:
 
 def batch(root: Path, source: random.Random) -> Case:
     """Mutate all studies of a batch."""
-    _write(root, FOLDER)
+    write_files(root, FOLDER)
     names = [f"s{i}.toml" for i in range(source.randint(1, 3))]
     for name in names:
         _study(root, source.choice((STUDY, COMPARISON)), source, name)
@@ -275,7 +275,7 @@ def batch(root: Path, source: random.Random) -> Case:
 def imported(root: Path, source: random.Random) -> Case:
     """Mutate a rheometer's export, and import it."""
     name = source.choice(list(EXPORTS))
-    _write(root, {**EXPORTS, "sweep.txt": SWEEP})
+    write_files(root, {**EXPORTS, "sweep.txt": SWEEP})
     with_sweep = source.random() < 0.3
     _spoil(root, "sweep.txt" if with_sweep else name, source)
     options = ["--lve", str(root / "sweep.txt")] if with_sweep else []
@@ -287,7 +287,7 @@ def imported(root: Path, source: random.Random) -> Case:
 
 def mapped(root: Path, source: random.Random) -> Case:
     """Mutate a mapping file, and import by it."""
-    _write(root, EXPORTS)
+    write_files(root, EXPORTS)
     _study(root, MAPPING, source, "map.toml")
     return Case(
         ["data", "import", "--mapping", str(root / "map.toml"), "--out", str(root / "data")],
@@ -314,8 +314,8 @@ def fetched(root: Path, source: random.Random) -> Case:
 
 def optioned(root: Path, source: random.Random) -> Case:
     """Give wrong words on the command line."""
-    _write(root, {**FOLDER, **EXPORTS, "study.toml": to_toml(STUDY)})
-    _write(root, {"loop.json": json.dumps(RESULTS["loop.json"])})
+    write_files(root, {**FOLDER, **EXPORTS, "study.toml": to_toml(STUDY)})
+    write_files(root, {"loop.json": json.dumps(RESULTS["loop.json"])})
     out = ["--out", str(root / "out")]
     tool = "cone_plate:radius_mm=25,angle_deg=1"
     word = source.choice([t for t in TOKENS if "\0" not in t])

@@ -43,5 +43,5 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     except OSError:
         return None  # a home that cannot be written to costs time, not the run
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     return folder

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import ShearRun
+from discover.protocols.shear import shear_rates
 from discover.simulate.grid import COARSEST_STRAIN, make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
@@ -90,7 +90,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         half = np.empty(2 * n_steps - 1)
         half[::2] = padded
         half[1::2] = 0.5 * (padded[1:] + padded[:-1])
-        rate = np.array(jax.vmap(run.protocol.shear_rate)(jnp.asarray(half)))
+        rate = shear_rates(run.protocol, half).copy()
         rate[half < 0.0] = run.rate_before
         # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
         # that the slope of the rate at the last sample is the flow's own

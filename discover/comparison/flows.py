@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
@@ -13,7 +11,7 @@ from scipy.integrate import cumulative_simpson
 from discover.dataset.run import ShearRun
 from discover.laws.multimode import Fluid
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
-from discover.protocols.shear import ShearProtocol, oscillatory_shear
+from discover.protocols.shear import ShearProtocol, oscillatory_shear, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import StudyData
@@ -27,7 +25,6 @@ Stresses = Mapping[str, Float[np.ndarray, " _"]]
 HIGH_DEBORAH_AMPLITUDE = 3.0
 """Wi of the paper's curves that become elliptical."""
 
-_BUCKET = 401
 
 FlowKind = Literal["training", "held_out", "test", "high_deborah", "pipkin"]
 
@@ -182,7 +179,7 @@ def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
-    rates = np.asarray(jax.vmap(protocol.shear_rate)(jnp.asarray(times)))
+    rates = shear_rates(protocol, times)
     return Flow(
         name,
         kind,
@@ -197,8 +194,7 @@ def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
 
 
 def _exactly(truth: Fluid, protocol: ShearProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
-    solution = stresses(simulate(truth, protocol, _padded(times)))
-    return {quantity: values[: times.size] for quantity, values in solution.items()}
+    return stresses(simulate(truth, protocol, times))
 
 
 def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
@@ -217,19 +213,10 @@ def stresses(stress: ShearStress) -> dict[str, np.ndarray]:
 
 def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
     """Return what a fluid does in a flow, or None if its stress runs away."""
-    n = flow.times.size
     try:
-        solution = simulate(fluid, flow.protocol, _padded(flow.times))
+        return stresses(simulate(fluid, flow.protocol, flow.times))
     except SimulationError:
         return None
-    return {quantity: values[:n] for quantity, values in stresses(solution).items()}
-
-
-def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
-    """Return the times with a few more after the end, so that flows share one compilation."""
-    missing = -times.size % _BUCKET
-    step = 1e-6 * max(float(times[-1]), 1e-12)
-    return np.concatenate([times, times[-1] + step * np.arange(1, missing + 1)])
 
 
 def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[str, float | None]:

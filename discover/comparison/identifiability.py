@@ -118,6 +118,7 @@ def find_rivals(
     model: DeclaredModel,
     flows: Sequence[Flow],
     library: TermLibrary | None = None,
+    predictions: Mapping[str, Stresses | None] | None = None,
 ) -> list[Rival]:
     """Return rivals of a law: exact twins first, then what the data do not rule out, closest first.
 
@@ -134,6 +135,8 @@ def find_rivals(
     library
         Terms that the search had. Twins are sought beyond them too, in the basis with up to one
         invariant: the fluid need not keep to the library that somebody chose.
+    predictions
+        Of the chosen law, by the key of the flow, where they are known already.
     """
     chosen = law_terms(terms)
     searched = () if library is None else library.terms
@@ -141,7 +144,9 @@ def find_rivals(
     library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
+    reference = predictions
+    if reference is None:
+        reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
     candidates: dict[frozenset[str], Rival] = {}
     for twin in find_twins(library, chosen, model.law):
         if not _concerns_shear(twin, len(chosen.coefficients)):

@@ -103,7 +103,7 @@ def compare(
     if chosen is not None:
         library = study_library(study)
         met = chosen.details.get("rivals", ())
-        rivals = find_rivals(chosen.terms, met, model, flows, library)
+        rivals = find_rivals(chosen.terms, met, model, flows, library, chosen.predictions)
         structure = structure_of(
             chosen.terms, data.fit.runs, library, model, options.use_normal_stresses
         )

@@ -8,19 +8,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
 from discover.equations.equation import mean_relaxation_time as mean_of_modes
-from discover.identify.physics_flows import Trajectories, cycles, trajectories
+from discover.identify.physics_flows import Cycles, Trajectories, cycles, trajectories
 from discover.identify.steady_states import (
     is_stable,
     is_steady,
     steady_shear,
     steady_uniaxial_extension,
 )
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.notebook_view import NotebookView, table_of
 from discover.protocols.shear import ShearProtocol
@@ -40,6 +42,8 @@ EXTENSION_RATES = np.geomspace(0.02, 20.0, 241)
 
 _REFINED = 61
 _BOX_FACTORS = (1.0, 1.5, 2.0, 3.0, 5.0)
+_DEBORAH_FACTORS = (0.5, 1.0, 2.0)
+_PER_RATE = len(_DEBORAH_FACTORS)
 
 
 @dataclass(frozen=True)
@@ -141,15 +145,20 @@ def check_physics(
         the box beyond which the law extrapolates.
     """
     along = trajectories(fluid, protocols, grids)
+    beyond = cycles(
+        fluid,
+        [weissenberg * factor for factor in _BOX_FACTORS],
+        [deborah * factor for factor in _DEBORAH_FACTORS],
+    )
     return PhysicsReport(
         (
             _conformation(along, names),
             _free_energy(along, names),
-            _work(fluid, weissenberg, deborah),
+            _work(beyond),
             _flow_curve(fluid, weissenberg),
             _extension(fluid),
             _small_strain(fluid),
-            _reach(fluid, weissenberg, deborah),
+            _reach(beyond, weissenberg, deborah),
         )
     )
 
@@ -198,14 +207,14 @@ def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
     )
 
 
-def _work(fluid: Fluid, weissenberg: float, deborah: float) -> PhysicsCheck:
+def _work(beyond: Cycles) -> PhysicsCheck:
     name = "work over a cycle non-negative"
-    grid = cycles(fluid, [weissenberg], [0.5 * deborah, deborah, 2.0 * deborah])
-    usable = [(i, w) for i, w in enumerate(grid.work) if np.isfinite(w)]
+    # at the Weissenberg number of training, which is the first
+    usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
     if not usable:
         return PhysicsCheck(name, None, None, "", "The law runs away in the oscillations tried.")
     run, value = min(usable, key=lambda pair: pair[1])
-    where = grid.names[run]
+    where = beyond.names[run]
     return PhysicsCheck(
         name,
         bool(value >= -_ROUNDING),
@@ -291,12 +300,18 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     return rates.size if good.all() else int(np.argmin(good))
 
 
+@eqx.filter_jit
+def _linearised_at_rest(law: AbstractConstitutiveLaw):
+    """Return dσ/dt at rest, and its derivatives with respect to stress and to shear rate."""
+    rest, still = jnp.zeros(4), jnp.asarray(0.0)
+    by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
+    return law.stress_rate(rest, still), by_stress, by_rate
+
+
 def _small_strain(fluid: Fluid) -> PhysicsCheck:
     name = "small-strain limit"
-    rest, still = jnp.zeros(4), jnp.asarray(0.0)
-    relaxation = np.asarray(jax.jacfwd(fluid.law.stress_rate)(rest, still))
-    source = np.asarray(jax.jacfwd(fluid.law.stress_rate, argnums=1)(rest, still))
-    offset = float(np.max(np.abs(np.asarray(fluid.law.stress_rate(rest, still)))))
+    drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(fluid.law))
+    offset = float(np.max(np.abs(drift)))
     frequency = np.geomspace(0.01, 100.0, 41)
     response = np.array(
         [
@@ -317,21 +332,18 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     return PhysicsCheck(name, passed, value, "at rest", text + ".")
 
 
-def _reach(fluid: Fluid, weissenberg: float, deborah: float) -> PhysicsCheck:
+def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
     name = "integrates beyond training"
-    grid = cycles(
-        fluid, [weissenberg * f for f in _BOX_FACTORS], [deborah * f for f in (0.5, 1.0, 2.0)]
-    )
-    finite = np.isfinite(grid.work).reshape(len(_BOX_FACTORS), 3)
+    finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)
     reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
-    box = f"De from {0.5 * deborah:.3g} to {2.0 * deborah:.3g}"
+    box = f"De from {_DEBORAH_FACTORS[0] * deborah:.3g} to {_DEBORAH_FACTORS[-1] * deborah:.3g}"
     if reached == len(_BOX_FACTORS):
         limit = weissenberg * _BOX_FACTORS[-1]
         where = f"Wi up to {limit:.3g}, {box}"
         text = f"Oscillations stay finite in the whole grid tried, {where}."
         return PhysicsCheck(name, True, limit, where, text)
-    failed = [grid.names[3 * i + j] for i, j in np.argwhere(~finite)]
+    failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
         f"Oscillations stay finite up to Wi = {limit:.3g} for {box}; the stress runs away first in "

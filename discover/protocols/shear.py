@@ -169,14 +169,26 @@ def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
     c = max(p.amplitudes.shape[0] for p in protocols)
 
     def padded(p: ShearProtocol) -> ShearProtocol:
-        rows = m - p.table_times.shape[0]
+        # in numpy: every operation of JAX's outside a program is a program of its own to compile
+        times, rates = np.asarray(p.table_times), np.asarray(p.table_rates)
+        rows = m - times.size
         waves = (0, c - p.amplitudes.shape[0])
-        return ShearProtocol(
-            jnp.concatenate([p.table_times, p.table_times[-1] + 1.0 + jnp.arange(rows)]),
-            jnp.concatenate([p.table_rates, jnp.repeat(p.table_rates[-1:], rows)]),
-            jnp.pad(p.amplitudes, waves),
-            jnp.pad(p.frequencies, waves),
-            jnp.pad(p.phases, waves),
+        parts = (
+            np.concatenate([times, times[-1] + 1.0 + np.arange(rows)]),
+            np.pad(rates, (0, rows), mode="edge"),
+            *(np.pad(np.asarray(v), waves) for v in (p.amplitudes, p.frequencies, p.phases)),
         )
+        return ShearProtocol(*map(jnp.asarray, parts))
 
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *[padded(p) for p in protocols])
+    stacked = [padded(p) for p in protocols]
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
+
+
+def shear_rates(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return γ̇ in 1/s at many times in s, shape (n,)."""
+    return np.asarray(_shear_rates(protocol, jnp.asarray(times)))
+
+
+@eqx.filter_jit
+def _shear_rates(protocol: ShearProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
+    return jax.vmap(protocol.shear_rate)(times)

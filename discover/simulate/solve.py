@@ -18,6 +18,9 @@ from discover.simulate.grid import IntegrationGrid
 
 MAX_STEPS = 100_000
 
+_BUCKET = 401
+"""Flows with up to so many samples share one program."""
+
 
 class SimulationError(RuntimeError):
     """The law could not be integrated through the flow: its stress runs away or is too stiff."""
@@ -131,19 +134,25 @@ def simulate(
     solution = _solve_adaptively(
         fluid,
         protocol,
-        jnp.asarray(times),
+        jnp.asarray(_padded(times)),
         jnp.asarray(jumps) if jumps.size else None,
         solver,
         rtol,
         atol,
     )
-    components = np.asarray(solution.ys)
+    components = np.asarray(solution.ys)[: times.size]
     if solution.result != diffrax.RESULTS.successful or not np.all(np.isfinite(components)):
         raise SimulationError(
             f"The law could not be integrated to t = {end:g}: its stress runs away, or it needs "
             f"more than {MAX_STEPS} steps. Check its parameters and the shear rate."
         )
     return ShearStress(times, components)
+
+
+def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+    """Return the times with a few more just after the end."""
+    step = 1e-6 * max(float(times[-1]), 1e-12)
+    return np.concatenate([times, times[-1] + step * np.arange(1, -times.size % _BUCKET + 1)])
 
 
 def solve_on_grid(

@@ -10,7 +10,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.shear import ShearProtocol, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 
 
@@ -84,7 +84,7 @@ def synthetic_dataset(
                 name=name,
                 time=times,
                 protocol=flow,
-                shear_rate=_rates(flow, times),
+                shear_rate=shear_rates(flow, times),
                 shear_stress=stress.shear_stress + scale * generator.standard_normal(n_samples),
             )
         )
@@ -95,10 +95,3 @@ def synthetic_dataset(
         truth=fluid,
         exact=exact,
     )
-
-
-def _rates(flow: ShearProtocol, times: np.ndarray) -> np.ndarray:
-    import jax
-    import jax.numpy as jnp
-
-    return np.asarray(jax.vmap(flow.shear_rate)(jnp.asarray(times)))

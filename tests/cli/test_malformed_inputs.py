@@ -95,7 +95,7 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
 
 
 def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
-    malformed_inputs._complete_results(tmp_path)
+    malformed_cases.complete_results(tmp_path)
     again = ["close-loop", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--json"]
     assert malformed_inputs.run(again).code == 0
     (tmp_path / "out" / "loop.json").write_bytes(b"\x90")
@@ -116,7 +116,7 @@ def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
     mine, other = tmp_path / "mine", tmp_path / "other"
     for folder in (mine, other):
         folder.mkdir()
-        malformed_inputs._write(folder, malformed_inputs.FOLDER)
+        malformed_cases.write_files(folder, malformed_cases.FOLDER)
     for path, told in ((".", False), ("../other", True), (str(other), True)):
         (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
         outcome = malformed_inputs.run(
@@ -136,7 +136,7 @@ def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
         'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
     ):
         synthetic = "sweep" in section
-        malformed_inputs._write(tmp_path, malformed_inputs.FOLDER)
+        malformed_cases.write_files(tmp_path, malformed_cases.FOLDER)
         data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
         (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
         outcome = malformed_inputs.run(

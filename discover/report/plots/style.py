@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import matplotlib as mpl
 import numpy as np
 from jaxtyping import Float
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
@@ -173,7 +174,9 @@ def literal(text: str) -> str:
 def picture(drawing: Figure, name: str, caption: str) -> Picture:
     """Return the figure as SVG, the same bytes every time."""
     buffer = io.StringIO()
-    drawing.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    # as savefig does, which draws once more before, to no effect on these figures
+    canvas = FigureCanvasSVG(drawing)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
     return Picture(name, caption, buffer.getvalue())
 
 
