@@ -27,6 +27,7 @@ from discover.closed_loop.result import LoopResult, Stage, StageParameter
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
+from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.effects import (
     AbstractEffect,
@@ -204,6 +205,13 @@ def _split(dataset, fit, held_out, strain, most):
     )
     if len(fitted) == 0:
         raise InputError("No run is left to fit. Take some out of held_out.")
+    for run in held.runs:
+        copied = next((other.name for other in fitted.runs if same_samples(run, other)), None)
+        if copied is not None:
+            raise InputError(
+                f"The held-out run {run.name!r} holds the same samples as the fitted run "
+                f"{copied!r}, so it proves nothing. Hold out another, or none."
+            )
     if most < FEWEST_LINEAR_SAMPLES:
         raise InputError(
             f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "

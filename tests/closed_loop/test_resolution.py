@@ -10,6 +10,7 @@ from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.resolution import COMPUTED, Resolution, rounding
 from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
+from discover.errors import InputError
 from discover.protocols import measured_rate, oscillatory_shear, start_up
 
 TIMES = np.linspace(0.1, 10.0, 100)
@@ -101,6 +102,12 @@ def test_units_decide_nothing(stress, time):
     assert result.verdict == "effects_added"
     assert [stage.effect for stage in result.stages] == ["stress_offset"]
     assert result.stages[0].parameters["offset"].value == pytest.approx(3.0 * stress, rel=3e-3)
+
+
+def test_a_copy_of_a_fitted_run_is_not_held_out():
+    runs = maxwell_runs()
+    with pytest.raises(InputError, match="same samples as the fitted run 'wave'"):
+        loop([*runs[:2], replace(runs[1], name="held")])
 
 
 def test_every_candidate_may_be_in_the_model():
