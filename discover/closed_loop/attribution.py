@@ -99,6 +99,8 @@ def attribute(
         Which effects are candidates.
     """
     waiting = [e for e in model.effects if e.name not in active and admitted(e)]
+    if not waiting:
+        return Attribution([], [])
     trials = [(effect, base) for effect in waiting for base in _bases(model, fit, effect)]
     owners, bases = [effect for effect, _ in trials], [base for _, base in trials]
     at = [model.slices[effect.name].start for effect in owners]

@@ -16,7 +16,7 @@ from discover.closed_loop.least_squares import (
     fit_batch,
     left_out_errors,
 )
-from discover.closed_loop.residual import summarise
+from discover.closed_loop.residual import judging, summarise
 from discover.closed_loop.run_batch import RunBatch
 from discover.statistics import least_squares_covariance
 
@@ -37,6 +37,9 @@ RANKING = 1e-3
 """A refit that ranks ends when a step lowers its cost by less than this fraction, which moves no
 criterion by one."""
 
+
+FEWEST_SAMPLES = 5
+"""Samples beyond the constants to be fitted, below which any law fits."""
 
 _RESTARTED = 3
 
@@ -59,7 +62,12 @@ class Choice:
 
 
 def evidence(
-    before: Fit, after: Fit, effective_samples: float, n_candidates: int, n_effects: int = 1
+    before: Fit,
+    after: Fit,
+    weight: Float[np.ndarray, "runs n"],
+    effective_samples: float,
+    n_candidates: int,
+    n_effects: int = 1,
 ) -> float:
     """Return by how much adding parameters lowers the information criterion.
 
@@ -71,6 +79,8 @@ def evidence(
     ----------
     before, after
         Fits without and with the effect.
+    weight
+        Weights of the runs; those that do not judge (`judging`) are fitted, but give no evidence.
     effective_samples
         One number for all candidates that are compared: counted on each one's own residual, the
         worst fit with the whitest residual could win.
@@ -80,9 +90,11 @@ def evidence(
         How many were chosen among them.
     """
     added = len(after.free) - len(before.free)
-    if after.cost <= 0.0:
-        return float("inf") if before.cost > 0.0 else -float("inf")
-    gain = effective_samples * np.log(before.cost / after.cost)
+    rows = judging(weight)
+    cost, lowered = (float(np.sum(fit.residual[rows] ** 2)) for fit in (before, after))
+    if lowered <= 0.0:
+        return float("inf") if cost > 0.0 else -float("inf")
+    gain = effective_samples * np.log(cost / lowered) if cost > 0.0 else -np.inf
     price = added * np.log(max(effective_samples, 2.0)) + 2.0 * n_effects * np.log(
         max(n_candidates, 1)
     )
@@ -123,13 +135,14 @@ def refit(
     best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
     effective = summarise(best.residual, weight).effective_samples
     choices = []
+    samples = np.count_nonzero(weight)
     for candidate, trial in zip(leaders, fits, strict=True):
-        if not trial.usable:
+        if not trial.usable or samples < len(trial.free) + FEWEST_SAMPLES:
             continue
         left_out = left_out_errors(model, batch, trial, prior)
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
-        candidate.evidence = evidence(fit, trial, effective, n_candidates)
+        candidate.evidence = evidence(fit, trial, weight, effective, n_candidates)
         choices.append(Choice(candidate, trial, left_out))
     return choices
 
@@ -235,27 +248,83 @@ def prune(
     The fit and the effects that stay.
     """
     active = list(active)
-    weight = np.asarray(batch.weight)
     while optional := [name for name in active[:-1] if name not in settled]:
-        starts, free = [], []
-        for name in optional:
-            at = model.positions(name)
-            theta = fit.theta.copy()
-            theta[at] = model.zero()[at]
-            starts.append(theta)
-            free.append(tuple(p for p in fit.free if p not in at))
-        fits = fit_batch(model, batch, starts, free, prior=prior)
-        effective = summarise(fit.residual, weight).effective_samples
-        support = [
-            evidence(trial, fit, effective, n_candidates) if trial.usable else np.inf
-            for trial in fits
-        ]
-        weakest = int(np.argmin(support))
-        if support[weakest] > 0.0:
+        support, name, without = _weakest(model, batch, fit, optional, n_candidates, prior)
+        if support > 0.0:
             break
-        fit = fits[weakest]
-        active.remove(optional[weakest])
+        fit = without
+        active.remove(name)
     return fit, active
+
+
+def drop_undecided(
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    active: Sequence[str],
+    n_candidates: int,
+    settled: Sequence[str] = (),
+    prior: Prior = NO_PRIOR,
+) -> tuple[Fit, list[str]]:
+    """Drop effects whose amplitude may be zero, one after another, the weakest first.
+
+    That is, zero lies in its 95 % interval, and the evidence of a fit with it over one without is
+    not strong (`INDISTINGUISHABLE`): where it is strong, something is missing without the effect,
+    and the interval, which is linear in the parameters, only shows how badly its size is known.
+
+    Parameters
+    ----------
+    model, batch, fit, active, n_candidates, settled, prior
+        As in `prune`, but that the last effect may be dropped too.
+
+    Returns
+    -------
+    The fit and the effects that stay.
+    """
+    active = list(active)
+    while active:
+        bounds = intervals(model, batch, fit)
+        amplitudes = {name: bounds[model.positions(name)[0]] for name in active}
+        optional = [
+            name
+            for name, (low, high) in amplitudes.items()
+            if low <= 0.0 <= high and name not in settled
+        ]
+        if not optional:
+            break
+        support, name, without = _weakest(model, batch, fit, optional, n_candidates, prior)
+        if support >= INDISTINGUISHABLE:
+            break
+        fit = without
+        active.remove(name)
+    return fit, active
+
+
+def _weakest(
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    optional: Sequence[str],
+    n_candidates: int,
+    prior: Prior,
+) -> tuple[float, str, Fit]:
+    """Return the least evidence for one of several effects, its name, and the fit without it."""
+    starts, free = [], []
+    for name in optional:
+        at = model.positions(name)
+        theta = fit.theta.copy()
+        theta[at] = model.zero()[at]
+        starts.append(theta)
+        free.append(tuple(p for p in fit.free if p not in at))
+    fits = fit_batch(model, batch, starts, free, prior=prior)
+    weight = np.asarray(batch.weight)
+    effective = summarise(fit.residual, weight).effective_samples
+    support = [
+        evidence(trial, fit, weight, effective, n_candidates) if trial.usable else np.inf
+        for trial in fits
+    ]
+    weakest = int(np.argmin(support))
+    return float(support[weakest]), optional[weakest], fits[weakest]
 
 
 def intervals(model: AugmentedModel, batch: RunBatch, fit: Fit) -> dict[int, tuple[float, float]]:

@@ -1,17 +1,23 @@
-"""What an element in series with the fluid would be on finer steps."""
+"""What finer steps would change: in a prediction, and in the parameters of a fit."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import PchipInterpolator
 
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
 from discover.effects import SeriesElement
+from discover.errors import InputError
+from discover.protocols import measured_rate
 
 _STRAIN_STEP = 0.05
+_BETWEEN = 4  # points of a smooth rate for each sample of it
+_FEWEST_KNOTS = 4
 
 
 def on_finer_steps(
@@ -39,17 +45,64 @@ def on_finer_steps(
     effects = [effect for effect in model.effects if effect.name in active]
     if not any(isinstance(effect, SeriesElement) for effect in effects):
         return fit
-    # without the candidates that were not chosen there is little to compile
-    small = AugmentedModel(model.declared, effects)
-    theta = small.zero()
-    shared = 2 + len(model.declared.free_parameters)
-    theta[:shared] = fit.theta[:shared]
-    for effect in effects:
-        theta[small.positions(effect.name)] = fit.theta[model.positions(effect.name)]
-    coarse = small.residuals([theta], batch)[0]
-    fine = small.residuals([theta], make_batch(runs, strain_step=_STRAIN_STEP))[0]
+    change = change_on_finer_steps(model, batch, runs, fit.theta, active)
     design = fit.jacobian.reshape(len(fit.free), -1).T
-    step = np.linalg.lstsq(design, (coarse - fine).ravel(), rcond=None)[0]
+    step = np.linalg.lstsq(design, -change.ravel(), rcond=None)[0]
     moved, at = fit.theta.copy(), list(fit.free)
     moved[at] = np.clip(moved[at] + step, model.low[at], model.high[at])
     return replace(fit, theta=moved) if np.all(np.isfinite(moved)) else fit
+
+
+def change_on_finer_steps(
+    model: AugmentedModel,
+    batch: RunBatch,
+    runs: Sequence[ShearRun],
+    theta: np.ndarray,
+    active: Sequence[str],
+    smooth_rates: bool = False,
+) -> Float[np.ndarray, "runs n"]:
+    """Return how weighted residuals would change on steps a fifth as long.
+
+    Parameters
+    ----------
+    model, batch, runs
+        The model, and the runs as a batch and as they are.
+    theta, active
+        Parameters, and the effects among them that are in the model.
+    smooth_rates
+        Whether a rate that was read in samples is a smooth curve through them on the finer steps,
+        monotonic between samples, and not straight lines   [Fritsch & Carlson 1980, SIAM J. Numer.
+        Anal. 17, 238]: what that changes is what nobody knows of the rate.
+
+    Returns
+    -------
+    Zero where finer steps would be too many, or would not stay finite.
+    """
+    # without the candidates that were not chosen there is little to compile
+    effects = [effect for effect in model.effects if effect.name in active]
+    small = AugmentedModel(model.declared, effects)
+    values = small.zero()
+    shared = 2 + len(model.declared.free_parameters)
+    values[:shared] = theta[:shared]
+    for effect in effects:
+        values[small.positions(effect.name)] = theta[model.positions(effect.name)]
+    finer = [_with_smooth_rate(run) for run in runs] if smooth_rates else runs
+    try:
+        fine_batch = make_batch(finer, strain_step=_STRAIN_STEP)
+    except InputError:
+        return np.zeros(np.shape(batch.stress))
+    change = small.residuals([values], fine_batch)[0] - small.residuals([values], batch)[0]
+    return change if np.all(np.isfinite(change)) else np.zeros_like(change)
+
+
+def _with_smooth_rate(run: ShearRun) -> ShearRun:
+    """Return a run whose rate, where it was read in samples, is a smooth curve through them."""
+    knots = np.asarray(run.protocol.table_times)
+    if len(knots) < _FEWEST_KNOTS or np.any(np.diff(knots) <= 0.0):
+        return run  # commanded: constant, a wave, or steps
+    rates = np.asarray(run.protocol.table_rates)
+    dense = np.interp(
+        np.arange(_BETWEEN * (len(knots) - 1) + 1) / _BETWEEN, np.arange(len(knots)), knots
+    )
+    smooth = np.asarray(PchipInterpolator(knots, rates)(dense))
+    return replace(run, protocol=measured_rate(dense, smooth))

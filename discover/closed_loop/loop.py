@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augment import intervals
+from discover.closed_loop.augment import FEWEST_SAMPLES, intervals
 from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.before_after import (
@@ -17,13 +17,17 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
+from discover.closed_loop.judgement import HeldOut, judge
 from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import STRUCTURE, Expectation, fast_part, summarise
-from discover.closed_loop.result import ErrorPair, LoopResult, Stage, StageParameter, Verdict
+from discover.closed_loop.leftover import Leftover
+from discover.closed_loop.residual import Expectation, fast_part, summarise
+from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.result import LoopResult, Stage, StageParameter
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.dataset import ShearDataset, ShearRun
+from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.effects import (
     AbstractEffect,
@@ -51,17 +55,6 @@ more of them say little more of a law."""
 _FEWEST_KEPT = 150
 _RESOLVED = 1e-3
 """Relative error that the noise of as many samples as are used may leave."""
-
-ONLY_NOISE = 0.9
-"""A model that misses a record by more of it than this says nothing of it."""
-
-CARRIED = 3.0
-"""A model that misses the held-out runs by more than so many times what it misses the fitted ones
-does not carry over to them. The fitted error is an optimistic guess of the other, by the freedom of
-a few constants; three times leaves room for that, and for flows that weigh them otherwise."""
-
-FEWEST_SAMPLES = 5
-"""Samples beyond the constants to be fitted, below which any law fits."""
 
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
@@ -137,14 +130,16 @@ def run_loop(
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    expectation = Expectation(noise, declared.linear_error)
+    leftover = Leftover(
+        Expectation(noise, declared.linear_error), Resolution(model, batch, fitted_runs)
+    )
     search = Search(
         model,
         batch,
         held_batch,
         len(candidates),
         _admission(fitted_runs, held_runs),
-        expectation,
+        leftover,
         Keeper(store, name),
     )
     if search.resume():
@@ -167,32 +162,30 @@ def run_loop(
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
-    weight = np.asarray(batch.weight)
-    floor = expectation.floor(current.residual, weight)
-    expected = expectation.size(current.residual, weight)
-    carries_over = after.held_out is None or after.held_out <= CARRIED * max(after.fit, expected)
-    structured = not (expectation.explains(current.residual, weight) and carries_over)
-    verdict: Verdict = "unexplained" if structured else "no_effect_needed"
-    if stages and not structured:
-        verdict = "effects_added"
-    worst = max(records, key=lambda record: record.errors[-1])
+    held = None
+    if held_batch is not None:
+        left = model.residuals([thetas[-1]], held_batch)[0]
+        held = HeldOut(left, Resolution(model, held_batch, held_runs))
+    judgement = judge(leftover, current, active, records, held)
     return LoopResult(
-        verdict=verdict,
+        verdict=judgement.verdict,
         error_before=errors_of(records, 0),
         error_after=after,
-        noise_floor=floor,
+        noise_floor=judgement.noise_floor,
         stages=stages,
         remaining={
-            "structured": structured,
+            "structured": judgement.structured,
             "error": after.fit,
-            "noise_floor": floor,
+            "noise_floor": judgement.noise_floor,
+            "resolution": judgement.resolution,
+            "noise_known": judgement.noise_known,
+            "carries_over": judgement.carries_over,
+            "not_judging": list(judgement.not_judging),
             "linear_error": declared.linear_error,
             "autocorrelation": float(np.mean(summary.autocorrelation)),
-            "worst_run": worst.name,
-            "worst_run_error": float(worst.errors[-1]),
-            "description": _describe(
-                after, expected, structured, carries_over, declared.linear_error > 0.0, worst
-            ),
+            "worst_run": judgement.worst.name,
+            "worst_run_error": float(judgement.worst.errors[-1]),
+            "description": judgement.description,
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
@@ -212,6 +205,13 @@ def _split(dataset, fit, held_out, strain, most):
     )
     if len(fitted) == 0:
         raise InputError("No run is left to fit. Take some out of held_out.")
+    for run in held.runs:
+        copied = next((other.name for other in fitted.runs if same_samples(run, other)), None)
+        if copied is not None:
+            raise InputError(
+                f"The held-out run {run.name!r} holds the same samples as the fitted run "
+                f"{copied!r}, so it proves nothing. Hold out another, or none."
+            )
     if most < FEWEST_LINEAR_SAMPLES:
         raise InputError(
             f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "
@@ -298,7 +298,7 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
     if len(small) < 2 or max_effects == 0:
         return
     linear = search.restricted(
-        make_batch(small), lambda effect: effect.kind != "constitutive", "at_small_strain"
+        small, lambda effect: effect.kind != "constitutive", "at_small_strain"
     )
     if not linear.resume():
         linear.start()
@@ -380,35 +380,3 @@ def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | No
         np.append(relaxation_time, [float(pair[1]) for pair in modes]),
         viscosity,
     )
-
-
-def _describe(
-    after: ErrorPair, expected: float, structured: bool, carries_over: bool, linear: bool, worst
-) -> str:
-    error = after.fit
-    causes = "noise and the error of the linear data explain" if linear else "noise explains"
-    missed, explained = f"The fitted runs are missed by {_percent(error)}", _percent(expected)
-    if not structured and error > ONLY_NOISE:
-        return f"{missed}, and {causes} that: the records hold hardly anything else."
-    if not structured:
-        return f"{missed}, as {causes} ({explained})."
-    if not carries_over:
-        assert after.held_out is not None  # without held-out runs nothing has to carry over
-        return (
-            f"{missed} ({explained} of it is what {causes}), but the runs held out by "
-            f"{_percent(after.held_out)}: what was found does not carry over to them, most of all "
-            f"not to {worst.name}. Some effect is still missing, or has another form."
-        )
-    if error > STRUCTURE * expected:
-        return (
-            f"{missed}, more than {causes} ({explained}); the worst run is {worst.name}. Some "
-            "effect is still missing."
-        )
-    return (
-        f"{missed}, hardly more than {causes} ({explained}), but what is left has a pattern that "
-        f"noise has not; the worst run is {worst.name}. Some effect is still missing."
-    )
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

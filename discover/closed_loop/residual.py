@@ -4,13 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
 from discover.statistics import independent_samples
 
 LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
+
+FEWEST_TESTED = 2 * LAGS
+"""Samples of a run from which on that is done."""
+
+FEWEST_FAST = 7
+"""Samples of a run from which on its noise can be told by third differences."""
 
 SIGNIFICANCE = 1e-3
 """Noise is taken for structure this often."""
@@ -78,9 +84,9 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
     Parameters
     ----------
     values
-        In order; of fewer than 7 nothing is said.
+        In order; of fewer than `FEWEST_FAST` nothing is said.
     """
-    if len(values) < 7:
+    if len(values) < FEWEST_FAST:
         return 0.0
     # the coefficients 1, 3, 3, 1 have a sum of squares of 20
     return float(1.4826 * np.median(np.abs(np.diff(values, 3))) / np.sqrt(20.0))
@@ -93,11 +99,38 @@ def noise_floor(
 
     Where the residual is noise, white or of first order, that is its size. Where it holds
     structure, it is the part of it that changes from sample to sample, see `summarise`; noise
-    that is correlated itself is then underestimated.
+    that is correlated itself is then underestimated. Runs too short to be tested are taken to be
+    as noisy as the tested ones, or as what changes in them from sample to sample if that is more:
+    their size is no sign of noise. Those that do not judge (`judging`) do not count.
     """
-    if is_noise(residual, weight):
-        return float(np.mean(np.sqrt(np.sum(np.asarray(residual) ** 2, axis=1))))
-    return summarise(residual, weight).noise_floor
+    rows = judging(weight)
+    residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
+    fast = summarise(residual, weight).noise
+    if not is_noise(residual, weight):
+        return float(np.mean(fast))
+    sizes = np.sqrt(np.sum(residual**2, axis=1))
+    samples = np.count_nonzero(weight > 0, axis=1)
+    tested = samples >= FEWEST_TESTED
+    if np.any(tested):
+        sizes = np.where(tested, sizes, np.maximum(fast, np.mean(sizes[tested])))
+    elif np.all(samples >= FEWEST_FAST):
+        sizes = fast
+    return float(np.mean(sizes))
+
+
+def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
+    """Return which runs judge a model: those long enough to say how noisy they are.
+
+    A run counts as much as any other, however few its samples, so that one bad sample could decide
+    alone. Where no run is long enough, all judge; see `tells_noise`.
+    """
+    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST
+    return told if np.any(told) else np.ones_like(told)
+
+
+def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
+    """Return whether any run is long enough to say how noisy it is."""
+    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST))
 
 
 def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]) -> bool:
@@ -127,7 +160,9 @@ def noise_probability(
         As in `summarise`.
     """
     rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
-    rows = [row / np.sqrt(np.mean(row**2)) for row in rows if len(row) >= 2 * LAGS and np.any(row)]
+    rows = [
+        row / np.sqrt(np.mean(row**2)) for row in rows if len(row) >= FEWEST_TESTED and np.any(row)
+    ]
     if not rows:
         return None
     # noise of one instrument has one correlation
@@ -179,7 +214,8 @@ class Expectation:
 
     def explains(self, residual: Float[np.ndarray, "runs n"], weight) -> bool:
         """Return whether noise and the error of the linear data explain a residual."""
-        error = float(np.mean(np.sqrt(np.sum(np.asarray(residual) ** 2, axis=1))))
+        rows = judging(weight)
+        error = float(np.mean(np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))))
         if error > STRUCTURE * self.size(residual, weight):
             return False
         # without an error of the linear data to allow for, what is left must look like noise

@@ -10,6 +10,7 @@ from discover.closed_loop.augment import (
     IMPROVEMENT,
     aliases_of,
     choose,
+    drop_undecided,
     evidence,
     intervals,
     prune,
@@ -26,13 +27,11 @@ from discover.closed_loop.least_squares import (
     jacobians,
     left_out_errors,
 )
-from discover.closed_loop.residual import (
-    SIGNIFICANCE,
-    Expectation,
-    noise_probability,
-    summarise,
-)
-from discover.closed_loop.run_batch import RunBatch
+from discover.closed_loop.leftover import Leftover
+from discover.closed_loop.residual import summarise
+from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.run_batch import RunBatch, make_batch
+from discover.dataset import ShearRun
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 
@@ -63,7 +62,7 @@ class Search:
         Number of candidates, the price of choosing among which every effect must pay.
     admitted
         Which effects are candidates.
-    expectation
+    leftover
         What a complete model may leave of the data.
     keeper
         Keeps the search after each stage; by default nothing is kept.
@@ -97,14 +96,14 @@ class Search:
         held_batch: RunBatch | None,
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
-        expectation: Expectation | None = None,
+        leftover: Leftover,
         keeper: Keeper | None = None,
     ):
         self.keeper = keeper or Keeper(None, "")
         self.rounds = 0
         self.model, self.batch, self.held_batch = model, batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
-        self.expectation = expectation or Expectation()
+        self.leftover = leftover
         self.active: list[str] = []
         self.settled: tuple[str, ...] = ()
         self.rankings: list[tuple[CandidateScore, ...]] = []
@@ -140,15 +139,21 @@ class Search:
     @property
     def explained(self) -> bool:
         """Whether what is left is what a complete model may leave."""
-        return self.expectation.explains(self.fit.residual, np.asarray(self.batch.weight))
+        return self.leftover.explained(self.fit, self.active)
 
     def restricted(
-        self, batch: RunBatch, admitted: Callable[[AbstractEffect], bool], name: str
+        self, runs: Sequence[ShearRun], admitted: Callable[[AbstractEffect], bool], name: str
     ) -> "Search":
         """Return a new search on other samples among fewer candidates, kept under its own name."""
-        keeper = Keeper(self.keeper.store, f"{self.keeper.name}_{name}")
+        batch = make_batch(runs)
         return Search(
-            self.model, batch, None, self.n_candidates, admitted, self.expectation, keeper
+            self.model,
+            batch,
+            None,
+            self.n_candidates,
+            admitted,
+            self.leftover.on(Resolution(self.model, batch, runs)),
+            Keeper(self.keeper.store, f"{self.keeper.name}_{name}"),
         )
 
     def resume(self) -> bool:
@@ -199,6 +204,23 @@ class Search:
                 break
             say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
             self.keeper.save(self)
+        dropped = self._drop_undecided()
+        if dropped:
+            # not kept: a search that goes on from before drops the same again
+            say(f"dropped, as zero is in the interval: {', '.join(dropped)}")
+
+    def _drop_undecided(self) -> list[str]:
+        """Take out effects of which the whole leaves open whether they are there; name them."""
+        fit, kept = drop_undecided(
+            self.model, self.batch, self.fit, self.active, self.n_candidates, self.settled,
+            self.prior,
+        )  # fmt: skip
+        dropped = [name for name in self.active if name not in kept]
+        if dropped:
+            self.fit, self.active = fit, kept
+            self._fit_path()
+            self._leave_out()
+        return dropped
 
     def look_ahead(self, max_effects: int) -> str | None:
         """Add several effects at once that only together earn their places; return their names.
@@ -219,8 +241,9 @@ class Search:
             fit = best.fit
             kept.append(best.candidate.effect)
             added = len(kept) - len(active)
-            effective = summarise(fit.residual, np.asarray(self.batch.weight)).effective_samples
-            support = evidence(before, fit, effective, self.n_candidates, added)
+            weight = np.asarray(self.batch.weight)
+            effective = summarise(fit.residual, weight).effective_samples
+            support = evidence(before, fit, weight, effective, self.n_candidates, added)
             errors = left_out_errors(self.model, self.batch, fit, self.prior)
             if added < 2 or support <= BARE_MENTION or np.mean(errors) >= IMPROVEMENT * left_out:
                 continue
@@ -282,7 +305,7 @@ class Search:
         best = simplest(able, self.model)
         if (best.candidate.evidence or 0.0) < (current.evidence or 0.0):
             best = own_choice
-        explained = self.expectation.explains(best.fit.residual, np.asarray(self.batch.weight))
+        explained = self.leftover.explained(best.fit, [*others, best.candidate.effect])
         gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
         if name in self.settled and not (explained and gain > self.support[name]):
             return False
@@ -329,9 +352,7 @@ class Search:
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         # what cannot be told from noise gives no reason to add anything
-        probability = noise_probability(self.fit.residual, np.asarray(self.batch.weight))
-        noise = probability is not None and probability > SIGNIFICANCE
-        if chosen is None or noise:
+        if chosen is None or self.leftover.random(self.fit, self.active):
             return None
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from discover.dataset import units
+from discover.dataset.check_among import doubts_among_runs
 from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
 from discover.dataset.check_run import doubts_of_run
 from discover.dataset.finding import Finding
@@ -20,7 +21,7 @@ from discover.dataset.load import (
     read_run,
     resolve_folder,
 )
-from discover.dataset.run import LinearSweep, ShearRun, require_signal
+from discover.dataset.run import LinearSweep, ShearRun, require_signal, same_samples
 from discover.dataset.table import Table, read_table
 from discover.errors import InputError
 
@@ -75,6 +76,7 @@ def check_folder(
     sweep, spectrum, said = _sweep(root)
     findings += said
     findings += against_linear_theory(runs, sweep, spectrum)
+    findings += doubts_among_runs(runs)
     findings += _folder(root, index, runs)
     rank = {"error": 0, "warning": 1, "note": 2}
     return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
@@ -174,18 +176,16 @@ def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]
             yield Finding(
                 "note", "runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used."
             )
-    seen: dict[tuple[bytes, bytes], str] = {}
-    for run in runs:
-        key = (run.time.tobytes(), run.shear_stress.tobytes())
-        if key in seen:
+    for at, run in enumerate(runs):
+        first = next((other.name for other in runs[:at] if same_samples(run, other)), None)
+        if first is not None:
             yield Finding(
                 "warning",
                 "runs",
                 run.name,
-                f"{run.name} holds the same samples as {seen[key]}. Held out, a copy of a fitted "
+                f"{run.name} holds the same samples as {first}. Held out, a copy of a fitted "
                 "run proves nothing: remove one.",
             )
-        seen.setdefault(key, run.name)
     try:
         require_signal(runs)
     except InputError as error:

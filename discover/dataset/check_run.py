@@ -19,6 +19,7 @@ _SPIKE_SHARE = 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
+_RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 
 # Elastic limit: N1 = σ12 γ where all modes are still elastic, less later. Beyond this factor of it,
 # or below zero by as much, the transducer speaks, not the fluid
@@ -145,7 +146,15 @@ def _strain(run: ShearRun) -> Iterator[Finding]:
     measured = run.strain - run.strain[0]
     size = np.max(np.abs(expected))
     off = float(np.max(np.abs(measured - expected)) / size) if size > 0 else 0.0
-    if off > 0.1:
+    if off > 0.1 and np.max(np.abs(measured + expected)) < 0.1 * size:
+        yield Finding(
+            "warning",
+            "strain",
+            run.name,
+            f"The strain in {run.name} runs against its shear rate: one of the two has the wrong "
+            "sign. If it is the rate, the stress has it too.",
+        )
+    elif off > 0.1:
         yield Finding(
             "warning",
             "strain",
@@ -187,6 +196,8 @@ def _cycles(run: ShearRun) -> Iterator[Finding]:
     turns = int(np.sum(np.diff(np.sign(run.shear_rate[run.shear_rate != 0])) != 0))
     if turns < 2:
         return
+    if run.rate_before == 0.0:
+        yield from _work(run)
     per_cycle = 2.0 * len(run) / turns
     if per_cycle < _FEWEST_PER_CYCLE:
         yield Finding(
@@ -196,6 +207,23 @@ def _cycles(run: ShearRun) -> Iterator[Finding]:
             f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign {turns} "
             f"times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the rate if "
             "the sign changes are noise.",
+        )
+
+
+def _work(run: ShearRun) -> Iterator[Finding]:
+    """Hold the work of an oscillation from rest against zero, below which no passive fluid goes."""
+    power = run.shear_rate * run.shear_stress
+    work = float(np.trapezoid(power, run.time))
+    size = float(np.trapezoid(np.abs(power), run.time))
+    # noise around zero sums to some 1/√n of its size
+    if work < -max(_RETURNED_WORK, 3.0 / np.sqrt(len(run))) * size:
+        yield Finding(
+            "warning",
+            "stress",
+            run.name,
+            f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
+            "exchange, and a fluid at rest before has none to return: the stress or the rate has "
+            "the wrong sign, or one lags the other.",
         )
 
 

@@ -130,6 +130,13 @@ class ShearRun:
         )
 
 
+def same_samples(one: ShearRun, other: ShearRun) -> bool:
+    """Return whether two runs hold the same times and stresses, under whatever names."""
+    return np.array_equal(one.time, other.time) and np.array_equal(
+        one.shear_stress, other.shear_stress
+    )
+
+
 def require_signal(runs: Sequence[ShearRun]) -> None:
     """Refuse runs of which none can teach a law.
 

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.loop import ONLY_NOISE
+from discover.closed_loop.judgement import ONLY_NOISE
+from discover.closed_loop.residual import FEWEST_TESTED
 from discover.closed_loop.result import LoopResult, Stage
 from discover.comparison.comparison import Comparison
 from discover.comparison.next_measurement import NextMeasurement
@@ -29,9 +30,12 @@ KINDS = {
 }
 _LOOP = {
     "effects_added": "The declared model lacked something, and adding it explains the data",
-    "no_effect_needed": "The declared model explains the data; no effect earned its place",
+    "no_effect_needed": "Nothing is missing that these data show: the declared model explains them",
     "unexplained": "What is left still has structure that no candidate explains",
 }
+_UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
+_NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
+_MOST_NAMES = 3
 
 
 def comparison_verdict(comparison: Comparison) -> list[str]:
@@ -153,32 +157,55 @@ def _loop_found(result: LoopResult) -> str:
         parts.append(f"{added}{KINDS[stage.kind]}: {spoken(stage.effect)}, {values}")
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
+        if not result.remaining.get("noise_known", True):
+            verdict = _UNKNOWN_NOISE
+        elif not result.remaining.get("carries_over", True):
+            verdict = _NOT_CARRIED
         return _sentence([*parts, verdict if not parts else verdict[:1].lower() + verdict[1:]])
     return _sentence([verdict, *parts])
 
 
 def _loop_sure(result: LoopResult) -> str:
     before, after = result.error_before, result.error_after
-    parts, falls = [], "the error falls "
-    if before.held_out is not None:
+    parts, said = [], ""
+    if before.held_out is not None and after.held_out is not None:
         unseen = "on runs that no fit saw"
         if result.folds:
             unseen = "on each run, by a search that did not see it,"
-        parts.append(
-            f"{unseen} {falls}from {percent(before.held_out)} to {percent(after.held_out)}"
-        )
-        falls = ""
-    parts.append(
-        f"on the fitted runs {falls}from {percent(before.fit)} to {percent(after.fit)}, where "
-        f"noise explains {percent(result.noise_floor)}"
-    )
+        said, sizes = _change(result, before.held_out, after.held_out)
+        parts.append(f"{unseen} the error {said} {sizes}")
+    verb, sizes = _change(result, before.fit, after.fit)
+    # a verb is said again only where it is another one
+    told = sizes if verb == said else f"the error {verb} {sizes}"
+    noise = f"where noise explains {percent(result.noise_floor)}"
+    if not result.remaining.get("noise_known", True):
+        noise = "of which nobody knows how much is noise"
+    parts.append(f"on the fitted runs {told}, {noise}")
     if before.held_out is None:
         parts.append("no run was held out to judge by")
+    if few := result.remaining.get("not_judging", ()):
+        verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
+        parts.append(f"{_several(few, 'and')} {verb}")
     for stage in result.stages:
         if stage.aliases:
-            others = " or ".join(map(spoken, stage.aliases))
+            others = _several(stage.aliases, "or")
             parts.append(f"these data cannot tell {spoken(stage.effect)} from {others}")
     return _sentence(parts)
+
+
+def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:
+    """Return what an error did, as a verb, and from where to where, as far as digits show it."""
+    if percent(before) == percent(after):
+        return "stays at" if result.stages or result.folds else "is", percent(after)
+    return "falls" if after < before else "rises", f"from {percent(before)} to {percent(after)}"
+
+
+def _several(names: Sequence[str], word: str) -> str:
+    """Return the first of several names, and how many more there are."""
+    shown = [spoken(name) for name in names[:_MOST_NAMES]]
+    if more := len(names) - len(shown):
+        shown.append(f"{more} more")
+    return f" {word} ".join(shown)
 
 
 def _loop_next(result: LoopResult) -> str:
@@ -188,17 +215,32 @@ def _loop_next(result: LoopResult) -> str:
         if not check[1:2].isdigit():  # N2 keeps its capital
             check = check[:1].lower() + check[1:]
         purpose = f"To tell {spoken(doubtful.effect)} from" if doubtful.aliases else "To confirm"
-        others = " and ".join(map(spoken, doubtful.aliases)) or spoken(doubtful.effect)
+        others = _several(doubtful.aliases or [doubtful.effect], "and")
         return f"{purpose} {others}: {check}."
+    if not result.remaining.get("noise_known", True):
+        return (
+            f"Record at least {FEWEST_TESTED} samples in each run, or repeat a run to learn its "
+            "noise and write it in the study ([loop] noise)."
+        )
     if result.verdict == "unexplained":
         return (
             "Repeat one run with another geometry or instrument: what changes is the instrument's, "
             "what stays is the fluid's."
         )
     rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
+    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
+    if result.error_after.fit > ONLY_NOISE:
+        return (
+            "Measure where the stress stands out of the noise: with a more sensitive transducer, a "
+            f"larger sample, or {faster}."
+        )
+    hidden = max(
+        result.noise_floor,
+        *(float(result.remaining.get(name, 0.0)) for name in ("resolution", "linear_error")),
+    )
     return (
-        "Nothing is missing in these flows, so what tests the model hardest is a faster one: a "
-        f"shear rate above {significant(max(rates, default=0.0), 3)} 1/s."
+        f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
+        f"tests the model hardest is a faster flow: {faster}."
     )
 
 

@@ -7,8 +7,10 @@ from discover.closed_loop.planting import Noise
 from discover.closed_loop.residual import (
     Expectation,
     is_noise,
+    judging,
     noise_floor,
     noise_probability,
+    tells_noise,
 )
 
 RUNS, SAMPLES = 6, 60
@@ -57,3 +59,32 @@ def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
     assert Expectation(linear_error=0.02).explains(left, WEIGHT)
     assert Expectation(noise=0.015).explains(left, WEIGHT)
     assert not Expectation(noise=0.005).explains(left, WEIGHT)
+
+
+def with_a_short_run(samples, miss):
+    """Return noise of two long runs and a shorter one that is missed by so much, with weights."""
+    residual, weight = noise()[:3].copy(), WEIGHT[:3].copy()
+    residual[2], weight[2] = 0.0, 0.0
+    residual[2, :samples], weight[2, :samples] = miss / np.sqrt(samples), 1.0 / np.sqrt(samples)
+    return residual, weight
+
+
+@pytest.mark.parametrize("samples", [1, 3, 6])
+def test_a_run_of_a_few_samples_decides_nothing_beside_longer_ones(samples):
+    residual, weight = with_a_short_run(samples, 0.3)
+    assert judging(weight).tolist() == [True, True, False]
+    assert noise_floor(residual, weight) == pytest.approx(0.01, rel=0.2)
+    assert Expectation().explains(residual, weight)
+
+
+def test_the_size_of_a_run_too_short_to_be_tested_is_no_sign_of_noise():
+    residual, weight = with_a_short_run(15, 0.3)
+    assert noise_floor(residual, weight) == pytest.approx(0.01, rel=0.2)
+    assert not Expectation().explains(residual, weight)
+    residual, weight = with_a_short_run(15, 0.01)
+    assert Expectation().explains(residual, weight)
+
+
+def test_runs_that_are_all_of_a_few_samples_do_not_say_how_noisy_they_are():
+    assert not tells_noise(np.ones((3, 6)))
+    assert tells_noise(np.ones((3, 7)))

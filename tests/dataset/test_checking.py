@@ -131,6 +131,36 @@ def test_each_doubt_is_raised_by_the_fault_it_is_for(folder, subject):
     assert {f.file for f in mine} <= {"r0.csv", ""}
 
 
+@pytest.mark.parametrize(("column", "factor"), [("time_s", 1e3), ("stress_Pa", 1e-3)])
+def test_another_unit_in_one_run_is_doubted_beside_the_others(folder, column, factor):
+    runs = [start_up(rate) for rate in (0.2, 0.5, 1.0, 5.0)]
+    for table in runs:
+        del table["N1_Pa"]
+    runs[2][column] = factor * runs[2][column]
+    units = [f.file for f in check_folder(folder(*runs, sweep=False)) if f.subject == "units"]
+    assert units == ["r2.csv"]
+
+
+def wave(sign=1.0, strain_sign=1.0):
+    """Oscillation of a nearly elastic Maxwell fluid; its work is small beside what it stores."""
+    time = np.linspace(0.0, 20.0, 400)
+    x = 3.0 * RELAXATION_TIME
+    stress = MODULUS * x * (x * np.sin(3.0 * time) + np.cos(3.0 * time)) / (1 + x**2)
+    return {
+        "time_s": time,
+        "shear_rate_1_s": 3.0 * np.cos(3.0 * time),
+        "stress_Pa": sign * stress,
+        "strain": strain_sign * np.sin(3.0 * time),
+    }
+
+
+def test_a_wrong_sign_in_one_oscillation_is_doubted(folder):
+    found = check_folder(folder(wave(), wave(sign=-1.0), wave(strain_sign=-1.0), sweep=False))
+    said = {(f.file, f.subject) for f in found if f.subject in ("stress", "strain")}
+    assert said == {("r1.csv", "stress"), ("r2.csv", "strain")}
+    assert any("wrong sign" in f.text for f in found if f.subject == "strain")
+
+
 def test_a_constant_stress_is_doubted(folder):
     bad = with_column(start_up(), stress_Pa=np.full(len(TIMES), 3.0))
     assert any("the same in every sample" in f.text for f in check_folder(folder(bad)))

@@ -78,7 +78,7 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
         error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
     )  # fmt: skip
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
-    assert "no effect earned its place" in page
+    assert "Nothing is missing that these data show" in page
 
 
 def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):
@@ -136,6 +136,52 @@ def test_the_verdict_of_an_unexplained_loop_does_not_end_on_what_was_added():
     text = loop_verdict(replace(loop_result(), verdict="unexplained"))[0]
     assert text.startswith("Added in the instrument's signal: stress_gain, gain = 0.7 (95 % 0.69")
     assert text.endswith("what is left still has structure that no candidate explains.")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (0.4, 0.2, "the error falls from 40 % to 20 %; on the fitted runs from 40 % to 1 %"),
+        (0.2, 0.4, "the error rises from 20 % to 40 %; on the fitted runs the error falls from"),
+        (0.201, 0.2, "the error stays at 20 %; on the fitted runs the error falls from 40 %"),
+    ],
+)
+def test_an_error_that_does_not_fall_is_not_said_to_fall(before, after, said):
+    changed = replace(loop_result(after), error_before=ErrorPair(0.4, before))
+    assert said in loop_verdict(changed)[1]
+
+
+def test_where_nothing_was_added_the_verdict_says_what_may_still_hide():
+    clean = replace(
+        loop_result(), verdict="no_effect_needed", stages=(), error_before=ErrorPair(0.01, 0.012),
+        error_after=ErrorPair(0.01, 0.012), remaining={"resolution": 0.02},
+    )  # fmt: skip
+    found, sure, following = loop_verdict(clean)
+    assert found.startswith("Nothing is missing that these data show")
+    assert "the error is 1.2 %; on the fitted runs 1 %" in sure
+    assert "falls" not in sure
+    assert "by less than 2 % may still hide" in following
+
+
+@pytest.mark.parametrize(
+    ("remaining", "found"),
+    [
+        ({"noise_known": False}, "The runs have too few samples to tell noise"),
+        ({"carries_over": False}, "What explains the fitted runs does not carry over"),
+        ({}, "What is left still has structure"),
+    ],
+)
+def test_an_unexplained_loop_says_why(remaining, found):
+    unexplained = replace(loop_result(), verdict="unexplained", stages=(), remaining=remaining)
+    assert loop_verdict(unexplained)[0].startswith(found)
+
+
+def test_many_aliases_are_counted_and_not_recited():
+    aliases = ("rate_gain", "sigma", "stress_drift", "edge_fracture", "I")
+    stage = replace(loop_result().stages[0], aliases=aliases)
+    for sentence in loop_verdict(replace(loop_result(), stages=(stage,)))[1:]:
+        assert "2 more" in sentence
+        assert "edge_fracture" not in sentence
 
 
 def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path):

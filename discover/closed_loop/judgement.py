@@ -1,0 +1,176 @@
+"""The verdict: does what was found explain the fitted runs, and does it carry over to others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.least_squares import Fit
+from discover.closed_loop.leftover import Leftover
+from discover.closed_loop.residual import (
+    FEWEST_FAST,
+    STRUCTURE,
+    summarise,
+    tells_noise,
+)
+from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.result import RunRecord, Verdict
+
+ONLY_NOISE = 0.9
+"""A model that misses a record by more of it than this says nothing of it."""
+
+CARRIED = 3.0
+"""A model that misses the held-out runs by more than so many times what it misses the fitted ones
+does not carry over to them. The fitted error is an optimistic guess of the other, by the freedom of
+a few constants; three times leaves room for that, and for flows that weigh them otherwise."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Runs that no fit saw: what the final model leaves of them, and what arithmetic leaves.
+
+    Attributes
+    ----------
+    residual
+        Weighted residuals, padded, shape (runs, n).
+    resolution
+        Of these runs.
+    """
+
+    residual: Float[np.ndarray, "runs n"]
+    resolution: Resolution
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is to be believed of a final model.
+
+    Attributes
+    ----------
+    verdict, structured
+        The verdict, and whether something is left that nothing explains.
+    noise_floor, resolution
+        Relative error of the fitted runs that noise and that arithmetic explain.
+    noise_known, carries_over
+        Whether the runs are long enough to tell noise from structure, or the noise was given; and
+        whether the held-out runs are predicted as well as can be asked.
+    not_judging
+        Runs with too few samples to judge by, where others have more.
+    worst
+        The run that is missed most.
+    description
+        The reasons, in sentences.
+    """
+
+    verdict: Verdict
+    structured: bool
+    noise_floor: float
+    resolution: float
+    noise_known: bool
+    carries_over: bool
+    not_judging: tuple[str, ...]
+    worst: RunRecord
+    description: str
+
+
+def judge(
+    leftover: Leftover,
+    fit: Fit,
+    active: Sequence[str],
+    records: Sequence[RunRecord],
+    held: HeldOut | None,
+) -> Judgement:
+    """Return the verdict on a final model.
+
+    Parameters
+    ----------
+    leftover
+        What a complete model may leave of the fitted runs.
+    fit, active
+        The final fit and the effects in it.
+    records
+        All runs with their predictions.
+    held
+        Runs held out, if any.
+    """
+    expectation, weight = leftover.expectation, leftover.weight
+    error = _error([record for record in records if not record.held_out])
+    floor = expectation.floor(fit.residual, weight)
+    expected = expectation.size(fit.residual, weight)
+    plain = expectation.explains(fit.residual, weight)
+    explained = plain or leftover.explained(fit, active)
+    # steps are computed on only where noise alone does not explain what is left
+    asked = float("inf") if plain else error
+    resolution = leftover.resolution.limit(fit.theta, active, asked)
+    given = expectation.noise is not None or tells_noise(weight)
+    known = given or error <= STRUCTURE * resolution
+    missed_held_out = _error([record for record in records if record.held_out])
+    carries_over = held is None or missed_held_out <= CARRIED * max(error, expected, resolution)
+    if held is not None and not carries_over:
+        # held-out runs may be noisier than the fitted ones, or rounded more coarsely
+        own = summarise(held.residual, np.asarray(held.resolution.batch.weight)).noise
+        limit = held.resolution.limit(fit.theta, active, missed_held_out)
+        carries_over = missed_held_out <= CARRIED * max(held.resolution.mean(own), limit)
+        # and a few samples, off by chance, decide nothing
+        carries_over |= tells_noise(weight) and not tells_noise(
+            np.asarray(held.resolution.batch.weight)
+        )
+    structured = not (known and explained and carries_over)
+    verdict: Verdict = "unexplained" if structured else "no_effect_needed"
+    if active and not structured:
+        verdict = "effects_added"
+    worst = max(records, key=lambda record: record.errors[-1])
+    linear = expectation.linear_error > 0.0
+    causes = "noise and the error of the linear data explain" if linear else "noise explains"
+    short = tuple(r.name for r in records if given and len(r.time) < FEWEST_FAST)
+    which = f"The fitted runs of {FEWEST_FAST} samples or more" if short else "The fitted runs"
+    missed = f"{which} are missed by {_percent(error)}"
+    if not known:
+        text = (
+            f"{missed}, and no run has enough samples to tell noise from a missing effect. Sample "
+            "more often, or give the noise ([loop] noise)."
+        )
+    elif not structured and error > ONLY_NOISE:
+        text = f"{missed}, and {causes} that: the records hold hardly anything else."
+    elif not structured and error > STRUCTURE * expected:
+        text = (
+            f"{missed}, no more than finite steps, rates known only at the samples and rounded "
+            f"numbers leave ({_percent(resolution)}). These data show no smaller effect."
+        )
+    elif not structured:
+        text = f"{missed}, as {causes} ({_percent(expected)})."
+    elif explained:
+        text = (
+            f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "
+            f"{_percent(missed_held_out)}: what was found does not carry over to them, most of all "
+            f"not to {worst.name}. Some effect is still missing, or has another form."
+        )
+    elif error > STRUCTURE * expected:
+        text = (
+            f"{missed}, more than {causes} ({_percent(expected)}); the worst run is {worst.name}. "
+            "Some effect is still missing."
+        )
+    else:
+        text = (
+            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has a "
+            f"pattern that noise has not; the worst run is {worst.name}. Some effect is still "
+            "missing."
+        )
+    if short:
+        text += f" Runs of fewer samples do not judge: {', '.join(short)}."
+    # what does not explain the fitted runs has nothing to carry over
+    carries_over = carries_over or not explained
+    return Judgement(
+        verdict, structured, floor, resolution, known, carries_over, short, worst, text
+    )
+
+
+def _error(records: Sequence[RunRecord]) -> float:
+    """Return the mean error of the final model over the runs that judge; 0 of none."""
+    told = [record for record in records if len(record.time) >= FEWEST_FAST]
+    return float(np.mean([record.errors[-1] for record in told or records] or [0.0]))
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

@@ -1,0 +1,107 @@
+"""What a misfit may owe to arithmetic: finite steps, a rate read in samples, rounded stresses."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.finer_steps import change_on_finer_steps
+from discover.closed_loop.least_squares import Fit
+from discover.closed_loop.residual import judging
+from discover.closed_loop.run_batch import RunBatch
+from discover.dataset import ShearRun
+
+COMPUTED = 1e-6
+"""Relative accuracy of this software's simulations (`discover.simulate.make_grid`). Data that were
+computed are taken to be no better, whatever their digits."""
+
+_LARGEST = 5e-3
+"""A larger relative misfit is not put down to steps, and what they do is not computed: elements in
+series err by a thousandth on the steps of a search, and a rate read 24 times a cycle by φ²/12, with
+φ the phase between samples, which is this."""
+
+_MOST_DIGITS = 9  # a difference of the tenth digit is below `COMPUTED` by far
+_FEWEST_VALUES = 5  # that all of fewer end in the same noughts may be chance
+
+
+class Resolution:
+    """What a model's misfit of some runs may owe to arithmetic.
+
+    Parameters
+    ----------
+    model, batch, runs
+        The model with all candidates; the runs, laid out for it and as they are.
+    """
+
+    def __init__(self, model: AugmentedModel, batch: RunBatch, runs: Sequence[ShearRun]):
+        self.model, self.batch, self.runs = model, batch, runs
+        sizes = [float(np.sqrt(np.mean(run.shear_stress**2))) or 1.0 for run in runs]
+        self.rounding = np.array(
+            [rounding(run.shear_stress) / size for run, size in zip(runs, sizes, strict=True)]
+        )
+        self._known: dict[bytes, np.ndarray] = {}
+
+    def limit(self, theta: np.ndarray, active: Sequence[str], error: float) -> float:
+        """Return the relative error that arithmetic explains, mean over the runs that judge.
+
+        Parameters
+        ----------
+        theta, active
+            Parameters, and the effects among them that are in the model.
+        error
+            Relative error in question; one that is large by far is not put down to steps.
+        """
+        steps = np.zeros(len(self.runs))
+        if error <= _LARGEST:
+            steps = np.sqrt(np.sum(self._change(theta, active) ** 2, axis=1))
+        return self.mean(np.sqrt(steps**2 + self.rounding**2 + COMPUTED**2))
+
+    def mean(self, errors: Float[np.ndarray, " runs"]) -> float:
+        """Return the mean of errors over the runs that judge."""
+        return float(np.mean(errors[judging(np.asarray(self.batch.weight))]))
+
+    def corrected(self, fit: Fit, active: Sequence[str]) -> Float[np.ndarray, "runs n"] | None:
+        """Return what a fit on finer steps would leave, to first order; None where it is large."""
+        if self.mean(fit.run_errors) > _LARGEST:
+            return None
+        change = self._change(fit.theta, active).ravel()
+        if fit.free:
+            # the fitted parameters take up what they can
+            design = fit.jacobian.reshape(len(fit.free), -1).T
+            change = change - design @ np.linalg.lstsq(design, change, rcond=None)[0]
+        return fit.residual + change.reshape(fit.residual.shape)
+
+    def _change(self, theta, active) -> Float[np.ndarray, "runs n"]:
+        # a position that belongs to no active effect changes nothing
+        key = np.asarray(theta).tobytes()
+        if key not in self._known:
+            self._known[key] = change_on_finer_steps(
+                self.model, self.batch, self.runs, theta, active, smooth_rates=True
+            )
+        return self._known[key]
+
+
+def rounding(values: Float[np.ndarray, " n"]) -> float:
+    """Return half a unit in the last place of numbers, root-mean-square; 0 if they hold them all.
+
+    A file gives its numbers with so many digits, or with so many decimals; both are looked for, and
+    the coarser of those that the numbers fit is taken.
+
+    Parameters
+    ----------
+    values
+        In any unit. Of fewer than five that differ nothing is said.
+    """
+    values = np.abs(values[values != 0.0])
+    if len(np.unique(values)) < _FEWEST_VALUES:
+        return 0.0
+    own, largest = np.floor(np.log10(values)), np.floor(np.log10(np.max(values)))
+    found = [0.0]
+    for exponents in (own, np.full_like(own, largest)):
+        for digits in range(1, _MOST_DIGITS + 1):
+            unit = 10.0 ** (exponents - digits + 1)
+            if np.all(np.abs(values - unit * np.round(values / unit)) <= 1e-5 * unit):
+                found.append(float(np.sqrt(np.mean((0.5 * unit) ** 2))))
+                break
+    return max(found)

@@ -1,0 +1,73 @@
+"""Doubts about runs held against one another: a unit that is another in one of them."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from discover.dataset.finding import Finding
+from discover.dataset.run import ShearRun
+
+# Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
+# band) stays within this factor
+_UNIT_FACTOR = 30.0
+
+
+def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
+    """Yield which start-ups do not go together with the others.
+
+    In a faster start-up the largest stress is no smaller, and larger by the ratio of the rates at
+    most, as viscosities do not rise with the rate; half of it is reached no later, and earlier by
+    that ratio at most, which is the same strain. Shear thickening and yielding break these rules by
+    less than another unit of stress or of time does. Another unit of rate may pass for thinning.
+
+    Parameters
+    ----------
+    runs
+        Those that load; less than two start-ups say nothing.
+    """
+    start_ups = [run for run in runs if _is_start_up(run)]
+    for run in start_ups:
+        others = [other for other in start_ups if other is not run]
+        for what, quantity, rises in (
+            ("The stress", _largest, True),
+            ("The time at which the stress rises", _half_time, False),
+        ):
+            ratios = [_outside(quantity, other, run, rises) for other in others]
+            # of two nobody knows which is wrong, and both are named
+            ratio = min(ratios, key=lambda r: abs(np.log(r)), default=1.0)
+            if abs(np.log(ratio)) < np.log(_UNIT_FACTOR):
+                continue
+            large = f"{ratio:.2g} times too large"
+            size = large if ratio > 1.0 else f"{1.0 / ratio:.2g} times too small"
+            yield Finding(
+                "warning",
+                "units",
+                run.name,
+                f"{what} in {run.name} is at least {size} for its shear rate, beside the other "
+                "start-ups. Check the units of its stress and time (kPa for Pa, ms for s).",
+            )
+
+
+def _is_start_up(run: ShearRun) -> bool:
+    rate = run.shear_rate
+    constant = np.ptp(rate) <= 1e-6 * np.max(np.abs(rate))
+    return bool(len(run) >= 3 and rate[0] != 0 and constant and run.rate_before == 0.0)
+
+
+def _largest(run: ShearRun) -> float:
+    return float(np.max(np.abs(run.shear_stress)))
+
+
+def _half_time(run: ShearRun) -> float:
+    stress = np.abs(run.shear_stress)
+    return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
+
+
+def _outside(quantity, other: ShearRun, run: ShearRun, rises: bool) -> float:
+    """Return by which factor a quantity of a run is outside what another allows; 1 inside."""
+    value, reference = quantity(run), quantity(other)
+    if value <= 0.0 or reference <= 0.0:
+        return 1.0
+    share = abs(run.shear_rate[0] / other.shear_rate[0])
+    bounds = sorted([reference, reference * (share if rises else 1.0 / share)])
+    return value / float(np.clip(value, *bounds))
