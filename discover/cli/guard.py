@@ -1,6 +1,6 @@
 """What a command does when something goes wrong: one line, and an exit code that says whose fault.
 
-0 done; 2 the user's input is wrong; 1 anything else.
+0 done; 2 the user's input is wrong; 130 interrupted; 1 anything else.
 """
 
 import errno
@@ -11,6 +11,7 @@ from collections.abc import Callable
 import typer
 
 from discover.cli.console import say_error
+from discover.cli.interruption import INTERRUPTED, INTERRUPTED_CODE
 from discover.errors import InputError
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
@@ -32,7 +33,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except InputError as error:
             _fail(str(error), 2)
         except KeyboardInterrupt:
-            _fail("interrupted; run again to resume", 1)
+            _fail(INTERRUPTED, INTERRUPTED_CODE)
         except OSError as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise

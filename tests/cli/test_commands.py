@@ -119,8 +119,8 @@ def test_an_interrupted_run_says_so_and_goes_on(tmp_path, monkeypatch, trained):
     with monkeypatch.context() as patch:
         patch.setattr(module, "train", interrupted)
         result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 1
-    assert "interrupted; run again to resume" in result.stderr
+    assert result.exit_code == 130
+    assert "run the same command again" in result.stderr
     assert invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").exit_code == 0
     assert trained == ["tensor_sindy", "tbnn_ude"]
 
