@@ -1,5 +1,6 @@
 """Many studies, one after the other or on a dask cluster."""
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -8,8 +9,8 @@ from time import perf_counter
 from discover.batch.cluster import run_on_cluster
 from discover.batch.progress import BatchProgress
 from discover.batch.status import BatchResult, StudyStatus
-from discover.batch.summary import Summary
-from discover.batch.tasks import Progress, run_close_loop, run_compare
+from discover.batch.summary import SUMMARY_FILES, Summary
+from discover.batch.tasks import Note, Progress, nothing_to_note, run_close_loop, run_compare
 from discover.errors import InputError
 from discover.last_words import last_words
 from discover.study.atomic import make_folder
@@ -26,6 +27,7 @@ def run_batch(
     seed: int | None = None,
     overwrite: bool = False,
     progress: Progress = lambda label, fraction: None,
+    note: Note = nothing_to_note,
 ) -> BatchResult:
     """Run studies into folders of their own; one that fails does not stop the others.
 
@@ -46,13 +48,21 @@ def run_batch(
         As in `discover.batch.tasks.run_compare`.
     progress
         Called with what is going on and the fraction done.
+    note
+        Called with every study that can be read, before the first runs.
+
+    Raises
+    ------
+    InputError
+        If two studies would write to one folder, or `out` cannot be written to.
     """
     make_folder(out)
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
-        for name, task in _tasks_of(path, name)
+        for name, task in _tasks_of(path, name, note)
     ]
+    _require_different([job[1] for job in jobs])
     summary = Summary(out, [(job[1], job[2]) for job in jobs])
     so_far = BatchProgress([job[1] for job in jobs], progress)
 
@@ -76,23 +86,33 @@ def run_batch(
 def folder_names(paths: Sequence[Path]) -> list[str]:
     """Return a folder name for every study: its stem, with its folder's name where stems repeat.
 
+    Names that differ by upper and lower case alone are one name: on many disks they are. A study
+    that has the name of one of the batch's own files gets ``study-`` before it.
+
     Raises
     ------
     InputError
         If two studies still have one name.
     """
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
+    times = Counter(stem.casefold() for stem in stems)
     names = [
-        stem if stems.count(stem) == 1 else f"{path.resolve().parent.name}-{stem}"
+        stem if times[stem.casefold()] == 1 else f"{path.resolve().parent.name}-{stem}"
         for path, stem in zip(paths, stems, strict=True)
     ]
+    names = [f"study-{name}" if name.casefold() in SUMMARY_FILES else name for name in names]
+    _require_different(names)
+    return names
+
+
+def _require_different(names: Sequence[str]) -> None:
+    taken = Counter(name.casefold() for name in names)
     for name in names:
-        if names.count(name) > 1:
+        if taken[name.casefold()] > 1:
             raise InputError(
                 f"Two studies would write to the folder {name!r}. Rename one of the files, or give "
                 "each only once."
             )
-    return names
 
 
 def run_one(
@@ -117,11 +137,13 @@ def run_one(
     return StudyStatus(name, task, status, result.text, False, perf_counter() - started)
 
 
-def _tasks_of(path: Path, name: str) -> list[tuple[str, str]]:
+def _tasks_of(path: Path, name: str, note: Note) -> list[tuple[str, str]]:
     try:
-        sections = read_study(path).model_fields_set
+        study = read_study(path)
     except InputError:
         return [(name, "compare")]  # fails again when it runs, and is listed with the reason
+    note(study)
+    sections = study.model_fields_set
     if "loop" not in sections:
         return [(name, "compare")]
     if "compare" not in sections:

@@ -9,6 +9,9 @@ from discover.batch.rows import StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
 from discover.study.atomic import write_text
 
+PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
+"""What lies in the folder of a batch beside the folders of its studies."""
+
 _PAUSE = 5.0  # seconds for which news are gathered before the page is written again
 
 
@@ -60,10 +63,10 @@ class Summary:
             return self._write()
 
     def _write(self) -> BatchResult:
-        result = BatchResult(tuple(self._statuses), self.out / "index.html", tuple(self._rows))
-        write_text(self.out / "batch.json", json.dumps(result.to_json(), indent=2) + "\n")
+        result = BatchResult(tuple(self._statuses), self.out / PAGE, tuple(self._rows))
+        write_text(self.out / STATES, json.dumps(result.to_json(), indent=2) + "\n")
         table = result.table().to_csv(index=False, lineterminator="\n")
-        write_text(self.out / "table.csv", table)
+        write_text(self.out / TABLE, table)
         from discover.report.batch_report import batch_page  # late: it takes a second to import
 
         write_text(result.index, batch_page(result.studies, result.rows))

@@ -15,6 +15,7 @@ from malformed_inputs import Outcome, attempt, complaint
 
 from discover import cli
 from discover.batch.run import folder_names
+from discover.errors import InputError
 
 CASE = Case(["close-loop", "s.toml"], ("s.toml",))
 CLEAR = "discover: s.toml: model.law: unknown law 'x'; write one of ucm.\n"
@@ -95,7 +96,7 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
 
 
 def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
-    malformed_inputs._complete_results(tmp_path)
+    malformed_cases._complete_results(tmp_path)
     again = ["close-loop", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--json"]
     assert malformed_inputs.run(again).code == 0
     (tmp_path / "out" / "loop.json").write_bytes(b"\x90")
@@ -116,7 +117,7 @@ def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
     mine, other = tmp_path / "mine", tmp_path / "other"
     for folder in (mine, other):
         folder.mkdir()
-        malformed_inputs._write(folder, malformed_inputs.FOLDER)
+        malformed_cases._write(folder, malformed_cases.FOLDER)
     for path, told in ((".", False), ("../other", True), (str(other), True)):
         (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
         outcome = malformed_inputs.run(
@@ -130,13 +131,20 @@ def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():
     assert folder_names([Path("...toml"), Path("a.toml")]) == ["study", "a"]
 
 
+def test_a_study_with_the_name_of_a_file_of_the_batch_gets_a_folder_of_another():
+    paths = [Path("batch.json.toml"), Path("Index.HTML.toml"), Path("table.toml")]
+    assert folder_names(paths) == ["study-batch.json", "study-Index.HTML", "table"]
+    with pytest.raises(InputError):
+        folder_names([Path("batch.json.toml"), Path("study-batch.json.toml")])
+
+
 def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
     for section in (
         "distillation = true",
         'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
     ):
         synthetic = "sweep" in section
-        malformed_inputs._write(tmp_path, malformed_inputs.FOLDER)
+        malformed_cases._write(tmp_path, malformed_cases.FOLDER)
         data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
         (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
         outcome = malformed_inputs.run(
