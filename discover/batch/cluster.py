@@ -111,15 +111,13 @@ def _local_client(workers: int) -> Iterator[Any]:
         try:
             with Client(cluster) as client:
                 yield client
-        except BaseException:
-            # dask would ask them to end and wait for some seconds
+        finally:
+            # nothing is left for them to do; dask would ask them to end and wait for some seconds
             level = logging.root.manager.disable
             kill_workers()
             with suppress(Exception):
                 cluster.close()
             logging.disable(level)
-            raise
-        cluster.close()
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from discover.batch.progress import BatchProgress
 from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, Progress, nothing_to_note, run_close_loop, run_compare
-from discover.errors import InputError
+from discover.errors import InputError, plain_os_error
 from discover.last_words import last_words
 from discover.study.atomic import make_folder
 from discover.study.read import read_study
@@ -130,6 +130,9 @@ def run_one(
         result = _TASKS[task](Path(path), Path(out), seed, overwrite, progress)
     except InputError as error:
         return StudyStatus(name, task, "failed", str(error), True, perf_counter() - started)
+    except OSError as error:
+        reason = plain_os_error(error)
+        return StudyStatus(name, task, "failed", reason, False, perf_counter() - started)
     except Exception as error:
         reason = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
         return StudyStatus(name, task, "failed", reason, False, perf_counter() - started)

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from threading import RLock, Timer
 
 from discover.batch.rows import StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
+from discover.errors import InputError
 from discover.study.atomic import write_text
 
 PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
@@ -45,9 +47,13 @@ class Summary:
         """Write in a few seconds: the next study may take hours, so the page cannot wait for it."""
         with self._lock:
             if self._timer is None:
-                self._timer = Timer(_PAUSE, self.write)
+                self._timer = Timer(_PAUSE, self._write_if_possible)
                 self._timer.daemon = True
                 self._timer.start()
+
+    def _write_if_possible(self) -> None:
+        with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
+            self.write()
 
     def write_ended(self) -> None:
         """Write everything now if any study has ended."""

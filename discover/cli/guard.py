@@ -3,7 +3,6 @@
 0 done; 2 the user's input is wrong; 130 interrupted; 1 anything else.
 """
 
-import errno
 import functools
 import os
 from collections.abc import Callable
@@ -12,13 +11,10 @@ import typer
 
 from discover.cli.console import say_error
 from discover.cli.interruption import INTERRUPTED, INTERRUPTED_CODE
-from discover.errors import InputError
+from discover.errors import InputError, plain_os_error
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
 """Environment variable that lets tracebacks through, for those who mend the software."""
-
-
-_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -37,9 +33,7 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except OSError as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
-            place = f" ({error.filename})" if error.filename else ""
-            full = "; make room and run again, what was finished is kept"
-            _fail(f"{error.strerror or error}{place}{full if error.errno in _FULL else ''}", 1)
+            _fail(plain_os_error(error), 1)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise

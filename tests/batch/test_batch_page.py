@@ -146,6 +146,20 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch
     assert json.loads((tmp_path / "batch.json").read_text())["studies"][1]["status"] == "waiting"
 
 
+def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(
+    tmp_path, monkeypatch, capfd
+):
+    monkeypatch.setattr("discover.batch.summary._PAUSE", 0.01)
+    summary = Summary(tmp_path / "gone", [("a", "compare")])
+    summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    timer = summary._timer
+    assert timer is not None
+    timer.join(10)
+    assert capfd.readouterr().err == ""
+    with pytest.raises(FileNotFoundError):
+        summary.write()
+
+
 def test_every_effect_has_a_title_in_words():
     for name in named_effects():
         assert "_" not in effect_title(name)
