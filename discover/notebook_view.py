@@ -35,9 +35,10 @@ def as_html(part: Any) -> str:
         return ""
     # lines that are only counted need no number in the margin
     numbered = isinstance(part.index, pd.RangeIndex)
-    return part.dropna(axis="columns", how="all").to_html(
-        escape=True, index=not numbered, float_format="{:.4g}".format, na_rep="–"
-    )
+    with pd.option_context("display.max_colwidth", None):  # a sentence is not cut
+        return part.dropna(axis="columns", how="all").to_html(
+            escape=True, index=not numbered, float_format="{:.4g}".format, na_rep="–"
+        )
 
 
 @runtime_checkable

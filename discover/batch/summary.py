@@ -2,12 +2,17 @@
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from threading import RLock, Timer
 
 from discover.batch.rows import StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
+from discover.errors import InputError
 from discover.study.atomic import write_text
+
+PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
+"""What lies in the folder of a batch beside the folders of its studies."""
 
 _PAUSE = 5.0  # seconds for which news are gathered before the page is written again
 
@@ -36,11 +41,24 @@ class Summary:
         with self._lock:
             self._statuses[position] = status
             self._rows[position] = row
+        self.write_soon()
+
+    def write_soon(self) -> None:
+        """Write in a few seconds: the next study may take hours, so the page cannot wait for it."""
+        with self._lock:
             if self._timer is None:
-                # the next study may take hours, so the page cannot wait for it
-                self._timer = Timer(_PAUSE, self.write)
+                self._timer = Timer(_PAUSE, self._write_if_possible)
                 self._timer.daemon = True
                 self._timer.start()
+
+    def _write_if_possible(self) -> None:
+        with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
+            self.write()
+
+    def write_ended(self) -> None:
+        """Write everything now if any study has ended."""
+        if any(status.status != "waiting" for status in self._statuses):
+            self.write()
 
     def write(self) -> BatchResult:
         """Write everything now and return how the studies ended."""
@@ -51,11 +69,11 @@ class Summary:
             return self._write()
 
     def _write(self) -> BatchResult:
-        from discover.report.batch_report import batch_page  # workers need no report
-
-        result = BatchResult(tuple(self._statuses), self.out / "index.html", tuple(self._rows))
-        write_text(self.out / "batch.json", json.dumps(result.to_json(), indent=2) + "\n")
+        result = BatchResult(tuple(self._statuses), self.out / PAGE, tuple(self._rows))
+        write_text(self.out / STATES, json.dumps(result.to_json(), indent=2) + "\n")
         table = result.table().to_csv(index=False, lineterminator="\n")
-        write_text(self.out / "table.csv", table)
+        write_text(self.out / TABLE, table)
+        from discover.report.batch_report import batch_page  # late: it takes a second to import
+
         write_text(result.index, batch_page(result.studies, result.rows))
         return result

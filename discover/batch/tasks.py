@@ -10,8 +10,15 @@ from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
+from discover.study.schema import Study
 
 Progress = Callable[[str, float], None]
+Note = Callable[[Study], None]
+"""Called with a study that was read, before anything is done with it."""
+
+
+def nothing_to_note(study: Study) -> None:
+    """Take no note of a study."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +42,12 @@ class TaskResult:
 
 
 def run_compare(
-    path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress
+    path: Path,
+    out: Path,
+    seed: int | None,
+    overwrite: bool,
+    progress: Progress,
+    note: Note = nothing_to_note,
 ) -> TaskResult:
     """Run both learners of a study and write the comparison report.
 
@@ -51,6 +63,8 @@ def run_compare(
         Start afresh.
     progress
         Called with what is going on and the fraction done.
+    note
+        Called with the study once it was read.
 
     Raises
     ------
@@ -60,6 +74,7 @@ def run_compare(
     enable_x64()
     enable_compilation_cache()
     study = read_study(path)
+    note(study)
     folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "comparison.json"
     if folder.complete and folder.holds(page.name, data.name):
@@ -78,7 +93,12 @@ def run_compare(
 
 
 def run_close_loop(
-    path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress
+    path: Path,
+    out: Path,
+    seed: int | None,
+    overwrite: bool,
+    progress: Progress,
+    note: Note = nothing_to_note,
 ) -> TaskResult:
     """Close the loop on a study and write its report.
 
@@ -87,6 +107,7 @@ def run_close_loop(
     enable_x64()
     enable_compilation_cache()
     study = read_study(path)
+    note(study)
     folder = RunFolder(out, fingerprint(study, "close-loop", seed), overwrite)
     page, data = folder.path / "report.html", folder.path / "loop.json"
     if folder.complete and folder.holds(page.name, data.name):

@@ -11,6 +11,7 @@ from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export
 from discover.cli.fetch_command import fetch_data
+from discover.cli.interruption import obeying_interrupts
 from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
@@ -56,4 +57,5 @@ def main() -> None:
         # σ12 on a terminal that knows no Greek, or half a character in a file's name
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    app()
+    with obeying_interrupts():
+        app()

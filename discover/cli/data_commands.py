@@ -3,7 +3,7 @@
 import json
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -54,23 +54,11 @@ def list_data(as_json: JsonOption = False) -> None:
 @guarded
 def show(name: FolderArgument, as_json: JsonOption = False) -> None:
     """Show the runs of a data set."""
-    import numpy as np
-
     from discover.dataset.load import load_dataset
+    from discover.dataset.run_table import run_line
 
     dataset = load_dataset(name)
-    rows = [
-        {
-            "run": run.name,
-            "samples": len(run),
-            "duration_s": float(run.time[-1]),
-            "largest_rate_1_s": float(np.max(np.abs(run.shear_rate))),
-            "largest_stress_Pa": float(np.max(np.abs(run.shear_stress))),
-            "N1": run.first_normal_stress_difference is not None,
-            "N2": run.second_normal_stress_difference is not None,
-        }
-        for run in dataset
-    ]
+    rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
     if as_json:
@@ -80,13 +68,13 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
         return
     say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
     typer.echo(
-        f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  also"
+        f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
     )
     for row in rows:
-        also = " ".join(key for key in ("N1", "N2") if row[key])
+        words = ", ".join([row["flow"], *(key for key in ("N1", "N2") if row[key])])
         say(
             f"{row['run']:<32}{row['samples']:>8}{row['duration_s']:>12.4g}"
-            f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {also}"
+            f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {words}"
         )
 
 
@@ -103,24 +91,20 @@ def check(
     from dataclasses import asdict
 
     from discover.dataset.check import check_folder
+    from discover.dataset.finding import Severity
 
     findings = check_folder(folder, clock_factor)
-    by_severity = {
-        severity: [finding for finding in findings if finding.severity == severity]
-        for severity in ("error", "warning", "note")
-    }
     if as_json:
-        lists = {f"{key}s": [asdict(f) for f in found] for key, found in by_severity.items()}
+        lists = {
+            f"{severity}s": [asdict(finding) for finding in findings.of(severity)]
+            for severity in get_args(Severity)
+        }
         typer.echo(json.dumps({"folder": folder, **lists}, indent=2))
     else:
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
-        counts = ", ".join(
-            f"{len(found)} {key}{'' if len(found) == 1 else 's'}"
-            for key, found in by_severity.items()
-        )
-        say(f"{folder}: {counts}." if findings else f"{folder}: nothing wrong was found.")
-    if by_severity["error"]:
+        say(f"{folder}: {findings.counts}." if findings else f"{folder}: nothing wrong was found.")
+    if findings.of("error"):
         raise typer.Exit(2)
 
 
@@ -194,7 +178,7 @@ def import_data(
     imported = import_files(paths, merged, sweep)
     write_folder(imported, out, overwrite)
     findings = check_folder(out)
-    errors = [finding for finding in findings if finding.severity == "error"]
+    errors = findings.of("error")
     said = [*changed, *imported.said]
     if as_json:
         content = {
@@ -202,7 +186,7 @@ def import_data(
             "files": sorted(imported.files),
             "said": said,
             "errors": [str(finding) for finding in errors],
-            "warnings": [str(f) for f in findings if f.severity == "warning"],
+            "warnings": [str(f) for f in findings.of("warning")],
         }
         typer.echo(json.dumps(content, indent=2))
     else:

@@ -1,32 +1,34 @@
 """A word on studies that read data from elsewhere."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from discover.cli.console import say
 
+if TYPE_CHECKING:  # --help needs no studies
+    from discover.study.schema import Study
 
-def tell_of_folders(paths: Sequence[Path]) -> None:
-    """Print a note for every study whose data lie outside the folders where one would look.
+
+def tell_of_folder(study: "Study") -> None:
+    """Print a note if a study's data lie outside the folders where one would look.
 
     A study file may come from somebody else; what it reads should surprise nobody.
 
     Parameters
     ----------
-    paths
-        Study files; those that are wrong are passed over, for the command itself to refuse.
+    study
+        As read; if its folder does not exist, nothing is said: the command refuses it.
     """
     from discover.errors import InputError
-    from discover.study.read import folder_elsewhere, read_study
+    from discover.study.read import folder_elsewhere
 
-    for path in paths:
-        try:
-            folder = folder_elsewhere(read_study(path))
-        except InputError:
-            continue
-        if folder is not None:
-            say(
-                f"discover: note: {path.name} reads its data from {folder}, which is neither "
-                "beside it nor under DISCOVER_DATA or the working directory.",
-                err=True,
-            )
+    try:
+        folder = folder_elsewhere(study)
+    except InputError:
+        return
+    if folder is not None:
+        name = "the study" if study.path is None else study.path.name
+        say(
+            f"discover: note: {name} reads its data from {folder}, which is neither "
+            "beside it nor under DISCOVER_DATA or the working directory.",
+            err=True,
+        )

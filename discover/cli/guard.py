@@ -1,9 +1,8 @@
 """What a command does when something goes wrong: one line, and an exit code that says whose fault.
 
-0 done; 2 the user's input is wrong; 1 anything else.
+0 done; 2 the user's input is wrong; 130 interrupted; 1 anything else.
 """
 
-import errno
 import functools
 import os
 from collections.abc import Callable
@@ -11,13 +10,11 @@ from collections.abc import Callable
 import typer
 
 from discover.cli.console import say_error
-from discover.errors import InputError
+from discover.cli.interruption import INTERRUPTED, INTERRUPTED_CODE
+from discover.errors import InputError, plain_os_error
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
 """Environment variable that lets tracebacks through, for those who mend the software."""
-
-
-_FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 
 
 def guarded(command: Callable[..., None]) -> Callable[..., None]:
@@ -32,13 +29,11 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
         except InputError as error:
             _fail(str(error), 2)
         except KeyboardInterrupt:
-            _fail("interrupted; run again to resume", 1)
+            _fail(INTERRUPTED, INTERRUPTED_CODE)
         except OSError as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
-            place = f" ({error.filename})" if error.filename else ""
-            full = "; make room and run again, what was finished is kept"
-            _fail(f"{error.strerror or error}{place}{full if error.errno in _FULL else ''}", 1)
+            _fail(plain_os_error(error), 1)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise

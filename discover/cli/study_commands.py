@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from discover.cli.console import progress_bar, say, say_error
-from discover.cli.folders import tell_of_folders
+from discover.cli.folders import tell_of_folder
 from discover.cli.guard import guarded
 from discover.cli.options import (
     JsonOption,
@@ -68,9 +68,10 @@ def batch(
     from discover.batch.run import run_batch
 
     folder = out or Path("results") / "batch"
-    tell_of_folders(studies)
     with progress_bar(quiet) as report:
-        result = run_batch(studies, folder, workers, scheduler, seed, overwrite, report)
+        result = run_batch(
+            studies, folder, workers, scheduler, seed, overwrite, report, tell_of_folder
+        )
     if as_json:
         typer.echo(json.dumps(result.to_json(), indent=2))
     elif not quiet:
@@ -107,9 +108,8 @@ def _run_task(
     from discover.batch.run import folder_names
 
     folder = out or Path("results") / folder_names([study])[0]
-    tell_of_folders([study])
     with progress_bar(quiet) as report:
-        result = task(study, folder, seed, over, report)
+        result = task(study, folder, seed, over, report, tell_of_folder)
     if as_json:
         typer.echo(result.json_file.read_text("utf-8"))
         return

@@ -1,11 +1,14 @@
 """Data sets: runs, loading, checking, linear viscoelasticity."""
 
 from discover.dataset.check import check_folder
+from discover.dataset.finding import Finding, Findings
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 
 __all__ = [
+    "Finding",
+    "Findings",
     "LinearSweep",
     "RelaxationSpectrum",
     "ShearDataset",

@@ -10,7 +10,7 @@ from discover.dataset import units
 from discover.dataset.check_among import doubts_among_runs
 from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
 from discover.dataset.check_run import doubts_of_run
-from discover.dataset.finding import Finding
+from discover.dataset.finding import Finding, Findings
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import (
     INDEX_FILE,
@@ -39,7 +39,7 @@ _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
 def check_folder(
     folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None
-) -> tuple[Finding, ...]:
+) -> Findings:
     """Return what is wrong, doubtful or worth knowing about a data folder; errors come first.
 
     Nothing is simulated: the checks compare a run with itself, with what a passive fluid at rest
@@ -53,11 +53,11 @@ def check_folder(
     try:
         root = resolve_folder(folder, base)
     except InputError as error:
-        return (Finding("error", "folder", "", str(error)),)
+        return Findings([Finding("error", "folder", "", str(error))])
     try:
         index = read_index(root)
     except InputError as error:
-        return (Finding("error", "runs", INDEX_FILE, str(error)),)
+        return Findings([Finding("error", "runs", INDEX_FILE, str(error))])
     findings = [*_clock(index, clock_factor), *_before(index)]
     runs: list[ShearRun] = []
     unused: dict[str, list[str]] = {}
@@ -79,7 +79,7 @@ def check_folder(
     findings += doubts_among_runs(runs)
     findings += _folder(root, index, runs)
     rank = {"error": 0, "warning": 1, "note": 2}
-    return tuple(sorted(findings, key=lambda finding: rank[finding.severity]))
+    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
 
 
 def _clock(index: Table, column: str | None) -> Iterator[Finding]:

@@ -1,12 +1,15 @@
 """Runs and data sets as the rest of the software sees them: SI units, checked."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.notebook_view import NotebookView
 from discover.protocols.shear import ShearProtocol
 
 SLOWEST_RATE = 1e-12
@@ -176,7 +179,7 @@ class LinearSweep:
 
 
 @dataclass(frozen=True)
-class ShearDataset:
+class ShearDataset(NotebookView):
     """Runs on one fluid.
 
     Attributes
@@ -228,6 +231,24 @@ class ShearDataset:
         """Which runs were thinned when they were read, in sentences; empty if none was."""
         runs = [run for run in self.runs if "thinned" in run.metadata]
         return " ".join(f"{run.name}: {run.metadata['thinned']}." for run in runs)
+
+    def table(self) -> pd.DataFrame:
+        """Return the runs as a table, one line each; units are in the names of the columns."""
+        from discover.dataset.run_table import run_line
+
+        return pd.DataFrame([run_line(run) for run in self.runs])
+
+    def _shown(self) -> Iterable[Any]:
+        sweep = self.linear_sweep
+        points = 0 if sweep is None else len(sweep.angular_frequency)
+        linear = f"a linear sweep of {points} points" if points else "no linear sweep"
+        first = next(iter(self.provenance.splitlines()), "")
+        yield f"{self.name}: {len(self)} runs, {linear}. {first}".strip()
+        table = self.table()
+        for name in ("N1", "N2") if len(self) else ():
+            table[name] = ["measured" if there else None for there in table[name]]
+        yield table
+        yield self.thinned
 
     def select(self, names: Sequence[str]) -> "ShearDataset":
         """Return the data set of the named runs, in the order given.

@@ -7,7 +7,7 @@ from typing import Any
 from discover.equations.mathml import number, term_mathml
 from discover.report.page import render
 from discover.report.plots.style import LEARNER_TITLES
-from discover.report.wording import RULES, spoken
+from discover.report.wording import RULES, effect_title
 
 _SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
 
@@ -48,7 +48,12 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
             if row.chosen
         ],
         loops=[
-            {"study": study, "effects": ", ".join(map(spoken, row.effects)), "row": row}
+            {
+                "study": study,
+                "verdict": row.verdict.replace("_", " "),
+                "effects": ", ".join(map(effect_title, row.effects)),
+                "row": row,
+            }
             for study, row in pairs
             if row.verdict
         ],

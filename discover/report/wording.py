@@ -50,6 +50,24 @@ def spoken(term: str) -> str:
     return text
 
 
+_EFFECTS = {
+    "giesekus_mobility": "Giesekus mobility",
+    "non_affine_motion": "non-affine motion",
+    "ptt_linear": "linear PTT",
+    "ptt_exponential": "exponential PTT",
+}
+
+
+def effect_title(name: str) -> str:
+    """Return an effect as readers know it: its name in words, or its term in the field's letters.
+
+    Studies and JSON keep the name itself.
+    """
+    if "sigma" in name or "gammadot" in name:
+        return spoken(name)
+    return _EFFECTS.get(name, name.replace("_", " "))
+
+
 def interval(bounds: Sequence[float] | None) -> str:
     """Return an interval, with as many digits as tell its ends apart."""
     if bounds is None:

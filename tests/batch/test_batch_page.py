@@ -9,7 +9,9 @@ import pytest
 from discover.batch.rows import LearnerRow, StudyRow, read_row
 from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import Summary
+from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page
+from discover.report.wording import effect_title
 
 GOOD = {
     "learners": {
@@ -79,8 +81,12 @@ def test_the_page_says_what_failed_and_puts_selectors_side_by_side(rows):
     assert "2 with a result, 1 failed, 1 not run yet" in page
     assert 'href="good/report.html"' in page
     assert "script%3E" not in page  # a failed study has no link
-    for text in ("BIC", "pysindy at its default", "3 %", "rate_gain".replace("_", " ")):
-        assert text in page or text.replace(" ", "_") in page
+    for text in ("BIC", "pysindy at its default", "3 %"):
+        assert text in page
+    loops = page.split('id="loops"')[1].split("</table>")[0]
+    assert "rate gain" in loops
+    assert "effects added" in loops
+    assert "_" not in re.sub("<[^>]*>", "", loops)  # what readers see is words
     assert "0.375" in page.split('id="found"')[1].split("</table>")[0]
     selection = page.split('id="selection"')[1].split("</table>")[0]
     assert selection.count("<math>") == 2
@@ -138,6 +144,27 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch
     assert "the reason" in page
     assert "1 not run yet" in page
     assert json.loads((tmp_path / "batch.json").read_text())["studies"][1]["status"] == "waiting"
+
+
+def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(
+    tmp_path, monkeypatch, capfd
+):
+    monkeypatch.setattr("discover.batch.summary._PAUSE", 0.01)
+    summary = Summary(tmp_path / "gone", [("a", "compare")])
+    summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
+    timer = summary._timer
+    assert timer is not None
+    timer.join(10)
+    assert capfd.readouterr().err == ""
+    with pytest.raises(FileNotFoundError):
+        summary.write()
+
+
+def test_every_effect_has_a_title_in_words():
+    for name in named_effects():
+        assert "_" not in effect_title(name)
+    assert effect_title("ptt_linear") == "linear PTT"
+    assert effect_title("sigma.sigma") == "σ·σ"
 
 
 def test_a_term_that_nobody_knows_is_shown_as_text():

@@ -19,6 +19,7 @@ from collections import Counter
 
 import pytest
 
+from discover.batch import cluster
 from discover.batch import run as batch
 from discover.errors import InputError
 from discover.study.lock import LOCK_FILE
@@ -45,7 +46,7 @@ def compare(path, out, seed, overwrite, progress):
     for i in range(6):
         part = folder.load(f"part{i}")
         if part is None:
-            time.sleep(0.08)
+            time.sleep(float(os.environ.get("SECONDS_A_PART", "0.08")))
             part = {"x": np.random.default_rng([i, int(1000 * noise)]).normal(size=500).tolist()}
             folder.save(f"part{i}", part)
             with open(os.environ["COUNTS"], "a") as counts:
@@ -85,6 +86,13 @@ def computed(folder):
     return Counter((folder / "counts.txt").read_text().splitlines())
 
 
+def command(folder, pause=5.0):
+    """The command line with the stand-in, to be completed by arguments."""
+    code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
+    code += f"from discover.batch import summary; summary._PAUSE = {pause}\n"
+    return [sys.executable, "-c", code + "from discover.cli import main; main()"]
+
+
 def results(out):
     return {
         path.relative_to(out).as_posix(): path.read_bytes()
@@ -112,12 +120,10 @@ def wait_for(condition, seconds=120.0):
 
 def test_a_batch_killed_at_random_ends_with_the_same_bytes(studies, calm, tmp_path):
     generator = random.Random(1)
-    code = f"import runpy; runpy.run_path({str(tmp_path / 'stand_in.py')!r})\n"
-    code += "from discover.cli import main; main()"
     out = tmp_path / "out"
     arguments = ["batch", *map(str, studies), "--out", str(out), "--quiet"]
     for _ in range(2):
-        process = subprocess.Popen([sys.executable, "-c", code, *arguments])
+        process = subprocess.Popen([*command(tmp_path), *arguments])
         wanted = computed(tmp_path).total() + generator.randint(1, 8)
         while computed(tmp_path).total() < wanted:
             assert process.poll() is None
@@ -144,6 +150,41 @@ def test_what_ended_before_an_interruption_is_on_the_page(studies, calm, tmp_pat
     assert [s.status for s in batch.run_batch(studies, tmp_path / "out").studies] == [
         "complete", "done", "done", "failed",
     ]  # fmt: skip
+
+
+def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp_path):
+    pytest.importorskip("distributed")
+    psutil = pytest.importorskip("psutil")
+    out = tmp_path / "out"
+    settings = {
+        "DASK_DISTRIBUTED__WORKER__PRELOAD": repr([str(tmp_path / "stand_in.py")]),
+        "SECONDS_A_PART": "0.3",
+    }
+    arguments = ["batch", *map(str, studies[::-1]), "--out", str(out), "--workers", "2"]
+    process = subprocess.Popen(
+        [*command(tmp_path, pause=0.1), *arguments],
+        env=os.environ | settings,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    table = out / "table.csv"
+    wait_for(lambda: table.is_file() and "fails,compare,failed" in table.read_text())
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, workers and all
+    said, error = process.communicate(timeout=60)
+    assert (said, error.count("\n"), process.returncode) == ("", 1, 130)
+    assert "run the same command again" in error
+
+    def at_work(other):
+        with contextlib.suppress(OSError, psutil.Error):
+            return os.getpgid(other.pid) == process.pid and other.status() != "zombie"
+
+    wait_for(lambda: not any(map(at_work, psutil.process_iter())), 10)
+    assert computed(tmp_path).total() < 18  # it had not ended
+    batch.run_batch(studies, out)
+    assert results(out) == calm
+    assert max(computed(tmp_path).values()) == 1
 
 
 def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path):
@@ -206,9 +247,8 @@ def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_p
         def result(self):
             return batch.StudyStatus("a", "compare", "done", "found")
 
-    status = batch._status_of(
-        Future(), ("a.toml", "a", "compare", str(tmp_path / "a"), None, False)
-    )
+    job = ("a.toml", "a", "compare", str(tmp_path / "a"), None, False)
+    status = cluster._status_of(Future(), job)
     assert status.status == "failed"
     assert "one file system" in status.text
 

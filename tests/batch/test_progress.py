@@ -1,7 +1,10 @@
 """How far a batch is: in a terminal, from studies that run here or in workers."""
 
+import errno
+
 import pytest
 
+from discover.batch import run
 from discover.batch.progress import BatchProgress, now_and_then
 from discover.batch.status import StudyStatus
 
@@ -47,3 +50,13 @@ def test_a_worker_sends_word_now_and_then_and_not_at_every_step(said):
         say("one", 0.1)
         say("two", 0.2)
     assert said == [("one", 0.1), ("one", 0.1), ("two", 0.2)]
+
+
+def test_a_study_on_a_full_disk_says_so_in_words(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device", "a.svg")
+
+    monkeypatch.setitem(run._TASKS, "compare", full)
+    status = run.run_one("a.toml", "a", "compare", str(tmp_path), None, False)
+    assert (status.status, status.input_error) == ("failed", False)
+    assert status.text.startswith("No space left on device (a.svg); make room and run again")

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
+from discover.errors import InputError
 from discover.learners.result import LearnerResult, RecoveredTerm
 
 STUDY = """
@@ -119,8 +120,8 @@ def test_an_interrupted_run_says_so_and_goes_on(tmp_path, monkeypatch, trained):
     with monkeypatch.context() as patch:
         patch.setattr(module, "train", interrupted)
         result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
-    assert result.exit_code == 1
-    assert "interrupted; run again to resume" in result.stderr
+    assert result.exit_code == 130
+    assert "run the same command again" in result.stderr
     assert invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").exit_code == 0
     assert trained == ["tensor_sindy", "tbnn_ude"]
 
@@ -252,10 +253,33 @@ def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained):
     assert len(trained) == 2
 
 
-def test_a_batch_refuses_two_studies_for_one_folder(tmp_path):
-    (tmp_path / "a.toml").write_text(STUDY)
-    twice = (tmp_path / "a.toml", tmp_path / "a.toml")
-    assert invoke("batch", *twice, "--out", tmp_path / "b").exit_code == 2
+@pytest.mark.parametrize("names", [("a", "a"), ("a", "A"), ("a", "a-loop")])
+def test_a_batch_refuses_two_studies_for_one_folder(tmp_path, names):
+    # both learners and a loop: two folders, a and a-loop
+    (tmp_path / "a.toml").write_text(STUDY + "[loop]\n")
+    (tmp_path / "A.toml").write_text(STUDY)
+    (tmp_path / "a-loop.toml").write_text(STUDY)
+    result = invoke(
+        "batch", *(tmp_path / f"{name}.toml" for name in names), "--out", tmp_path / "b"
+    )
+    assert result.exit_code == 2
+    assert "Two studies would write to the folder" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
+    from discover.batch import tasks
+
+    def stop(*arguments):
+        raise InputError("so far")
+
+    known, read = tasks.read_study, []
+    monkeypatch.setattr(tasks, "read_study", lambda path: read.append(path) or known(path))
+    monkeypatch.setattr("discover.study.read.read_study", lambda path: pytest.fail("read again"))
+    monkeypatch.setattr(tasks, "RunFolder", stop)
+    (tmp_path / "s.toml").write_text(STUDY)
+    assert "so far" in invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").stderr
+    assert read == [tmp_path / "s.toml"]
 
 
 @pytest.mark.parametrize("kept", [True, False])

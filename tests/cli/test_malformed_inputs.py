@@ -15,6 +15,7 @@ from malformed_inputs import Outcome, attempt, complaint
 
 from discover import cli
 from discover.batch.run import folder_names
+from discover.errors import InputError
 
 CASE = Case(["close-loop", "s.toml"], ("s.toml",))
 CLEAR = "discover: s.toml: model.law: unknown law 'x'; write one of ucm.\n"
@@ -128,6 +129,13 @@ def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
 
 def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():
     assert folder_names([Path("...toml"), Path("a.toml")]) == ["study", "a"]
+
+
+def test_a_study_with_the_name_of_a_file_of_the_batch_gets_a_folder_of_another():
+    paths = [Path("batch.json.toml"), Path("Index.HTML.toml"), Path("table.toml")]
+    assert folder_names(paths) == ["study-batch.json", "study-Index.HTML", "table"]
+    with pytest.raises(InputError):
+        folder_names([Path("batch.json.toml"), Path("study-batch.json.toml")])
 
 
 def test_what_would_fail_after_the_training_is_refused_before(tmp_path):

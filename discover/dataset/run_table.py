@@ -1,0 +1,81 @@
+"""Runs in words and numbers, one line each."""
+
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from discover.dataset.run import ShearRun
+
+# share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
+# many where the stress was commanded, and noise
+_PERIODIC = 0.7
+_VARYING = "varying rate"
+
+
+def run_line(run: ShearRun) -> dict[str, Any]:
+    """Return what a reader asks first of a run.
+
+    Frequency (rad/s) and strain amplitude are there for oscillations alone. They are read off the
+    shear rate at the samples, so that commanded and measured rates are treated alike.
+
+    Parameters
+    ----------
+    run
+        The run.
+    """
+    flow = _flow(run)
+    wave = _oscillation(run) if flow == _VARYING else None
+    normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
+    return {
+        "run": run.name,
+        "flow": "oscillation" if wave else flow,
+        "samples": len(run),
+        "duration_s": float(run.time[-1]),
+        "largest_rate_1_s": float(np.max(np.abs(run.shear_rate))),
+        "frequency_rad_s": wave[0] if wave else None,
+        "strain_amplitude": wave[1] / wave[0] if wave else None,
+        "largest_stress_Pa": float(np.max(np.abs(run.shear_stress))),
+        "N1": normal[0] is not None,
+        "N2": normal[1] is not None,
+    }
+
+
+def _flow(run: ShearRun) -> str:
+    if not run.flows:
+        return "rest"
+    size = max(float(np.max(np.abs(run.shear_rate))), abs(run.rate_before))
+    jumps = np.count_nonzero(np.abs(np.diff(run.shear_rate)) > 1e-6 * size)
+    if jumps > len(run) // 4:
+        return _VARYING
+    if jumps:
+        return "steps of rate"
+    if abs(run.shear_rate[0]) <= 1e-6 * size:
+        return "cessation"
+    return "step of rate" if run.rate_before else "start-up"
+
+
+def _oscillation(run: ShearRun) -> tuple[float, float] | None:
+    """Return frequency (rad/s) and amplitude (1/s) of the first harmonic of a rate about zero."""
+    time, rate = run.time, run.shear_rate
+    clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
+    turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)
+    if turns.size < 2:
+        return None
+    zeros = 0.5 * (time[clear[turns]] + time[clear[turns + 1]])
+    about = np.pi * (turns.size - 1) / (zeros[-1] - zeros[0])
+
+    def fitted(frequency: float) -> tuple[np.ndarray, np.ndarray]:
+        angle = frequency * time
+        waves = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
+        found, *_ = np.linalg.lstsq(waves, rate, rcond=None)
+        return found, rate - waves @ found
+
+    nearby = (0.8 * about, 1.2 * about)
+    best = minimize_scalar(lambda x: np.sum(fitted(x)[1] ** 2), bounds=nearby, method="bounded")
+    frequency = float(best.x)  # pyright: ignore[reportAttributeAccessIssue]
+    found, left = fitted(frequency)
+    amplitude = float(np.hypot(found[0], found[1]))
+    if left @ left > (1.0 - _PERIODIC) * (rate @ rate) or abs(found[2]) > 0.2 * amplitude:
+        return None
+    return frequency, amplitude

@@ -1,0 +1,32 @@
+"""What is still done when a program is told to stop at once."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+_registered: list[Callable[[], object]] = []
+
+
+@contextmanager
+def last_words(callback: Callable[[], object]) -> Iterator[None]:
+    """Have a function called if the program is stopped while the context lasts.
+
+    Whatever decides to stop the program calls `say_last_words`, from a thread of its own. Nothing
+    is called if the context ends by itself.
+
+    Parameters
+    ----------
+    callback
+        Takes no arguments, and takes no longer than a user waits after Ctrl-C.
+    """
+    _registered.append(callback)
+    try:
+        yield
+    finally:
+        _registered.remove(callback)
+
+
+def say_last_words() -> None:
+    """Call what is registered, the last first; one that fails does not stop the others."""
+    for callback in reversed(_registered):
+        with suppress(Exception):
+            callback()

@@ -1,0 +1,81 @@
+"""Runs and findings as a notebook and a terminal show them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discover.dataset import Finding, Findings, LinearSweep, ShearDataset, ShearRun
+from discover.dataset.run_table import run_line
+from discover.protocols.shear import measured_rate
+
+TIME = np.linspace(0.0, 10.0, 201)
+ONES = np.ones(201)
+
+
+def run(rate, **more):
+    return ShearRun("a.csv", TIME, measured_rate(TIME, rate), rate, 3.0 * ONES, **more)
+
+
+@pytest.mark.parametrize(
+    ("rate", "before", "flow"),
+    [
+        (2.0 * ONES, 0.0, "start-up"),
+        (2.0 * ONES, 1.0, "step of rate"),
+        (0.0 * ONES, 1.0, "cessation"),
+        (0.0 * ONES, 0.0, "rest"),
+        (np.where(TIME < 5.0, 2.0, 1.0), 0.0, "steps of rate"),
+        (TIME, 0.0, "varying rate"),
+        (2.0 * np.cos(3.0 * TIME), 0.0, "oscillation"),
+        (np.cos(3.0 * TIME) + 0.3 * np.cos(9.0 * TIME), 0.0, "oscillation"),
+        (np.sign(np.cos(3.0 * TIME)), 0.0, "steps of rate"),
+        (1.0 + 2.0 * np.cos(3.0 * TIME), 0.0, "varying rate"),
+        (np.random.default_rng(0).normal(size=201), 0.0, "varying rate"),
+    ],
+)
+def test_a_flow_is_called_by_its_name(rate, before, flow):
+    line = run_line(run(rate, rate_before=before))
+    assert line["flow"] == flow
+    assert (line["frequency_rad_s"] is None) is (flow != "oscillation")
+
+
+def test_amplitude_and_frequency_are_read_off_a_noisy_rate():
+    noise = 0.1 * np.random.default_rng(1).normal(size=201)
+    line = run_line(run(6.0 * np.cos(3.0 * TIME + 1.0) + noise))
+    assert line["frequency_rad_s"] == pytest.approx(3.0, rel=0.002)
+    assert line["strain_amplitude"] == pytest.approx(2.0, rel=0.02)
+    assert line["largest_rate_1_s"] == pytest.approx(6.0, rel=0.1)
+    assert (line["samples"], line["duration_s"], line["largest_stress_Pa"]) == (201, 10.0, 3.0)
+
+
+def test_a_single_sample_has_a_line():
+    one = np.ones(1)
+    line = run_line(ShearRun("a", 0.0 * one, measured_rate([0.0], [1.0]), one, one))
+    assert (line["flow"], line["samples"]) == ("start-up", 1)
+
+
+def test_a_data_set_shows_its_runs_with_units_and_escapes_their_names():
+    wave = replace(run(2.0 * np.cos(TIME)), name="<b>.csv", first_normal_stress_difference=ONES)
+    sweep = LinearSweep(np.ones(1), np.ones(1), np.ones(1))
+    shown = ShearDataset("gel", (wave,), sweep, "from <there>")._repr_html_()
+    for text in ("a linear sweep of 1 points", "&lt;there&gt;", "&lt;b&gt;.csv", "oscillation"):
+        assert text in shown
+    for column in ("samples", "duration_s", "largest_rate_1_s", "frequency_rad_s"):
+        assert f"<th>{column}</th>" in shown
+    assert "<b>" not in shown
+    # nothing oscillates: no column for it
+    assert "frequency_rad_s" not in ShearDataset("x", (run(ONES),))._repr_html_()
+    assert "N2" not in shown
+    assert "measured" in shown
+    assert "no linear sweep" in ShearDataset("x", ())._repr_html_()
+
+
+def test_findings_show_their_whole_sentences_and_stay_a_tuple():
+    text = "The column <x> in a.csv " + "is not used, " * 20 + "at all."
+    findings = Findings([Finding("warning", "columns", "a.csv", text)])
+    shown = findings._repr_html_()
+    assert text.replace("<x>", "&lt;x&gt;") in shown
+    assert "0 errors, 1 warning, 0 notes." in shown
+    assert findings == (findings[0],)
+    assert Findings() == ()
+    assert Findings()._repr_html_() == "<p>Nothing wrong was found.</p>"
