@@ -1,6 +1,7 @@
 """Results as a notebook shows them: sentences, laws and tables, one under the other."""
 
 import html
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -16,6 +17,23 @@ class NotebookView:
 
     def _repr_html_(self) -> str:
         return "".join(map(as_html, self._shown()))
+
+
+class SentenceAndTable(NotebookView, ABC):
+    """A result that one sentence sums up and a table lays out."""
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """One sentence for a reader."""
+
+    @abstractmethod
+    def table(self) -> pd.DataFrame:
+        """Return what it consists of, one line each."""
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
 
 
 def as_html(part: Any) -> str:

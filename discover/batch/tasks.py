@@ -114,6 +114,7 @@ def run_close_loop(
         kept = folder.load("verdict") or {}
         return TaskResult(page, data, kept.get("text", ""), True)
     from discover.closed_loop import run_loop, run_loop_on_each
+    from discover.laws.registry import LAWS
     from discover.report.loop_report import write_loop
     from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, load_study_data
@@ -158,7 +159,8 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {model.law_name}, {modes}. {data_of_study.dataset.thinned}"
+        f"Declared model: {LAWS[model.law_name].described(model.parameters)}, {modes}. "
+        f"{data_of_study.dataset.thinned}"
     ).strip()
     write_loop(result, folder, study.name, summary, study.text)
     text = "\n".join(loop_verdict(result))

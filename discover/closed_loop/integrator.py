@@ -18,8 +18,6 @@ from discover.simulate.exponential_runge_kutta import phi_functions
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
 
-ModeSlope = Callable[[Float[Array, "4 k"], Float[Array, " k"]], Float[Array, "4 k"]]
-
 
 class Modes(NamedTuple):
     """Modes: moduli in Pa, relaxation times in s, both shape (k,)."""

@@ -351,7 +351,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
         fluid,
         stack_protocols(protocols),
         make_grids(protocols, times, strain_step=0.2),
-        [flow.name for flow in along],
+        [flow.title for flow in along],
         weissenberg,
         # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
         max(deborah, weissenberg / 5.0),

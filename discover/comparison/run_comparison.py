@@ -243,8 +243,7 @@ def _summary(data: StudyData, study: Study) -> str:
         kept = data.dataset.thinned.removesuffix(".")
         text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
         return f"{text}. {kept}" if kept else text
-    values = ", ".join(f"{key} = {value:g}" for key, value in made.parameters.items())
-    law = LAWS[made.law].title + (f" ({values})" if values else "")
+    law = LAWS[made.law].described(made.parameters)
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
     return f"{runs} computed from the {law} law, {noise}"
 
@@ -260,7 +259,6 @@ def _known_part(model: DeclaredModel, study: Study, fitted: tuple[str, ...]) -> 
 def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     if not study.model.known_relaxation:
         return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
-    values = ", ".join(f"{key} = {value:g}" for key, value in model.parameters.items())
-    title = LAWS[model.law_name].title + (f" ({values})" if values else "")
+    title = LAWS[model.law_name].described(model.parameters)
     modes = len(model.modulus)
     return title if modes == 1 else f"{title}, {modes} relaxation modes from the linear sweep"

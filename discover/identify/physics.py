@@ -4,7 +4,7 @@ None of them uses data. A law that fails one may still fit; it should not be car
 simulation of other flows without a second thought.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,7 +24,7 @@ from discover.identify.steady_states import (
 )
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
-from discover.notebook_view import NotebookView, table_of
+from discover.notebook_view import SentenceAndTable, table_of
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.grid import IntegrationGrid
 
@@ -86,7 +86,7 @@ class PhysicsCheck:
 
 
 @dataclass(frozen=True)
-class PhysicsReport(NotebookView):
+class PhysicsReport(SentenceAndTable):
     """All checks of a law.
 
     Attributes
@@ -111,10 +111,6 @@ class PhysicsReport(NotebookView):
     def table(self) -> pd.DataFrame:
         """Return the checks, one line each."""
         return table_of(self.checks)
-
-    def _shown(self) -> Iterable[Any]:
-        yield self.text
-        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""
@@ -324,8 +320,8 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     passed = value <= _LINEAR_TOLERANCE and offset <= _LINEAR_TOLERANCE
     text = (
         f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
-        f"{100.0 * value:.2g} % (the law linearised at rest, frequencies times relaxation time "
-        "from 0.01 to 100)"
+        f"{max(100.0 * value, 0.001):.2g} % (the law linearised at rest, frequencies times "
+        "relaxation time from 0.01 to 100)"
     )
     if offset > _LINEAR_TOLERANCE:
         text += f", and the law does not rest: dσ/dt = {offset:.2g} G/λ without flow or stress"

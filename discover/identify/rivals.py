@@ -11,7 +11,7 @@ be the simplest: fewest terms, then lowest complexity, then fewest invariants, t
 library; `RivalTable.simplest` says whether it is.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,7 @@ from discover.identify.lanes import LawTerms
 from discover.identify.relations import spell
 from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
-from discover.notebook_view import NotebookView, table_of
+from discover.notebook_view import SentenceAndTable, table_of
 
 MOST_RIVALS = 8
 
@@ -102,7 +102,7 @@ class FittedRival:
 
 
 @dataclass(frozen=True)
-class RivalTable(NotebookView):
+class RivalTable(SentenceAndTable):
     """Every law met that the data cannot tell from the chosen one.
 
     Attributes
@@ -140,10 +140,6 @@ class RivalTable(NotebookView):
     def table(self) -> pd.DataFrame:
         """Return the rivals, one line each, closest predictions first."""
         return table_of(self.rivals)
-
-    def _shown(self) -> Iterable[Any]:
-        yield self.text
-        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the table as JSON-able values."""

@@ -29,7 +29,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.tensor_sindy.problem import TrajectoryProblem, make_problem
 from discover.learners.tensor_sindy.sensitivities import linearise
-from discover.notebook_view import NotebookView, table_of
+from discover.notebook_view import NotebookView, SentenceAndTable, table_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -157,7 +157,7 @@ class LawStructure(NotebookView):
 
 
 @dataclass(frozen=True)
-class Structure(NotebookView):
+class Structure(SentenceAndTable):
     """What an experiment can determine of a library.
 
     Attributes
@@ -186,10 +186,6 @@ class Structure(NotebookView):
     def table(self) -> pd.DataFrame:
         """Return how many combinations stay unseen, and the verdicts, one line for each law."""
         return table_of(self.laws)
-
-    def _shown(self) -> Iterable[Any]:
-        yield self.text
-        yield self.table()
 
     def to_json(self) -> dict[str, Any]:
         """Return the structure as ``comparison.json`` holds it."""

@@ -23,3 +23,8 @@ class NamedLaw:
     title: str
     build: Callable[..., AbstractConstitutiveLaw]
     parameters: Mapping[str, tuple[float, float]]
+
+    def described(self, values: Mapping[str, float]) -> str:
+        """Return the title with the values of the parameters, by their names in study files."""
+        text = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        return f"{self.title} ({text})" if text else self.title

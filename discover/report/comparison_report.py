@@ -1,14 +1,17 @@
 """The report on a comparison: page, figures, JSON and LaTeX."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.identifiability import EXACT, Rival
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
+from discover.laws.registry import LAWS
 from discover.learners.result import RecoveredTerm
 from discover.report.equations import equations_tex
 from discover.report.page import made_by, render
@@ -24,6 +27,7 @@ from discover.report.wording import (
     RULES,
     interval,
     selection_sentence,
+    significant,
     spoken,
 )
 from discover.study.run_folder import RunFolder
@@ -79,7 +83,8 @@ def write_comparison(
         physics_titles=[LEARNER_TITLES[name] for name in comparison.physics],
         physics_rows=_physics_rows(comparison),
         proposals=_proposals(comparison),
-        rivals=[_rival(rival) for rival in comparison.rivals],
+        rivals=[_rival(rival, _titles(comparison)) for rival in comparison.rivals],
+        distillations=_distillations(comparison),
         run=made_by(
             folder.fingerprint,
             f"discover compare {comparison.name}.toml --seed {comparison.seed}",
@@ -132,7 +137,7 @@ def _selection(comparison: Comparison) -> dict[str, Any] | None:
         }
         for row in path
     ]
-    titles = {flow.name: flow.title for flow in comparison.flows_of("training")}
+    titles = _titles(comparison)
     runs = [
         {
             "title": titles.get(name, name),
@@ -258,7 +263,32 @@ def _proposals(comparison: Comparison) -> list[dict[str, Any]]:
 
 def _rivals_text(comparison: Comparison) -> str:
     sparse = comparison.outcomes.get("tensor_sindy")
-    return "" if sparse is None else str(sparse.details.get("rivals_text", ""))
+    text = "" if sparse is None else str(sparse.details.get("rivals_text", ""))
+    # the text is on laws that were fitted; a twin follows from mathematics and is never ruled out
+    exact = sum((r.errors_to_chosen["sigma12"] or 0.0) <= EXACT for r in comparison.rivals)
+    twins = "One law below gives" if exact == 1 else f"{exact} laws below give"
+    return f"{text} {twins} the same σ12 whatever the flow." if text and exact else text
+
+
+def _titles(comparison: Comparison) -> dict[str, str]:
+    """Return the flows in the field's notation, by their names."""
+    return {flow.name: flow.title for flow in comparison.flows}
+
+
+def _distillations(comparison: Comparison) -> list[dict[str, Any]]:
+    def values(parameters: Mapping[str, float]) -> str:
+        return ", ".join(f"{spoken(k)} = {significant(v)}" for k, v in parameters.items())
+
+    return [
+        {
+            "teacher": LAWS[row["teacher"]].title,
+            "student": LAWS[row["student"]].title,
+            "penalised": values(row["penalised"]),
+            "debiased": values(row["debiased"]),
+            "misfit": row["misfit"],
+        }
+        for row in comparison.distillations
+    ]
 
 
 def _structure(comparison: Comparison) -> dict[str, Any] | None:
@@ -289,7 +319,7 @@ def _physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def _rival(rival) -> dict[str, Any]:
+def _rival(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
     sum_of_terms = "".join(
         f"<mo>{'−' if value < 0 else '+'}</mo><mn>{abs(value):.3g}</mn>"
         f"<mspace width='0.15em'/>{term_mathml(name, dict(rival.inner))}"
@@ -300,7 +330,8 @@ def _rival(rival) -> dict[str, Any]:
         "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
         "reason": rival.reason,
         "errors": rival.errors_to_chosen,
-        "separated": f"{place['quantity']} in {place['protocol']}"
+        "separated": f"{SYMBOLS[place['quantity']]} in "
+        f"{titles.get(place['protocol'], place['protocol'])}"
         if place
         else "nothing that was tried",
     }

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from discover.closed_loop.residual import fast_part
 from discover.closed_loop.result import Fold, LoopResult, Stage
+from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError
 from discover.report.comparison_report import safe_name
@@ -71,12 +73,13 @@ def write_loop(
         questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=_error_rows(result),
+        noise_range=_noise_range(result),
         run_rows=_run_rows(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         rankings=[_ranking(ranking) for ranking in result.rankings],
         folds=[_fold(fold) for fold in result.folds],
         law=_law(result),
-        remaining=_flatten(result.remaining),
+        remaining=[(_REMAINING.get(key, key), value) for key, value in _flatten(result.remaining)],
         readings=[
             (f"Of the {name} model", reading.sentences)
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
@@ -158,13 +161,43 @@ def loop_tex(result: LoopResult) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _noise_range(result: LoopResult) -> list[float] | None:
+    """Return the noise of each fitted run; None where it was given or comes from another residual.
+
+    The noise of a loop is a mean over the fitted runs, either of their residuals as they are or of
+    the part of them that changes from sample to sample.
+    """
+    residuals = [r.relative_residual[-1] for r in result.records if not r.held_out]
+    for of_run in (lambda values: float(np.sqrt(np.mean(values**2))), fast_part):
+        noise = [of_run(values) for values in residuals]
+        if noise and np.isclose(np.mean(noise), result.noise_floor, rtol=1e-3):
+            return noise
+    return None
+
+
+def _symbols(stage: Stage) -> dict[str, str]:
+    """Return the typeset symbol of each parameter, as the equation has it."""
+    try:
+        parameters = make_effect(stage.effect).parameters
+    except InputError:  # an effect that somebody gave as an object
+        return {}
+    return {p.name: formula(p.symbol, f"{safe_name(stage.effect)}_{p.name}") for p in parameters}
+
+
 def _stage(stage: Stage, number: int) -> dict[str, Any]:
+    symbols = _symbols(stage)
     return {
         "effect": spoken(stage.effect) if "sigma" in stage.effect else stage.effect,
         "kind": KINDS[stage.kind],
         "formula": formula(stage.equation, f"formula{number}"),
         "parameters": [
-            {"name": name, "value": p.value, "ci95": p.ci95, "unit": p.unit}
+            {
+                "name": name,
+                "symbol": symbols.get(name, "–"),
+                "value": p.value,
+                "ci95": p.ci95,
+                "unit": p.unit,
+            }
             for name, p in stage.parameters.items()
         ],
         "aliases": ", ".join(map(spoken, stage.aliases)),
@@ -209,6 +242,19 @@ def _ranking(ranking, shown: int = 12) -> list[dict[str, Any]]:
 
 _SHARES = ("error", "floor")
 """Last words of what is a share of the root-mean-square stress."""
+
+
+_REMAINING = {
+    "structured": "structure left in the residual",
+    "error": "error on the fitted runs",
+    "noise floor": "noise",
+    "linear error": "error of the linear sweep",
+    "autocorrelation": "correlation of neighbouring residuals",
+    "worst run": "run missed most",
+    "worst run error": "its error",
+    "description": "in words",
+}
+"""What is said of the residual, for those who do not read the JSON."""
 
 
 def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:

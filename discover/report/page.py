@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from discover import __version__
 from discover.report.palette import style_sheet
-from discover.report.wording import interval, percent, percent_range, significant, spoken
+from discover.report.wording import estimate, interval, percent, percent_range, significant, spoken
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -68,6 +68,7 @@ def render(template: str, **content: Any) -> str:
         percent_range=percent_range,
         significant=significant,
         interval=interval,
+        estimate=estimate,
         spoken=spoken,
         safe_svg=Markup,
     )

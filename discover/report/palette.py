@@ -21,7 +21,7 @@ COLOURS = {
     "purple": ("#b5558d", "#e39cc5"),
     "yellow": ("#b87f00", "#f0b840"),
     "grid": ("#e2e4e7", "#33373d"),
-    "shade": ("#eef0f2", "#23272c"),
+    "shade": ("#eef0f2", "#2c3138"),
 }
 """Name of the CSS variable, without dashes → its value in light and in dark."""
 

@@ -1,5 +1,6 @@
 """Numbers and conclusions in words."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 
@@ -29,7 +30,29 @@ def significant(value: float | None, digits: int = 4) -> str:
     """Return a number with so many digits; a dash where there is none."""
     if value is None:
         return "–"
-    return "0" if abs(value) < 1e-12 else f"{value:.{digits}g}".replace("-", "−")
+    if abs(value) < 1e-12 or not math.isfinite(value):
+        return "0" if abs(value) < 1e-12 else f"{value}".replace("-", "−")
+    power = _power(value)
+    return _plain(float(f"{value:.{digits}g}") / 10.0**power) + _times_ten(power)
+
+
+_READABLE = (1e-3, 1e5)
+"""Between which a number is written without a power of ten."""
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def _power(value: float) -> int:
+    """Return the power of ten that is written apart; 0 where none is needed."""
+    low, high = _READABLE
+    return 0 if value == 0 or low <= abs(value) < high else math.floor(math.log10(abs(value)))
+
+
+def _times_ten(power: int) -> str:
+    return f" × 10{str(power).translate(_SUPERSCRIPTS)}" if power else ""
+
+
+def _plain(value: float) -> str:
+    return f"{value + 0.0:.12g}".replace("-", "−")
 
 
 _LETTERS = (
@@ -39,6 +62,8 @@ _LETTERS = (
     ("kappa", "κ"),
     ("*", " "),
 )
+_WORDS = {"alpha": "α", "beta": "β", "xi": "ξ"}
+"""Letters that are also parts of English words."""
 
 
 def spoken(term: str) -> str:
@@ -47,7 +72,7 @@ def spoken(term: str) -> str:
     text = re.sub(r"(?<=sigma|madot)\.(?=sigma|gammadot)", "·", term)
     for spelled, letter in _LETTERS:
         text = text.replace(spelled, letter)
-    return text
+    return re.sub(r"\b(alpha|beta|xi)\b", lambda found: _WORDS[found[0]], text)
 
 
 _EFFECTS = {
@@ -69,15 +94,28 @@ def effect_title(name: str) -> str:
 
 
 def interval(bounds: Sequence[float] | None) -> str:
-    """Return an interval, with as many digits as tell its ends apart."""
+    """Return an interval with as many digits as tell two of its width."""
     if bounds is None:
         return "–"
     low, high = bounds
     width = abs(high - low)
-    digits = 4
-    while digits < 10 and width > 0 and f"{low:.{digits}g}" == f"{high:.{digits}g}":
-        digits += 1
-    return f"{low:.{digits}g} to {high:.{digits}g}".replace("-", "−")
+    if not 0.0 < width < math.inf:
+        return f"{significant(low)} to {significant(high)}"
+    power = _power(max(abs(low), abs(high)))
+    decimals = min(1 - math.floor(math.log10(width)) + power, 8)
+    low, high = (_plain(round(end / 10.0**power, decimals)) for end in (low, high))
+    return f"({low} to {high}){_times_ten(power)}" if power else f"{low} to {high}"
+
+
+def estimate(value: float | None, bounds: Sequence[float] | None) -> str:
+    """Return a number with the digits that its interval leaves it, but no fewer than two."""
+    if value is None or bounds is None:
+        return significant(value)
+    width = abs(bounds[1] - bounds[0])
+    if value == 0 or not 0.0 < width < math.inf:
+        return significant(value)
+    digits = 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(width))
+    return significant(value, min(max(digits, 2), 8))
 
 
 def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:
@@ -92,7 +130,7 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "no term at all"
     parts = []
     for term in outcome.terms:
-        text = f"{significant(term.coefficient)} {spoken(term.term)}"
+        text = f"{estimate(term.coefficient, term.ci95)} {spoken(term.term)}"
         if term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)

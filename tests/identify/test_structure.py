@@ -11,23 +11,18 @@ from discover.identify.lanes import LawTerms
 from discover.identify.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
-from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library import build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
-LIBRARY = TermLibrary(
-    (
-        *build_library().terms,
-        *(
-            parse_term(name)
-            for name in (
-                "tr(sigma)*sigma",
-                "tr(sigma)*gammadot",
-                "tr(sigma.gammadot)*I",
-                "tr(gammadot.gammadot)*I",
-                "tr(sigma.gammadot)*gammadot",
-            )
-        ),
+LIBRARY = build_library().extended(
+    parse_term(name)
+    for name in (
+        "tr(sigma)*sigma",
+        "tr(sigma)*gammadot",
+        "tr(sigma.gammadot)*I",
+        "tr(gammadot.gammadot)*I",
+        "tr(sigma.gammadot)*gammadot",
     )
 )
 

@@ -20,28 +20,19 @@ from discover.laws import (
     UpperConvectedMaxwell,
 )
 from discover.simulate import simulate_homogeneous_flow
-from tensor_library import TermLibrary, build_library, parse_term, uniaxial_extension
+from tensor_library import build_library, parse_term, uniaxial_extension
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 PTT = "(exp(epsilon*tr(sigma))-1)*sigma"
 # one library for the whole file: one compilation of each program
-LIBRARY = TermLibrary(
-    tuple(
-        dict.fromkeys(
-            (
-                *build_library().terms,
-                *(
-                    parse_term(name)
-                    for name in (
-                        "tr(sigma)*sigma",
-                        "tr(sigma)*gammadot",
-                        "tr(sigma.gammadot)*I",
-                        "tr(gammadot.gammadot)*I",
-                        PTT,
-                    )
-                ),
-            )
-        )
+LIBRARY = build_library().extended(
+    parse_term(name)
+    for name in (
+        "tr(sigma)*sigma",
+        "tr(sigma)*gammadot",
+        "tr(sigma.gammadot)*I",
+        "tr(gammadot.gammadot)*I",
+        PTT,
     )
 )
 

@@ -4,23 +4,18 @@ from dataclasses import replace
 
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
-from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library import build_library, parse_term
 
 FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
 
-LIBRARY = TermLibrary(
-    (
-        *build_library().terms,
-        *(
-            parse_term(name)
-            for name in (
-                "tr(sigma)*sigma",
-                "tr(sigma)*gammadot",
-                "tr(sigma.gammadot)*I",
-                "tr(sigma)^2*sigma",
-                "(exp(epsilon*tr(sigma))-1)*sigma",
-            )
-        ),
+LIBRARY = build_library().extended(
+    parse_term(name)
+    for name in (
+        "tr(sigma)*sigma",
+        "tr(sigma)*gammadot",
+        "tr(sigma.gammadot)*I",
+        "tr(sigma)^2*sigma",
+        "(exp(epsilon*tr(sigma))-1)*sigma",
     )
 )
 """The eight tensors, the twins of Johnson–Segalman, and the terms of both PTT laws."""

@@ -16,7 +16,7 @@ from discover.closed_loop.result import (
     Stage,
     StageParameter,
 )
-from discover.report.loop_report import write_loop
+from discover.report.loop_report import _noise_range, write_loop
 from discover.report.plots.cycles import in_last_cycle
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
@@ -210,9 +210,31 @@ def test_oscillations_are_drawn_against_strain_and_rate_and_start_ups_are_not():
     waves = replace(loop_result(), records=(oscillating(), oscillating("held.csv", True)))
     drawn = lissajous_picture(waves)
     assert drawn is not None
-    for text in ("elastic: σ₁₂ (Pa)", "viscous: σ₁₂ (Pa)", "strain γ", "γ̇ (1/s)", "held: 30 %"):
+    for text in ("elastic: σ₁₂ (Pa)", "viscous: σ₁₂ (Pa)", "strain γ", "γ̇ (1/s)", "held", "30 %"):
         assert text in drawn.svg
     assert lissajous_picture(loop_result()) is None
+
+
+def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residuals():
+    given = loop_result()
+    assert _noise_range(given) is None  # 0.5 % that somebody gave: no run has it
+    residual = given.records[0].relative_residual[-1]
+    noise = float(np.sqrt(np.mean(residual**2)))
+    fitted = replace(given.records[0], name="second.csv")
+    estimated = replace(given, records=(*given.records, fitted), noise_floor=noise)
+    assert _noise_range(estimated) == pytest.approx([noise, noise])
+
+
+def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path):
+    result = loop_result()
+    (stage,) = result.stages
+    known = {"gain_error": StageParameter(0.7, (0.69, 0.71), "")}
+    result = replace(result, stages=(replace(stage, parameters={**known, **stage.parameters}),))
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d", "").read_text("utf-8")
+    row = re.search(r"<tr><td>gain_error</td>.*?</tr>", page, re.S)
+    assert row is not None
+    assert 'class="formula"' in row[0]
+    assert '<tr><td>gain</td><td class="text">–</td>' in page  # named as nobody names it
 
 
 def test_the_last_cycle_is_one_period_long():

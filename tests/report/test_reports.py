@@ -38,11 +38,8 @@ from discover.report.plots.studies import third_harmonic
 from discover.report.plots.style import SPARSE
 from discover.report.verdicts import QUESTIONS, comparison_verdict
 from discover.report.wording import (
-    interval,
     percent,
-    percent_range,
     selection_sentence,
-    significant,
     spoken,
 )
 from discover.study import RunFolder, parse_study
@@ -328,15 +325,6 @@ def test_every_term_typesets_as_well_formed_mathml():
     law = law_element(terms, False)
     ElementTree.fromstring(law)
     assert "<mn>-7</mn>" in law
-
-
-def test_numbers_keep_what_tells_them_apart():
-    assert interval((0.20001, 0.20002)) == "0.20001 to 0.20002"
-    assert percent(None) == significant(None) == interval(None) == "–"
-    assert percent(0.1234) == "12 %"
-    assert significant(-0.5) == "−0.5"
-    assert percent_range([0.01, 0.03]) == " (1 to 3 %)"
-    assert percent_range([0.01]) == percent_range(None) == ""
 
 
 def test_file_names_stay_in_the_folder():

@@ -22,6 +22,6 @@ EFFECT = GiesekusMobility(
     parameters=(EffectParameter("alpha", r"\alpha", low=0.0, high=1.0, first_trial=0.01),),
     equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
     source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
-    check="A second normal stress difference N2/N1 near -alpha/2 at low rates.",
+    check="A second normal stress difference N2/N1 near −α/2 at low rates.",
     visible="alpha of about 0.05 at a Weissenberg number of 1.",
 )

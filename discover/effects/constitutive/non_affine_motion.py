@@ -21,7 +21,7 @@ EFFECT = NonAffineMotion(
     parameters=(EffectParameter("xi", r"\xi", low=0.0, high=2.0, first_trial=0.01),),
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",
     source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
-    check="N2/N1 near -xi/2 at all rates, and a stress that oscillates in fast start-up.",
+    check="N2/N1 near −ξ/2 at all rates, and a stress that oscillates in fast start-up.",
     visible="xi of about 0.05 at a Weissenberg number of 1.",
     explicit_rate=True,
 )

@@ -17,6 +17,7 @@ from discover.report.plots.style import (
     legend_above,
     literal,
     make_logarithmic,
+    make_percentage,
     picture,
     runs_through_decades,
 )
@@ -97,9 +98,26 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
 
 
 def short_title(record: RunRecord) -> str:
-    """Return the name of a run with its errors before and after."""
-    name = literal(record.name.removesuffix(".csv"))
-    return f"{name}: {percent(record.errors[0])} → {percent(record.errors[-1])}"
+    """Return the name of a run, and below it its errors before and after."""
+    name = literal(shortened(record.name))
+    return f"{name}\n{percent(record.errors[0])} → {percent(record.errors[-1])}"
+
+
+def shortened(name: str, longest: int = 30) -> str:
+    """Return the name of a run as it fits over a panel: its beginning and its end.
+
+    Parameters
+    ----------
+    name
+        Of the run, which may be a file's.
+    longest
+        Most characters.
+    """
+    name = name.removesuffix(".csv")
+    if len(name) <= longest:
+        return name
+    end = longest // 2
+    return f"{name[: longest - end - 1]}…{name[-end:]}"
 
 
 def residual_picture(result: LoopResult) -> Picture:
@@ -189,7 +207,7 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
         panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
     if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
         panel.set_xscale("log")
-    panel.set_yscale("log")
+    make_percentage(panel.yaxis)
     unit = f" ({_UNITS[name]})" if name in _UNITS else ""
     panel.set_xlabel(literal(name.replace("_", " ")) + unit)
     panel.set_ylabel("relative error (%)")
@@ -222,7 +240,7 @@ def waterfall_picture(result: LoopResult) -> Picture:
             panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
             _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
         panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
-        panel.set_yscale("log")
+        make_percentage(panel.yaxis)
         heights = [100.0 * value for _, _, values, _ in series for value in values]
         panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
         panel.set_xticks(positions, labels)
@@ -267,7 +285,9 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
                 color=[GREEN if c.effect == chosen else BEFORE for c in best],
             )
             panel.set_xlim(0, 100)
-            panel.set_title(f"stage {number + 1}" + ("" if chosen else ": none added"))
+            kept = any(c.effect == chosen for c in best)
+            said = "" if kept else ": taken later" if chosen else ": none added"
+            panel.set_title(f"stage {number + 1}{said}")
             panel.set_xlabel("squared residual removed (%)")
             panel.tick_params(axis="y", labelsize=7.5)
         return picture(
@@ -292,8 +312,9 @@ def run_error_picture(result: LoopResult) -> Picture:
             panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
             label = "augmented, held out" if record.held_out else "augmented, fitted"
             panel.plot(after, position, "o", color=colour, label=label)
-        panel.set_yticks(range(len(records)), [literal(r.name) for r in records[::-1]])
-        panel.set_xscale("log")
+        panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
+        panel.set_ylim(-0.6, len(records) - 0.4)
+        make_percentage(panel.xaxis)
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
         return picture(drawing, "run_errors", "Residual by run: error before and after.")

@@ -10,6 +10,7 @@ from matplotlib.patches import Patch
 from discover.closed_loop.result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.report.plots.flows import units
+from discover.report.plots.loop import shortened
 from discover.report.plots.style import (
     INK,
     LEARNER_TITLES,
@@ -55,7 +56,7 @@ def loop_residual_map(result: LoopResult) -> Picture:
     for stage, title in ((0, "declared model"), (-1, "augmented model")):
         panels[title] = [
             ResidualRow(
-                f"{r.name.removesuffix('.csv')}{' (held out)' if r.held_out else ''}",
+                f"{shortened(r.name)}{' (held out)' if r.held_out else ''}",
                 r.strain if started else r.time,
                 r.relative_residual[stage],
             )

@@ -15,6 +15,7 @@ from discover.report.plots.style import (
     Picture,
     figure,
     legend_above,
+    make_percentage,
     picture,
 )
 from discover.report.wording import spoken
@@ -60,6 +61,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
                 label="runs left out",
             )
         left.set_ylabel("misfit of σ₁₂ (%)")
+        make_percentage(left.yaxis)
         bic = np.array([row["bic"] for row in path])
         middle.plot(sizes, bic - bic.min(), color=BEFORE, marker=".")
         middle.set_yscale("symlog", linthresh=10.0)

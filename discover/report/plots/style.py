@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from discover.report.palette import style_sheet
 
@@ -200,3 +200,20 @@ def make_logarithmic(axis) -> None:
     """Make an axis logarithmic, with labels at decades only."""
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})
     axis.set_minor_formatter(NullFormatter())
+
+
+_FEW_DECADES = 20.0
+"""Ratio of the ends of a logarithmic axis below which decades alone do not say where one is."""
+
+
+def make_percentage(axis) -> None:
+    """Make an axis of per cents logarithmic, with plain numbers; 2 and 5 too where it is short."""
+    make_logarithmic(axis)
+
+    def between(value: float, position: int | None = None) -> str:
+        low, high = axis.get_view_interval()
+        wanted = high < _FEW_DECADES * low and f"{value:e}"[0] in "25"
+        return f"{value:g}" if wanted else ""
+
+    axis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
+    axis.set_minor_formatter(FuncFormatter(between))

@@ -1,0 +1,61 @@
+"""Numbers, letters and axes as readers see them."""
+
+import pytest
+from matplotlib.figure import Figure
+
+from discover.report.plots.style import make_percentage
+from discover.report.wording import (
+    estimate,
+    interval,
+    percent,
+    percent_range,
+    significant,
+    spoken,
+)
+
+
+def test_numbers_keep_what_tells_them_apart():
+    assert interval((0.20001, 0.20002)) == "0.20001 to 0.20002"
+    assert percent(None) == significant(None) == interval(None) == "–"
+    assert percent(0.1234) == "12 %"
+    assert significant(-0.5) == "−0.5"
+    assert significant(1411.0, 3) == "1410"
+    assert significant(1.606e-5) == "1.606 × 10⁻⁵"
+    assert percent_range([0.01, 0.03]) == " (1 to 3 %)"
+    assert percent_range([0.01]) == percent_range(None) == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds", "shown", "between"),
+    [
+        (8.394, (4.804, 11.98), "8.4", "4.8 to 12"),
+        (0.19987, (0.1991, 0.2007), "0.1999", "0.1991 to 0.2007"),
+        (66.65, (0.0, 231.9), "67", "0 to 230"),
+        (1.606e-5, (9.202e-6, 2.292e-5), "1.6 × 10⁻⁵", "(0.9 to 2.3) × 10⁻⁵"),
+        (0.0, (-1e-3, 2e-3), "0", "−0.001 to 0.002"),
+        (1.0, (1.0, 1.0), "1", "1 to 1"),
+    ],
+)
+def test_an_estimate_has_the_digits_that_its_interval_leaves_it(value, bounds, shown, between):
+    assert estimate(value, bounds) == shown
+    assert interval(bounds) == between
+    assert estimate(value, None) == significant(value)
+
+
+def test_axes_of_per_cents_have_plain_numbers_and_more_of_them_where_they_are_short():
+    def labels(low, high):
+        axes = Figure().subplots()
+        axes.plot([1, 2], [low, high])
+        make_percentage(axes.yaxis)
+        axes.figure.draw_without_rendering()
+        ticks = (*axes.yaxis.get_majorticklabels(), *axes.yaxis.get_minorticklabels())
+        return {tick.get_text() for tick in ticks}
+
+    assert {"5", "10", "20"} <= labels(4.0, 30.0)
+    long = labels(0.01, 200.0)
+    assert {"0.01", "1", "100"} <= long
+    assert "20" not in long
+
+
+def test_what_looks_like_a_letter_inside_a_word_stays():
+    assert spoken("alpha of the alphabet, xi, maximal") == "α of the alphabet, ξ, maximal"
