@@ -25,7 +25,7 @@ from discover.report.plots.loop import (
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict
-from discover.report.wording import percent, significant, spoken
+from discover.report.wording import effect_title, percent, significant
 from discover.study.run_folder import RunFolder
 
 
@@ -101,7 +101,7 @@ def _error_rows(result: LoopResult) -> list[dict[str, Any]]:
     def errors(held_out: bool, model: int) -> list[float]:
         return [float(r.errors[model]) for r in result.records if r.held_out is held_out]
 
-    names = ["declared", *(f"+ {spoken(stage.effect)}" for stage in result.stages)]
+    names = ["declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     rows = [
         {
@@ -187,7 +187,8 @@ def _symbols(stage: Stage) -> dict[str, str]:
 def _stage(stage: Stage, number: int) -> dict[str, Any]:
     symbols = _symbols(stage)
     return {
-        "effect": spoken(stage.effect) if "sigma" in stage.effect else stage.effect,
+        "name": stage.effect,
+        "effect": effect_title(stage.effect),
         "kind": KINDS[stage.kind],
         "formula": formula(stage.equation, f"formula{number}"),
         "parameters": [
@@ -200,7 +201,7 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
             }
             for name, p in stage.parameters.items()
         ],
-        "aliases": ", ".join(map(spoken, stage.aliases)),
+        "aliases": ", ".join(map(effect_title, stage.aliases)),
         "source": stage.source,
         "check": stage.check,
         "error": stage.error,
@@ -221,20 +222,20 @@ def _fold(fold: Fold) -> dict[str, Any]:
         "run": fold.run,
         "error_before": fold.error_before,
         "error_after": fold.error_after,
-        "effects": ", ".join(map(spoken, fold.effects)) or "none",
+        "effects": ", ".join(map(effect_title, fold.effects)) or "none",
     }
 
 
 def _ranking(ranking, shown: int = 12) -> list[dict[str, Any]]:
     return [
         {
-            "effect": spoken(c.effect),
+            "effect": effect_title(c.effect),
             "kind": KINDS[c.kind],
             "score": c.score,
             "reduction": c.reduction,
             "error": c.error,
             "left_out_error": c.left_out_error,
-            "aliases": ", ".join(map(spoken, c.aliases)),
+            "aliases": ", ".join(map(effect_title, c.aliases)),
         }
         for c in ranking[:shown]
     ]

@@ -12,6 +12,8 @@ from discover.comparison.next_measurement import NextMeasurement
 from discover.report.wording import (
     LEARNERS,
     SYMBOLS,
+    effect_title,
+    estimate,
     interval,
     percent,
     significant,
@@ -150,11 +152,12 @@ def _loop_found(result: LoopResult) -> str:
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
-            f"{name} = {significant(p.value, 3)} {p.unit}".rstrip() + f" (95 % {interval(p.ci95)})"
+            f"{spoken(name.replace('_', ' '))} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+            + f" (95 % {interval(p.ci95)})"
             for name, p in stage.parameters.items()
         )
         added = "added " if i == 0 else ""
-        parts.append(f"{added}{KINDS[stage.kind]}: {spoken(stage.effect)}, {values}")
+        parts.append(f"{added}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}")
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
         if not result.remaining.get("noise_known", True):
@@ -188,8 +191,8 @@ def _loop_sure(result: LoopResult) -> str:
         parts.append(f"{_several(few, 'and')} {verb}")
     for stage in result.stages:
         if stage.aliases:
-            others = _several(stage.aliases, "or")
-            parts.append(f"these data cannot tell {spoken(stage.effect)} from {others}")
+            others = _several([*map(effect_title, stage.aliases)], "or")
+            parts.append(f"these data cannot tell {effect_title(stage.effect)} from {others}")
     return _sentence(parts)
 
 
@@ -202,7 +205,7 @@ def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:
 
 def _several(names: Sequence[str], word: str) -> str:
     """Return the first of several names, and how many more there are."""
-    shown = [spoken(name) for name in names[:_MOST_NAMES]]
+    shown = list(names[:_MOST_NAMES])
     if more := len(names) - len(shown):
         shown.append(f"{more} more")
     return f" {word} ".join(shown)
@@ -214,9 +217,11 @@ def _loop_next(result: LoopResult) -> str:
         check = doubtful.check.rstrip(". ")
         if not check[1:2].isdigit():  # N2 keeps its capital
             check = check[:1].lower() + check[1:]
-        purpose = f"To tell {spoken(doubtful.effect)} from" if doubtful.aliases else "To confirm"
-        others = _several(doubtful.aliases or [doubtful.effect], "and")
-        return f"{purpose} {others}: {check}."
+        title = effect_title(doubtful.effect)
+        if not doubtful.aliases:
+            return f"To confirm {title}: {check}."
+        others = _several([*map(effect_title, doubtful.aliases)], "and")
+        return f"To tell {title} from {others}: {check}."
     if not result.remaining.get("noise_known", True):
         return (
             f"Record at least {FEWEST_TESTED} samples in each run, or repeat a run to learn its "

@@ -66,7 +66,13 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
     for name in names:
         assert f'<figure id="{name}">' in page
         assert (tmp_path / "figures" / f"{name}.svg").is_file()
-    for text in ("cannot tell it from", "rate_gain", "held-out runs", "gain", "0.69 to 0.71"):
+    for text in (
+        "cannot tell it from",
+        "rate gain",
+        "<code>stress_gain</code>",
+        "held-out runs",
+        "0.69 to 0.71",
+    ):
         assert text in page
     assert (tmp_path / "loop.json").is_file()
     assert r"\begin{equation}" in (tmp_path / "equations.tex").read_text()
@@ -126,15 +132,15 @@ def test_every_verdict_is_three_sentences_that_answer_three_questions():
             assert sentence.endswith(".")
             # one sentence: no full stop before the last that a capital follows
             assert not re.search(r"\.\s+[A-ZΑ-Ω]", sentence), sentence
-    assert "To tell stress_gain from rate_gain: a check." in loop_verdict(aliased)[2]
+    assert "To tell stress gain from rate gain: a check." in loop_verdict(aliased)[2]
     unaliased = replace(aliased.stages[0], aliases=())
     confirm = loop_verdict(replace(aliased, stages=(unaliased,)))[2]
-    assert confirm == "To confirm stress_gain: a check."
+    assert confirm == "To confirm stress gain: a check."
 
 
 def test_the_verdict_of_an_unexplained_loop_does_not_end_on_what_was_added():
     text = loop_verdict(replace(loop_result(), verdict="unexplained"))[0]
-    assert text.startswith("Added in the instrument's signal: stress_gain, gain = 0.7 (95 % 0.69")
+    assert text.startswith("Added in the instrument's signal: stress gain, gain = 0.7 (95 % 0.69")
     assert text.endswith("what is left still has structure that no candidate explains.")
 
 
@@ -181,7 +187,7 @@ def test_many_aliases_are_counted_and_not_recited():
     stage = replace(loop_result().stages[0], aliases=aliases)
     for sentence in loop_verdict(replace(loop_result(), stages=(stage,)))[1:]:
         assert "2 more" in sentence
-        assert "edge_fracture" not in sentence
+        assert "edge fracture" not in sentence
 
 
 def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path):

@@ -21,7 +21,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import percent, spoken
+from discover.report.wording import effect_title, percent
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
@@ -225,7 +225,7 @@ def _draw_waves(panel, readings) -> None:
 
 def waterfall_picture(result: LoopResult) -> Picture:
     """Return the errors after each stage."""
-    labels = ["declared", *(f"+ {spoken(stage.effect)}" for stage in result.stages)]
+    labels = ["declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
@@ -280,7 +280,7 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
             best = ranking[:shown][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(
-                [spoken(c.effect) for c in best],
+                [effect_title(c.effect) for c in best],
                 [100.0 * max(c.reduction, 0.0) for c in best],
                 color=[GREEN if c.effect == chosen else BEFORE for c in best],
             )
