@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from discover.closed_loop.reading import oscillation
 from discover.closed_loop.result import LoopResult
+from discover.closed_loop.waves import oscillation
 from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.loop import draw_run, short_title
 from discover.report.plots.style import Picture, figure, legend_above, picture
