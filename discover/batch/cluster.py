@@ -96,7 +96,7 @@ def _local_client(workers: int) -> Iterator[Any]:
         """End the workers at once; what they had finished is in their folders, whole."""
         logging.disable(logging.CRITICAL)  # dask has much to say of workers that die
         for nanny in (nanny for cluster in started for nanny in cluster.workers.values()):
-            nanny.auto_restart = False
+            nanny.close_gracefully()  # or it starts another, for which nobody has work
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
 
