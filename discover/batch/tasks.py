@@ -1,6 +1,6 @@
 """One study from file to report."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +15,9 @@ from discover.study.schema import Study
 Progress = Callable[[str, float], None]
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
+
+_PAGE = "report.html"
+_JSON_FILES = {"compare": "comparison.json", "close-loop": "loop.json"}
 
 
 def nothing_to_note(study: Study) -> None:
@@ -39,6 +42,33 @@ class TaskResult:
     json_file: Path
     text: str
     was_complete: bool
+
+
+def _begin(
+    task: str, path: Path, out: Path, seed: int | None, overwrite: bool, note: Note
+) -> tuple[Study, RunFolder, TaskResult | None]:
+    """Read a study and open its folder; the last is what the folder holds if that is complete."""
+    enable_x64()
+    enable_compilation_cache()
+    study = read_study(path)
+    note(study)
+    folder = RunFolder(out, fingerprint(study, task, seed), overwrite)
+    if not (folder.complete and folder.holds(_PAGE, _JSON_FILES[task])):
+        return study, folder, None
+    text = (folder.load("verdict") or {}).get("text", "")
+    return study, folder, _result(task, folder, text, was_complete=True)
+
+
+def _end(task: str, folder: RunFolder, verdict: Sequence[str]) -> TaskResult:
+    """Keep the verdict beside the report, which was written, and close the folder."""
+    text = "\n".join(verdict)
+    folder.save("verdict", {"text": text})
+    folder.finish()
+    return _result(task, folder, text, was_complete=False)
+
+
+def _result(task: str, folder: RunFolder, text: str, was_complete: bool) -> TaskResult:
+    return TaskResult(folder.path / _PAGE, folder.path / _JSON_FILES[task], text, was_complete)
 
 
 def run_compare(
@@ -71,25 +101,16 @@ def run_compare(
     InputError
         If the study, its data or the folder is wrong.
     """
-    enable_x64()
-    enable_compilation_cache()
-    study = read_study(path)
-    note(study)
-    folder = RunFolder(out, fingerprint(study, "compare", seed), overwrite)
-    page, data = folder.path / "report.html", folder.path / "comparison.json"
-    if folder.complete and folder.holds(page.name, data.name):
-        kept = folder.load("verdict") or {}
-        return TaskResult(page, data, kept.get("text", ""), True)
+    study, folder, there = _begin("compare", path, out, seed, overwrite, note)
+    if there is not None:
+        return there
     from discover.comparison.run_comparison import compare
     from discover.report.comparison_report import write_comparison
     from discover.report.verdicts import comparison_verdict
 
     comparison = compare(study, seed, progress, folder, settle=fit_declared)
-    text = "\n".join(comparison_verdict(comparison))
     write_comparison(comparison, folder, study.model.known_relaxation, study.text)
-    folder.save("verdict", {"text": text})
-    folder.finish()
-    return TaskResult(page, data, text, False)
+    return _end("compare", folder, comparison_verdict(comparison))
 
 
 def run_close_loop(
@@ -104,15 +125,9 @@ def run_close_loop(
 
     Parameters and errors as in `run_compare`; a seed only changes synthetic noise.
     """
-    enable_x64()
-    enable_compilation_cache()
-    study = read_study(path)
-    note(study)
-    folder = RunFolder(out, fingerprint(study, "close-loop", seed), overwrite)
-    page, data = folder.path / "report.html", folder.path / "loop.json"
-    if folder.complete and folder.holds(page.name, data.name):
-        kept = folder.load("verdict") or {}
-        return TaskResult(page, data, kept.get("text", ""), True)
+    study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
+    if there is not None:
+        return there
     from discover.closed_loop import run_loop, run_loop_on_each
     from discover.laws.registry import LAWS
     from discover.report.loop_report import write_loop
@@ -163,11 +178,9 @@ def run_close_loop(
         f"{data_of_study.dataset.thinned}"
     ).strip()
     write_loop(result, folder, study.name, summary, study.text)
-    text = "\n".join(loop_verdict(result))
-    folder.save("verdict", {"text": text})
-    folder.finish()
+    ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
-    return TaskResult(page, data, text, False)
+    return ended
 
 
 def fit_declared(model, dataset):

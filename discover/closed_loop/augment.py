@@ -1,6 +1,6 @@
 """Refit the leading candidates and choose the one that earns its place, or none."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -247,14 +247,11 @@ def prune(
     -------
     The fit and the effects that stay.
     """
-    active = list(active)
-    while optional := [name for name in active[:-1] if name not in settled]:
-        support, name, without = _weakest(model, batch, fit, optional, n_candidates, prior)
-        if support > 0.0:
-            break
-        fit = without
-        active.remove(name)
-    return fit, active
+
+    def optional(fit: Fit, active: list[str]) -> list[str]:
+        return [name for name in active[:-1] if name not in settled]
+
+    return _drop(model, batch, fit, active, optional, 0.0, n_candidates, prior)
 
 
 def drop_undecided(
@@ -281,23 +278,46 @@ def drop_undecided(
     -------
     The fit and the effects that stay.
     """
-    active = list(active)
-    while active:
+
+    def optional(fit: Fit, active: list[str]) -> list[str]:
         bounds = intervals(model, batch, fit)
         amplitudes = {name: bounds[model.positions(name)[0]] for name in active}
-        optional = [
+        return [
             name
             for name, (low, high) in amplitudes.items()
             if low <= 0.0 <= high and name not in settled
         ]
-        if not optional:
-            break
-        support, name, without = _weakest(model, batch, fit, optional, n_candidates, prior)
-        if support >= INDISTINGUISHABLE:
+
+    return _drop(model, batch, fit, active, optional, INDISTINGUISHABLE, n_candidates, prior)
+
+
+def _drop(
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    active: Sequence[str],
+    optional: Callable[[Fit, list[str]], list[str]],
+    enough: float,
+    n_candidates: int,
+    prior: Prior,
+) -> tuple[Fit, list[str]]:
+    """Drop the weakest of the optional effects until the evidence for it is enough to stay."""
+    active = list(active)
+    while names := optional(fit, active):
+        support, name, without = _weakest(model, batch, fit, names, n_candidates, prior)
+        if support > enough:
             break
         fit = without
         active.remove(name)
     return fit, active
+
+
+def taken_out(model: AugmentedModel, fit: Fit, effect: str) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Return a fit's parameters with one effect at zero, and those still free without it."""
+    own = model.positions(effect)
+    theta = fit.theta.copy()
+    theta[own] = model.zero()[own]
+    return theta, tuple(p for p in fit.free if p not in own)
 
 
 def _weakest(
@@ -309,13 +329,7 @@ def _weakest(
     prior: Prior,
 ) -> tuple[float, str, Fit]:
     """Return the least evidence for one of several effects, its name, and the fit without it."""
-    starts, free = [], []
-    for name in optional:
-        at = model.positions(name)
-        theta = fit.theta.copy()
-        theta[at] = model.zero()[at]
-        starts.append(theta)
-        free.append(tuple(p for p in fit.free if p not in at))
+    starts, free = zip(*(taken_out(model, fit, name) for name in optional), strict=True)
     fits = fit_batch(model, batch, starts, free, prior=prior)
     weight = np.asarray(batch.weight)
     effective = summarise(fit.residual, weight).effective_samples

@@ -16,6 +16,7 @@ from discover.closed_loop.augment import (
     prune,
     refit,
     simplest,
+    taken_out,
 )
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.kept_search import Keeper
@@ -282,8 +283,7 @@ class Search:
         return exchanged
 
     def _exchange(self, name: str) -> bool:
-        own = self.model.positions(name)
-        without = self._without(own)
+        without = self._without(name)
         if not without.usable:
             return False  # without it the law runs away: nothing can be ranked from there
         others = [other for other in self.active if other != name]
@@ -324,11 +324,9 @@ class Search:
         self._leave_out()
         return True
 
-    def _without(self, positions: Sequence[int]) -> Fit:
+    def _without(self, effect: str) -> Fit:
         """Return the current fit with an effect taken out and the others refitted."""
-        theta = self.fit.theta.copy()
-        theta[positions] = self.model.zero()[positions]
-        free = tuple(p for p in self.fit.free if p not in positions)
+        theta, free = taken_out(self.model, self.fit, effect)
         fit = fit_batch(self.model, self.batch, [theta], [free], prior=self.prior)[0]
         if fit.usable:
             return fit
