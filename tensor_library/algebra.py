@@ -66,7 +66,9 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
     """Return tr(a·b)."""
     if _is_shear(first):
         # the 12 component stands for 12 and 21
-        return jnp.dot(first[:3], second[:3]) + 2.0 * first[3] * second[3]
+        a11, a22, a33, a12 = first
+        b11, b22, b33, b12 = second
+        return a11 * b11 + a22 * b22 + a33 * b33 + 2.0 * a12 * b12
     return jnp.sum(first * second)
 
 

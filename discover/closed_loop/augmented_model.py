@@ -1,7 +1,8 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
 An effect at zero amplitude changes nothing, so a subset of effects is a vector of parameters with
-zeros, never another program. Runs are padded to one grid and mapped over; so are trial vectors.
+zeros, never another program. Runs are padded to one grid and mapped over. Trial vectors are not: in
+a call of its own, each leaves out the terms that it has at zero.
 """
 
 import os
@@ -16,15 +17,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from discover.closed_loop.added_terms import AddedTerms
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.integrator import Modes, Series, integrate
-from discover.closed_loop.library_matrix import LibraryMatrix
 from discover.closed_loop.run_batch import RunBatch
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
-    LibraryTerm,
     ModeEffect,
     Record,
     SeriesElement,
@@ -32,10 +32,6 @@ from discover.effects import (
     StateEffect,
 )
 from discover.laws import LAWS, AbstractConstitutiveLaw
-
-LANES = 2
-"""Parameter vectors in one call of the compiled program: with more, compiling takes longer, the
-work of each is no less, and a single one takes as long as all (measured)."""
 
 # Calls side by side: one uses a single core, whatever the number of runs
 _WORKERS = min(os.cpu_count() or 1, 4)
@@ -74,37 +70,28 @@ class _Program:
             self.slices[effect.name] = slice(position, position + len(effect.parameters))
             position += len(effect.parameters)
         self.size = position
-        terms = [e for e in effects if isinstance(e, LibraryTerm)]
-        closed = [t for t in terms if t.term.closed_form is not None]
-        plain = [t for t in terms if t.term.closed_form is None]
-        self._library = LibraryMatrix(plain, [self.slices[t.name].start for t in plain])
+        self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
+        self.added = AddedTerms(self._constitutive, self.slices)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self._states = [e for e in effects if isinstance(e, StateEffect)]
-        self._constitutive = [
-            e
-            for e in effects
-            if isinstance(e, ConstitutiveEffect)
-            and (e not in terms or e in closed)
-            and not isinstance(e, ModeEffect | StateEffect)
-        ]
         self._kinematic = [e for e in effects if isinstance(e, KinematicEffect)]
         self._series = [e for e in self._kinematic if isinstance(e, SeriesElement)]
         self._signal = [e for e in effects if isinstance(e, SignalEffect)]
-        over_runs = jax.vmap(self._predict_run, in_axes=(None, None, 0))
-        self.predict = eqx.filter_jit(jax.vmap(over_runs, in_axes=(None, 0, None)))
+        over_runs = jax.vmap(self._predict_run, in_axes=(None, None, None, 0))
+        self.predict = eqx.filter_jit(over_runs)
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
 
-    def _predict_run(self, numbers, theta, run):
+    def _predict_run(self, numbers, used, theta, run):
         instrument_times = run.times / run.clock_factor
         rate = run.commanded_rate
         for effect in self._kinematic:
             rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
         times = run.times[::2]
-        stress, felt = self._integrate(numbers, theta, times, rate)
+        stress, felt = self._integrate(numbers, used, theta, times, rate)
         stress = stress + numbers.solvent_viscosity * felt + self._beside(theta, felt)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before)
@@ -128,7 +115,7 @@ class _Program:
         )
         return LAWS[self.structure.law_name].build(*known.values())
 
-    def _integrate(self, numbers, theta, times, rate):
+    def _integrate(self, numbers, used, theta, times, rate):
         law = self._law(numbers, theta)
         # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
@@ -136,18 +123,11 @@ class _Program:
             modulus = modulus * jnp.exp(theta[0])
         if self.structure.fit_relaxation_time:
             relaxation_time = relaxation_time * jnp.exp(theta[1])
-        matrix = self._library.matrix(theta)
+        of_law = jax.vmap(law.stress_rate, in_axes=(-1, 0), out_axes=-1)
+        added = self.added.rate(theta, used)
 
-        def mode_rate(stress, shear_rate):
-            zero = jnp.zeros_like(shear_rate)
-            deformation = jnp.stack([zero, zero, zero, shear_rate])
-            change = law.stress_rate(stress, shear_rate)
-            if self._library.powers:
-                change = change - self._library.extra_term(matrix, stress, deformation)
-            for effect in self._constitutive:
-                values = self._values(theta, effect)
-                change = change - effect.extra_term(values, stress, deformation)
-            return change
+        def modes_rate(stress, shear_rate):
+            return of_law(stress, shear_rate) - added(stress, shear_rate)
 
         extra = None
         if self._modes:
@@ -160,7 +140,7 @@ class _Program:
             viscosity = numbers.solvent_viscosity + self._beside(theta, jnp.ones(1))[0]
             series = Series(jnp.asarray(slip), jnp.asarray(compliance), viscosity)
         return integrate(
-            jax.vmap(mode_rate, in_axes=(-1, 0), out_axes=-1),
+            modes_rate,
             law.linear_relaxation,
             Modes(modulus, relaxation_time),
             extra,
@@ -253,25 +233,24 @@ class AugmentedModel:
         self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the predicted records of any number of parameter vectors, in Pa."""
+        program = self._program
 
-        def one(block: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
-            filled = [*block, *[block[-1]] * (LANES - len(block))]
-            made = self._program.predict(self._numbers, jnp.asarray(np.stack(filled)), batch)
-            return np.asarray(made)[: len(block)]
+        def one(theta: np.ndarray) -> np.ndarray:
+            used = program.added.in_use(theta)
+            return np.asarray(program.predict(self._numbers, used, theta, batch))
 
-        blocks = [thetas[first : first + LANES] for first in range(0, len(thetas), LANES)]
-        out = []
+        trials, out = list(thetas), []
         # the first of a shape alone, so that the program is compiled once
         shape = (batch.times.shape, batch.stress.shape)
-        if shape not in self._program.met:
-            out.append(one(blocks.pop(0)))
-            self._program.met.add(shape)
-        if len(blocks) > 1:
+        if shape not in program.met:
+            out.append(one(trials.pop(0)))
+            program.met.add(shape)
+        if len(trials) > 1:
             with ThreadPoolExecutor(_WORKERS) as pool:
-                out += pool.map(one, blocks)
+                out += pool.map(one, trials)
         else:
-            out += map(one, blocks)
-        return np.concatenate(out)
+            out += map(one, trials)
+        return np.stack(out)
 
     def residuals(
         self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch

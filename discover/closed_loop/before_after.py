@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -12,13 +10,14 @@ from discover.closed_loop.result import ErrorPair, RunRecord
 from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
 from discover.errors import InputError
+from discover.protocols import strains
 
 
 def strain_of(run: ShearRun) -> Float[np.ndarray, " n"]:
     """Return the strain of a run at its samples: recorded, or of its commanded rate."""
     if run.strain is not None:
         return run.strain
-    return np.asarray(jax.vmap(run.protocol.strain)(jnp.asarray(run.time)))
+    return strains(run.protocol, run.time)
 
 
 def cut_to_strain(runs: Sequence[ShearRun], window: tuple[float, float] | None) -> list[ShearRun]:

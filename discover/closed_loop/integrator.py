@@ -110,6 +110,7 @@ def integrate(
         weights.append(_weights(extra.relaxation_time, width, linear_relaxation))
         modes = Modes(*(jnp.concatenate(pair) for pair in zip(declared, extra, strict=True)))
     modulus, relaxation_time = modes
+    slope = jax.jit(slope)  # so that it is traced once, and not at each of the four stages
 
     def remainder(stress, shear_rate, factor):
         # with all times longer by a factor the law holds in its own time, which runs slower

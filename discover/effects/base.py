@@ -113,6 +113,11 @@ class ConstitutiveEffect(AbstractEffect):
     explicit_rate: bool = False
     kind: ClassVar[Kind] = "constitutive"
 
+    @property
+    def adds_term(self) -> bool:
+        """Whether there is an `extra_term`."""
+        return type(self).extra_term is not ConstitutiveEffect.extra_term
+
     def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
         """Return what the effect adds to h, dimensionless, for one mode.
 
@@ -132,8 +137,7 @@ class ConstitutiveEffect(AbstractEffect):
         None if it is no such sum, which is also what an effect that does not say is taken to be.
         """
         del values
-        adds = type(self).extra_term is not ConstitutiveEffect.extra_term
-        return None if adds else ()
+        return None if self.adds_term else ()
 
     def instantaneous_stress(
         self, values: Float[Array, " p"], shear_rate: Float[Array, " n"]

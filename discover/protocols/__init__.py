@@ -9,6 +9,7 @@ from discover.protocols.shear import (
     stack_protocols,
     start_up,
     step_rates,
+    strains,
 )
 
 __all__ = [
@@ -21,4 +22,5 @@ __all__ = [
     "stack_protocols",
     "start_up",
     "step_rates",
+    "strains",
 ]

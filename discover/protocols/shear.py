@@ -167,28 +167,45 @@ def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
     """
     m = max(p.table_times.shape[0] for p in protocols)
     c = max(p.amplitudes.shape[0] for p in protocols)
-
-    def padded(p: ShearProtocol) -> ShearProtocol:
-        # in numpy: every operation of JAX's outside a program is a program of its own to compile
-        times, rates = np.asarray(p.table_times), np.asarray(p.table_rates)
-        rows = m - times.size
-        waves = (0, c - p.amplitudes.shape[0])
-        parts = (
-            np.concatenate([times, times[-1] + 1.0 + np.arange(rows)]),
-            np.pad(rates, (0, rows), mode="edge"),
-            *(np.pad(np.asarray(v), waves) for v in (p.amplitudes, p.frequencies, p.phases)),
-        )
-        return ShearProtocol(*map(jnp.asarray, parts))
-
-    stacked = [padded(p) for p in protocols]
+    stacked = [_padded(p, m, c) for p in protocols]
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
+
+
+def _padded(protocol: ShearProtocol, entries: int, cosines: int) -> ShearProtocol:
+    # in numpy: every operation of JAX's outside a program is a program of its own to compile
+    times, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    rows = entries - times.size
+    waves = (0, cosines - protocol.amplitudes.shape[0])
+    parts = (
+        np.concatenate([times, times[-1] + 1.0 + np.arange(rows)]),
+        np.pad(rates, (0, rows), mode="edge"),
+        *(
+            np.pad(np.asarray(v), waves)
+            for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
+        ),
+    )
+    return ShearProtocol(*map(jnp.asarray, parts))
 
 
 def shear_rates(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return γ̇ in 1/s at many times in s, shape (n,)."""
-    return np.asarray(_shear_rates(protocol, jnp.asarray(times)))
+    return _at_many(ShearProtocol.shear_rate, protocol, times)
+
+
+def strains(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return the strain since t = 0 at many times in s, shape (n,)."""
+    return _at_many(ShearProtocol.strain, protocol, times)
+
+
+def _at_many(function, protocol, times):
+    # lengths rounded up, so that runs of all lengths share a few programs
+    n = len(times)
+    entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
+    padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
+    times = jnp.asarray(np.pad(times, (0, size - n), mode="edge"))
+    return np.asarray(_mapped(function, padded, times))[:n]
 
 
 @eqx.filter_jit
-def _shear_rates(protocol: ShearProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
-    return jax.vmap(protocol.shear_rate)(times)
+def _mapped(function, protocol: ShearProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
+    return jax.vmap(lambda time: function(protocol, time))(times)

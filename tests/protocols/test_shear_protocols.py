@@ -10,9 +10,11 @@ from discover.protocols import (
     oscillatory_shear,
     paper_test_protocols,
     paper_training_protocols,
+    shear_rates,
     stack_protocols,
     start_up,
     step_rates,
+    strains,
 )
 
 FLOWS = {
@@ -68,3 +70,13 @@ def test_the_paper_trains_on_eight_flows_and_tests_on_three_others():
 def test_a_wrong_protocol_is_refused(make):
     with pytest.raises(InputError):
         make()
+
+
+@pytest.mark.parametrize("flow", FLOWS.values(), ids=FLOWS.keys())
+@pytest.mark.parametrize("n", [1, 33])
+def test_many_samples_at_once_are_what_each_is_alone(flow, n):
+    times = np.linspace(0.0, 3.0, n)
+    for together, alone in ((shear_rates, flow.shear_rate), (strains, flow.strain)):
+        np.testing.assert_allclose(
+            together(flow, times), [float(alone(jnp.asarray(t))) for t in times], atol=1e-14
+        )

@@ -1,0 +1,124 @@
+"""What effects add to the law of every mode, of which only what is in use is computed.
+
+All candidates stand in one program, and most are at zero in any one trial: a fit has a few
+effects, and the terms of the library are tried one at a time. The program therefore branches. What
+decides is a few integers that no run and no mode changes, so that a branch not taken costs nothing;
+an effect at zero amplitude adds nothing, so that leaving it out changes nothing.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.closed_loop.library_matrix import LibraryMatrix
+from discover.effects import ConstitutiveEffect, LibraryTerm
+from tensor_library.integrity_basis import integrity_basis
+
+ModesRate = Callable[[Float[Array, "4 k"], Float[Array, " k"]], Float[Array, "4 k"]]
+"""From σ_k/G_k and λ_k γ̇ of all modes."""
+
+
+class InUse(NamedTuple):
+    """Which branches a parameter vector takes.
+
+    Attributes
+    ----------
+    library
+        0 without library terms, 1 with terms of one basis tensor, 2 with terms of several.
+    tensor
+        That one tensor, by its position among those that occur in the library.
+    others
+        0 without other terms, i + 1 with the i-th alone, one past the last with several.
+    """
+
+    library: np.int32
+    tensor: np.int32
+    others: np.int32
+
+
+class AddedTerms:
+    """Terms of the law of each mode that effects add.
+
+    Parameters
+    ----------
+    effects
+        Effects of the fluid; those that add no term are passed over.
+    slices
+        Where the parameters of each effect stand in the vector.
+    """
+
+    def __init__(self, effects: Sequence[ConstitutiveEffect], slices: Mapping[str, slice]):
+        plain = [e for e in effects if isinstance(e, LibraryTerm) and e.term.closed_form is None]
+        self._library = LibraryMatrix(plain, [slices[term.name].start for term in plain])
+        self._others = [e for e in effects if e.adds_term and e not in plain]
+        self._slices = slices
+
+    def in_use(self, theta: Float[np.ndarray, " p"]) -> InUse:
+        """Return the branches that a parameter vector takes."""
+        tensors = self._library.tensors_in_use(theta)
+        others = [i for i, e in enumerate(self._others) if theta[self._slices[e.name].start] != 0.0]
+        several = len(self._others) + 1
+        return InUse(
+            np.int32(min(len(tensors), 2)),
+            np.int32(tensors[0] if tensors else 0),
+            np.int32(0 if not others else others[0] + 1 if len(others) == 1 else several),
+        )
+
+    def rate(self, theta: Float[Array, " p"], used: InUse) -> ModesRate:
+        """Return the function that sums what is in use, dimensionless."""
+        library = self._library_rate(theta, used) if self._library.tensors else _nothing
+        others = self._others_rate(theta, used) if self._others else _nothing
+
+        def total(stress, shear_rate):
+            return library(stress, shear_rate) + others(stress, shear_rate)
+
+        return total
+
+    def _library_rate(self, theta, used: InUse) -> ModesRate:
+        library, matrix = self._library, self._library.matrix(theta)
+        # with one tensor in use all other rows are zero
+        row = matrix.sum(axis=0)
+        tensors = [
+            _over_modes(lambda stress, rate, i=i: integrity_basis(stress, rate)[i])
+            for i in library.tensors
+        ]
+        coefficient = _over_modes(
+            lambda stress, rate: jnp.sum(row * library.monomials(stress, rate))
+        )
+        every = _over_modes(lambda stress, rate: library.sum(matrix, stress, rate))
+
+        def one(stress, shear_rate):
+            tensor = jax.lax.switch(used.tensor, tensors, stress, shear_rate)
+            return coefficient(stress, shear_rate) * tensor
+
+        return lambda *flow: jax.lax.switch(used.library, [_nothing, one, every], *flow)
+
+    def _others_rate(self, theta, used: InUse) -> ModesRate:
+        def of(effects: Sequence[ConstitutiveEffect]) -> ModesRate:
+            return _over_modes(
+                lambda stress, rate: sum(
+                    e.extra_term(theta[self._slices[e.name]], stress, rate) for e in effects
+                )
+            )
+
+        branches = [_nothing, *(of([e]) for e in self._others), of(self._others)]
+        return lambda *flow: jax.lax.switch(used.others, branches, *flow)
+
+
+def _nothing(stress, shear_rate):
+    del shear_rate
+    return jnp.zeros_like(stress)
+
+
+def _over_modes(term: Callable) -> ModesRate:
+    """Return a function of one mode's σ and γ̇, both shape (4,), as one of all modes."""
+
+    def of_mode(stress, shear_rate):
+        zero = jnp.zeros_like(shear_rate)
+        return term(stress, jnp.stack([zero, zero, zero, shear_rate]))
+
+    return jax.vmap(of_mode, in_axes=(-1, 0), out_axes=-1)
