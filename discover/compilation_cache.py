@@ -1,6 +1,8 @@
 """Keep compiled programs between runs of the software."""
 
 import os
+import zlib
+from contextlib import suppress
 from pathlib import Path
 
 # Diffrax and Optimistix report errors inside a program through a call back to Python, and a program
@@ -42,6 +44,34 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return None  # a home that cannot be written to costs time, not the run
+    with suppress(OSError):
+        remove_cut_short(folder)
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     return folder
+
+
+def remove_cut_short(folder: Path) -> None:
+    """Remove programs that a full disk or a kill left incomplete.
+
+    JAX neither writes them at once nor writes them anew, so that it would warn at every later
+    start. Each file is looked at once, at the first start after it was written.
+    """
+    stamp = folder / "checked"
+    since = stamp.stat().st_mtime - 1.0 if stamp.is_file() else 0.0
+    new = [entry for entry in folder.glob("*-cache") if entry.stat().st_mtime > since]
+    stamp.touch()
+    for entry in new:
+        if not _is_whole(entry.read_bytes()):
+            entry.unlink(missing_ok=True)
+
+
+def _is_whole(data: bytes) -> bool:
+    if data.startswith(b"\x28\xb5\x2f\xfd"):  # zstd, where that is installed: left to JAX
+        return True
+    stream = zlib.decompressobj()
+    try:
+        stream.decompress(data)
+    except zlib.error:
+        return False
+    return stream.eof

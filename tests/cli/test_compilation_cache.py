@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+import zlib
+
+from discover.compilation_cache import remove_cut_short
 
 SIMULATE = """
 import sys
@@ -15,7 +18,26 @@ simulate(Fluid(Giesekus(0.3), np.ones(1), np.ones(1)), start_up(2.0), np.linspac
 """
 
 
-def test_a_program_with_a_solver_in_it_is_kept(tmp_path):
-    # a check that calls back to Python would make it one that cannot be
-    subprocess.run([sys.executable, "-c", SIMULATE, str(tmp_path)], check=True, timeout=300)
-    assert any("_solve_adaptively" in path.name for path in tmp_path.iterdir())
+def start(folder):
+    """What a process says that simulates with a cache folder."""
+    command = [sys.executable, "-c", SIMULATE, str(folder)]
+    return subprocess.run(command, check=True, timeout=300, capture_output=True, text=True).stderr
+
+
+def test_a_program_with_a_solver_in_it_is_kept_and_one_cut_short_is_made_again(tmp_path):
+    # a check that calls back to Python would make it one that cannot be kept
+    start(tmp_path)
+    (kept,) = (path for path in tmp_path.iterdir() if "_solve_adaptively" in path.name)
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[: len(whole) // 2])  # as a full disk does, or a kill
+    assert start(tmp_path) == ""
+    assert kept.stat().st_size > 0.9 * len(whole)
+
+
+def test_whole_programs_are_left_and_broken_ones_go(tmp_path):
+    whole = zlib.compress(b"program " * 1000)
+    entries = {"a-cache": whole, "b-cache": whole[:-3], "c-cache": b"", "d-cache": b"nonsense"}
+    for name, content in entries.items():
+        (tmp_path / name).write_bytes(content)
+    remove_cut_short(tmp_path)
+    assert [path.name for path in tmp_path.glob("*-cache")] == ["a-cache"]
