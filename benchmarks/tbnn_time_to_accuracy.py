@@ -152,6 +152,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
 
+    import jax
+
     from discover.learners.tbnn_ude import TBNNUDE
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.precision import enable_x64
@@ -176,6 +178,7 @@ def main() -> None:
             return model.fit(data.runs).law_
 
         print(case, flush=True)
+        jax.clear_caches()  # or a case would find the programs of the one before
         clocked("default, compiling included", lambda: fitted("default"))
         clocked("default", lambda: fitted("default"))
         clocked(

@@ -22,7 +22,7 @@ from discover.learners.tbnn_ude.recipe_paper import (
     paper_loss,
     train_paper,
 )
-from discover.learners.tbnn_ude.variational import states_and_jacobian
+from discover.learners.tbnn_ude.variational import side_by_side, states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
@@ -65,6 +65,22 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
     np.testing.assert_allclose(
         jacobian @ direction, expected, atol=1e-7 * float(jnp.max(jnp.abs(expected)))
     )
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
+    law = make_network(jax.random.key(1), 3, True)
+    rebuild = Rebuild.everything(law)
+    some = jax.tree.map(
+        lambda x: x[:n],
+        (giesekus_problem.protocols, giesekus_problem.grids, giesekus_problem.target),
+    )
+    problem = eqx.tree_at(lambda p: (p.protocols, p.grids, p.target), giesekus_problem, some)
+    together = states_and_jacobian(rebuild.start, rebuild, giesekus_problem)
+    halves = side_by_side(rebuild.start, rebuild, problem)
+    for half, whole in zip(halves, together, strict=True):
+        # no more than the rounding of instructions of another width
+        np.testing.assert_allclose(half, whole[:n], rtol=1e-10, atol=1e-13)
 
 
 def test_constants_alone_recover_the_mobility_from_shear_stress(trained):

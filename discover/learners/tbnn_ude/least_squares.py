@@ -13,7 +13,11 @@ from jaxtyping import Array, Float
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import states_and_jacobian, trajectories
+from discover.learners.tbnn_ude.variational import (
+    side_by_side,
+    states_and_jacobian,
+    trajectories,
+)
 from discover.learners.tbnn_ude.weights import Rebuild
 
 # Normal equations halve the digits, which is harmless here: the damping keeps them well
@@ -31,6 +35,10 @@ _FAIR_STEPS = 4
 _FAR_BEHIND = 5.0
 
 Callback = Callable[[float], None]
+Integrate = Callable[
+    [Array, Rebuild, TrainingProblem],
+    tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]],
+]
 
 
 class Objective(eqx.Module):
@@ -86,13 +94,15 @@ class Linearised(eqx.Module):
         return self.rows + self.matrix @ (weights - self.weights), None
 
 
-def linearise(weights: Float[Array, " p"], objective: Objective) -> Linearised:
+def linearise(
+    weights: Float[Array, " p"], objective: Objective, integrate: Integrate = states_and_jacobian
+) -> Linearised:
     """Return the objective around some weights.
 
     The integration is a program of its own, apart from the solver's step: compiled inside it, it
-    took as long again.
+    took as long again. Outside of a transformation it may be done by `side_by_side`.
     """
-    states, jacobian = states_and_jacobian(weights, objective.rebuild, objective.problem)
+    states, jacobian = integrate(weights, objective.rebuild, objective.problem)
     return _with_prior(weights, objective, states, jacobian)
 
 
@@ -216,12 +226,12 @@ def minimise(
     pace
         Misfits of a rival after each of its steps: stop when far behind it.
     """
-    linearised = linearise(weights, objective)
+    linearised = linearise(weights, objective, side_by_side)
     state = first_state(linearised)
     best, stopping = weights, Stopping(target, pace)
     for step in range(steps):
         if step:
-            linearised = linearise(state.y_eval, objective)
+            linearised = linearise(state.y_eval, objective, side_by_side)
         weights, state = next_state(weights, linearised, state)
         misfit = norm_of_cost(float(state.f_info.as_min()))
         if np.isfinite(misfit):

@@ -5,11 +5,15 @@ state as one ordinary differential equation. J is 4 × 4, and four reverse passe
 network give it together with ∂f/∂θ, where one forward pass per weight would cost hundreds.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
 import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, Int
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
@@ -25,12 +29,41 @@ def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Arr
     """
     everything = jnp.ones(N_COEFFICIENTS)
     rebuild = Rebuild.of_constants(law, everything.astype(bool), everything)
-    return states_and_jacobian(rebuild.start, rebuild, problem)[0]
+    return side_by_side(rebuild.start, rebuild, problem)[0]
+
+
+def side_by_side(
+    weights: Float[Array, " p"], rebuild: Rebuild, problem: TrainingProblem
+) -> tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]]:
+    """Return what `states_and_jacobian` does, computed for two halves of the runs in threads.
+
+    Left to itself the compiled program uses two cores for longer than it takes on one: what it
+    shares out is too small. To be called from outside of any transformation.
+    """
+    n = problem.target.shape[0]
+    # halves of one size share a program; of an odd number of runs the middle one is in both
+    half = -(-n // 2)
+    if n < 2:
+        return states_and_jacobian(weights, rebuild, problem)
+    with ThreadPoolExecutor(1) as pool:
+        last = pool.submit(states_and_jacobian, weights, rebuild, problem, half, np.int32(n - half))
+        first = states_and_jacobian(weights, rebuild, problem, half, np.int32(0))
+        jax.block_until_ready(first)
+        return _joined(first, last.result(), 2 * half - n)
+
+
+@partial(jax.jit, static_argnums=2)
+def _joined(first, last, common: int):
+    return jax.tree.map(lambda a, b: jnp.concatenate([a, b[common:]]), first, last)
 
 
 @eqx.filter_jit
 def states_and_jacobian(
-    weights: Float[Array, " p"], rebuild: Rebuild, problem: TrainingProblem
+    weights: Float[Array, " p"],
+    rebuild: Rebuild,
+    problem: TrainingProblem,
+    count: int | None = None,
+    first: Int[Array, ""] | np.int32 | int = 0,
 ) -> tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]]:
     """Return the stress of every mode at the samples, and the derivatives of σ12 by every weight.
 
@@ -40,7 +73,12 @@ def states_and_jacobian(
         The numbers that move, and how they make a law.
     problem
         The training data.
+    count, first
+        How many runs, and the first of them; by default all.
     """
+    runs = (problem.protocols, problem.grids)
+    if count is not None:
+        runs = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, first, count), runs)
     modulus, relaxation_time = problem.modulus, problem.relaxation_time
     fluid = problem.fluid(rebuild(weights))
     decay = jax.lax.stop_gradient(fluid.decay_rate())[:, None, None]
@@ -80,5 +118,5 @@ def states_and_jacobian(
         )
         return jax.tree.map(lambda values: values[grid.sample_index], solution.ys)
 
-    states, jacobian = jax.vmap(one_run)(problem.protocols, problem.grids)
-    return states, jnp.where(problem.grids.sample_mask[..., None], jacobian, 0.0)
+    states, jacobian = jax.vmap(one_run)(*runs)
+    return states, jnp.where(runs[1].sample_mask[..., None], jacobian, 0.0)
