@@ -317,6 +317,7 @@ class Search:
         self.support[new] = self.support.pop(name)
         self.active[self.active.index(name)] = new
         self.settled = tuple(n for n in self.settled if n != name)
+        own = self.model.positions(name)
         self.known = {at: value for at, value in self.known.items() if at not in own}
         self.fit = self._sharpened(best.fit)
         self._polish()

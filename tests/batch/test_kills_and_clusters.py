@@ -159,7 +159,7 @@ def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp
     out = tmp_path / "out"
     settings = {
         "DASK_DISTRIBUTED__WORKER__PRELOAD": repr([str(tmp_path / "stand_in.py")]),
-        "SECONDS_A_PART": "0.3",
+        "SECONDS_A_PART": "3",  # so that the batch is at work when the signal comes
     }
     arguments = ["batch", *map(str, studies[::-1]), "--out", str(out), "--workers", "2"]
     process = subprocess.Popen(

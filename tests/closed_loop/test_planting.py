@@ -140,3 +140,19 @@ def test_a_mechanism_that_is_in_no_dictionary_is_unexplained(planter, mechanism)
     result = loop(planter.plant(outside=mechanism, size=0.1, seed=1))
     assert result.verdict == "unexplained"
     assert result.remaining["structured"]
+
+
+def test_an_effect_that_stood_in_for_another_gives_way_to_it(planter, monkeypatch):
+    exchanged = []
+    exchange = Search._exchange
+
+    def watched(search, name):
+        changed = exchange(search, name)
+        exchanged.append((name, changed))
+        return changed
+
+    monkeypatch.setattr(Search, "_exchange", watched)
+    case = planter.plant(["stress_offset"], size=0.12, noise=Noise(0.01), seed=1)
+    result = run_loop(case.dataset, case.declared, held_out=case.held_out, max_effects=3)
+    assert ("bearing_friction", True) in exchanged  # on runs of one sign alone they are alike
+    assert [stage.effect for stage in result.stages] == ["stress_offset"]
