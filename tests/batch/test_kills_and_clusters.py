@@ -91,6 +91,9 @@ def command(folder, pause=5.0):
     """The command line with the stand-in, to be completed by arguments."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
     code += f"from discover.batch import summary; summary._PAUSE = {pause}\n"
+    # whoever started the tests may ignore the signal, as a shell's & does, or block it
+    code += "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += "signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})\n"
     return [sys.executable, "-c", code + "from discover.cli import main; main()"]
 
 
