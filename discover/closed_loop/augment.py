@@ -16,9 +16,9 @@ from discover.closed_loop.least_squares import (
     fit_batch,
     left_out_errors,
 )
-from discover.closed_loop.residual import judging, summarise
 from discover.closed_loop.run_batch import RunBatch
 from discover.statistics import least_squares_covariance
+from discover.statistics.residual import judging, summarise
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""

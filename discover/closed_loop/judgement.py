@@ -8,14 +8,14 @@ from jaxtyping import Float
 
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.residual import (
+from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.result import RunRecord, Verdict
+from discover.statistics.residual import (
     FEWEST_FAST,
     STRUCTURE,
     summarise,
     tells_noise,
 )
-from discover.closed_loop.resolution import Resolution
-from discover.closed_loop.result import RunRecord, Verdict
 
 ONLY_NOISE = 0.9
 """A model that misses a record by more of it than this says nothing of it."""

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import SIGNIFICANCE, STRUCTURE, Expectation, noise_probability
 from discover.closed_loop.resolution import Resolution
+from discover.statistics.residual import SIGNIFICANCE, STRUCTURE, Expectation, noise_probability
 
 
 @dataclass(frozen=True)

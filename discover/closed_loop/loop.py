@@ -21,7 +21,6 @@ from discover.closed_loop.judgement import HeldOut, judge
 from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.residual import Expectation, fast_part, summarise
 from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.result import LoopResult, Stage, StageParameter
 from discover.closed_loop.run_batch import data_scales, make_batch
@@ -41,6 +40,7 @@ from discover.effects import (
 )
 from discover.errors import InputError
 from discover.laws import Fluid
+from discover.statistics.residual import Expectation, fast_part, summarise
 
 LINEAR_STRAIN = 0.4
 """Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""

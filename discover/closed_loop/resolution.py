@@ -8,9 +8,9 @@ from jaxtyping import Float
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.finer_steps import change_on_finer_steps
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.residual import judging
 from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
+from discover.statistics.residual import judging
 
 COMPUTED = 1e-6
 """Relative accuracy of this software's simulations (`discover.simulate.make_grid`). Data that were

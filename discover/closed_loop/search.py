@@ -29,12 +29,12 @@ from discover.closed_loop.least_squares import (
     left_out_errors,
 )
 from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.residual import summarise
 from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
 from discover.effects import AbstractEffect
 from discover.errors import InputError
+from discover.statistics.residual import summarise
 
 _ROUNDS, _POLISHES = 3, 5
 

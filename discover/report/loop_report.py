@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from discover.closed_loop.residual import fast_part
 from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.effects import make_effect
 from discover.equations.mathml import law_element
@@ -26,6 +25,7 @@ from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict
 from discover.report.wording import effect_title, percent, significant
+from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
 
 

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from discover.closed_loop.judgement import ONLY_NOISE
-from discover.closed_loop.residual import FEWEST_TESTED
 from discover.closed_loop.result import LoopResult, Stage
 from discover.comparison.comparison import Comparison
 from discover.comparison.next_measurement import NextMeasurement
@@ -21,6 +20,7 @@ from discover.report.wording import (
     terms_text,
     worst,
 )
+from discover.statistics.residual import FEWEST_TESTED
 
 QUESTIONS = ("What was found", "How sure", "What to measure next")
 """What the three sentences of every verdict answer, in order."""

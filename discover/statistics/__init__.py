@@ -2,6 +2,15 @@
 
 from discover.statistics.covariance import least_squares_covariance
 from discover.statistics.independent_samples import independent_samples
+from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.noise_model import NoiseModel, noise_model
 
-__all__ = ["NoiseModel", "independent_samples", "least_squares_covariance", "noise_model"]
+__all__ = [
+    "FitVerdict",
+    "LackOfFit",
+    "NoiseModel",
+    "independent_samples",
+    "lack_of_fit",
+    "least_squares_covariance",
+    "noise_model",
+]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.residual import summarise
 from discover.dataset import ShearDataset, ShearRun, load_dataset, relaxation_spectrum
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, start_up
 from discover.simulate import simulate
+from discover.statistics.residual import summarise
 
 TIMES = np.linspace(0.05, 10.0, 120)
 DECLARED = DeclaredModel.maxwell(100.0, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop.planting import Noise
-from discover.closed_loop.residual import (
+from discover.statistics.residual import (
     Expectation,
     is_noise,
     judging,

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import chi2
 
-from discover.statistics import independent_samples
+from discover.statistics.independent_samples import independent_samples
 
 LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
