@@ -22,6 +22,7 @@ from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import high_deborah_picture, loss_picture, sweep_picture
 from discover.report.plots.style import LEARNER_TITLES, Picture
+from discover.report.predictions import comparison_predictions, write_predictions
 from discover.report.verdicts import QUESTIONS, comparison_verdict
 from discover.report.wording import (
     RULES,
@@ -38,7 +39,7 @@ _COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
 def write_comparison(
     comparison: Comparison, folder: RunFolder, linear_relaxation: bool, study_text: str = ""
 ) -> Path:
-    """Write ``report.html``, ``comparison.json``, ``equations.tex`` and ``figures/*.svg``.
+    """Write the page, ``comparison.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
     Parameters
     ----------
@@ -61,6 +62,7 @@ def write_comparison(
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
     folder.write("comparison.json", content + "\n")
     folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
+    write_predictions(comparison_predictions(comparison), folder)
     page = render(
         "comparison.html",
         comparison=comparison,
@@ -88,7 +90,7 @@ def write_comparison(
         run=made_by(
             folder.fingerprint,
             f"discover compare {comparison.name}.toml --seed {comparison.seed}",
-            ("comparison.json", "equations.tex", "figures/*.svg"),
+            ("comparison.json", "predictions.csv", "equations.tex", "figures/*.svg"),
             study_text,
         ),
     )

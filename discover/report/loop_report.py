@@ -23,6 +23,7 @@ from discover.report.plots.loop import (
 )
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
+from discover.report.predictions import loop_predictions, write_predictions
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict
 from discover.report.wording import effect_title, percent, significant
 from discover.statistics.residual import fast_part
@@ -32,7 +33,7 @@ from discover.study.run_folder import RunFolder
 def write_loop(
     result: LoopResult, folder: RunFolder, name: str, summary: str, study_text: str = ""
 ) -> Path:
-    """Write ``report.html``, ``loop.json``, ``equations.tex`` and ``figures/*.svg``.
+    """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
     Parameters
     ----------
@@ -65,6 +66,7 @@ def write_loop(
     content = json.dumps(result.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
     folder.write("loop.json", content + "\n")
     folder.write("equations.tex", loop_tex(result))
+    write_predictions(loop_predictions(result), folder)
     page = render(
         "loop.html",
         name=name,
@@ -88,7 +90,7 @@ def write_loop(
         run=made_by(
             folder.fingerprint,
             f"discover close-loop {name}.toml",
-            ("loop.json", "equations.tex", "figures/*.svg"),
+            ("loop.json", "predictions.csv", "equations.tex", "figures/*.svg"),
             study_text,
         ),
     )

@@ -1,0 +1,135 @@
+"""``predictions.csv``: every curve that a report draws, one line a sample."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from discover.closed_loop.result import LoopResult, RunRecord
+from discover.comparison.comparison import Comparison
+from discover.comparison.flows import QUANTITIES, Flow
+from discover.study.run_folder import RunFolder
+
+COLUMNS = (
+    "run",
+    "role",
+    "time_s",
+    "strain",
+    "rate_1_s",
+    "quantity",
+    "source",
+    "value",
+    "low95",
+    "high95",
+    "measured",
+)
+
+PREDICTIONS = "predictions.csv"
+
+_ROLES = {"training": "fit", "held_out": "held_out", "test": "prediction"}
+_ROLES["high_deborah"] = "prediction"
+_SOURCES = {"before": "declared"}
+
+
+def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
+    """Return the curves of a comparison: the declared law's and each learner's, in every flow.
+
+    Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` hold what the data leave
+    open, rivals included; they are NaN where no claim is made, ``measured`` where nothing was.
+    A law that cannot be integrated through a flow has no line there.
+
+    Parameters
+    ----------
+    comparison
+        Flows over which only errors are mapped are left out.
+    """
+    parts = []
+    for flow in comparison.flows:
+        if flow.kind not in _ROLES:
+            continue
+        for who in ("before", *comparison.outcomes):
+            known = who == "before"
+            predictions = comparison.before if known else comparison.outcomes[who].predictions
+            predicted = predictions.get(flow.key)
+            if predicted is None:
+                continue
+            limits = _limits(comparison, who, flow)
+            for quantity in QUANTITIES:
+                low, high = limits.get(quantity, (np.nan, np.nan))
+                parts.append(
+                    _lines(
+                        run=flow.name,
+                        role=_ROLES[flow.kind],
+                        time_s=flow.times,
+                        strain=flow.strain,
+                        rate_1_s=flow.shear_rate,
+                        quantity=quantity,
+                        source=_SOURCES.get(who, who),
+                        value=predicted[quantity],
+                        low95=low,
+                        high95=high,
+                        measured=_measured(flow, quantity),
+                    )
+                )
+    return _table(parts)
+
+
+def loop_predictions(result: LoopResult) -> pd.DataFrame:
+    """Return the curves of a closed loop: σ12 by the declared model and by the augmented one.
+
+    Units as in `comparison_predictions`. Where nothing was added there is only the declared model.
+    """
+    return _table([part for record in result.records for part in _record_parts(record)])
+
+
+def write_predictions(table: pd.DataFrame, folder: RunFolder) -> None:
+    """Write a table of predictions into a folder of results."""
+    # nine digits: more than any measurement has, and than the integration promises
+    folder.write(PREDICTIONS, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+
+
+def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
+    sources = {"declared": record.predicted[0]}
+    if len(record.predicted) > 1:
+        sources["augmented"] = record.predicted[-1]
+    for source, predicted in sources.items():
+        yield _lines(
+            run=record.name,
+            role="held_out" if record.held_out else "fit",
+            time_s=record.time,
+            strain=record.strain,
+            rate_1_s=record.shear_rate,
+            quantity="sigma12",
+            source=source,
+            value=predicted,
+            low95=np.nan,
+            high95=np.nan,
+            measured=record.measured,
+        )
+
+
+def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[Any, Any]]:
+    """Return the band of a learner's predictions in a flow, by quantity; empty for no claim."""
+    band = comparison.next_measurement.bands.get(flow.key)
+    if who != "tensor_sindy" or band is None:
+        return {}
+    return {
+        quantity: (band.rivals_low[:, i], band.rivals_high[:, i])
+        for i, quantity in enumerate(QUANTITIES)
+    }
+
+
+def _measured(flow: Flow, quantity: str) -> Any:
+    """Return what was measured of a quantity; the truth of computed data is no measurement."""
+    if quantity == "sigma12" and flow.measured is not None:
+        return flow.measured
+    return np.nan if flow.is_truth else flow.reference.get(quantity, np.nan)
+
+
+def _lines(**columns: Any) -> pd.DataFrame:
+    return pd.DataFrame({name: columns[name] for name in COLUMNS})
+
+
+def _table(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(COLUMNS))
