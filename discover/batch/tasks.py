@@ -175,7 +175,7 @@ def run_close_loop(
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
         f"Declared model: {LAWS[model.law_name].described(model.parameters)}, {modes}. "
-        f"{data_of_study.dataset.thinned}"
+        f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
     write_loop(result, folder, study.name, summary, study.text)
     ended = _end("close-loop", folder, loop_verdict(result))

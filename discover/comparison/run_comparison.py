@@ -240,7 +240,7 @@ def _summary(data: StudyData, study: Study) -> str:
     runs = f"σ12 of {len(data.fit)} runs ({samples} samples)"
     made = study.data.synthetic
     if made is None:
-        kept = data.dataset.thinned.removesuffix(".")
+        kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
         text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
         return f"{text}. {kept}" if kept else text
     law = LAWS[made.law].described(made.parameters)

@@ -11,6 +11,7 @@ from discover.dataset.check_among import doubts_among_runs
 from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
 from discover.dataset.check_run import doubts_of_run
 from discover.dataset.finding import Finding, Findings
+from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import (
     INDEX_FILE,
@@ -63,6 +64,11 @@ def check_folder(
     unused: dict[str, list[str]] = {}
     for row, name in enumerate(index.columns["file"]):
         try:
+            reason = reason_to_set_aside(index, row, rate_before=True)
+            if reason is not None:
+                text = f"{name} is set aside: {reason}."
+                findings.append(Finding("note", "runs", name, text))
+                continue
             runs.append(read_run(root, index, row))
         except InputError as error:
             findings.append(Finding("error", "run", name, str(error)))

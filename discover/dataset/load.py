@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
+from discover.dataset.kind_of_test import reason_to_set_aside, stress_was_imposed
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 from discover.dataset.sequence import in_sequence
 from discover.dataset.table import Table, read_bytes, read_table
@@ -109,7 +110,8 @@ def load_dataset(
     A column may carry another unit in its name, such as ``stress_kPa`` or ``time_ms``. A run
     without a shear rate must have the strain; its rate is then derived from it, and its metadata
     say so under ``shear_rate_source``. A run of more than `MOST_SAMPLES` samples is thinned, and
-    its metadata say how under ``thinned``.
+    its metadata say how under ``thinned``. A run that is no transient in shear is set aside; see
+    `reason_to_set_aside`.
 
     Parameters
     ----------
@@ -140,17 +142,38 @@ def load_dataset(
     before = np.zeros(len(index))
     if rate_before is not None:
         before = read_column(index, "rate_before", rate_before)
+    aside = [reason_to_set_aside(index, row, rate_before is not None) for row in range(len(index))]
+    used = [row for row, reason in enumerate(aside) if reason is None]
+    if not used and aside:
+        raise InputError(
+            f"No run of {root.resolve().name!r} can be fitted: {index.columns['file'][0]} is set "
+            f"aside, since {aside[0]}. Add runs in shear from rest."
+        )
     runs = tuple(
-        read_run(root, index, row, factors[row], rate_is_measured, rate_window, before[row])
-        for row in range(len(index))
+        read_run(
+            root,
+            index,
+            row,
+            factors[row],
+            # of a test at a given stress the rate is what the fluid answered
+            rate_is_measured or stress_was_imposed(index, row),
+            rate_window,
+            before[row],
+        )
+        for row in used
     )
     if sequence is not None:
-        runs = in_sequence(runs, read_column(index, "sequence", sequence))
+        runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
     return ShearDataset(
         name=root.resolve().name,
         runs=runs,
         linear_sweep=find_sweep(root),
         provenance=_provenance(root),
+        set_aside={
+            name: reason
+            for name, reason in zip(index.columns["file"], aside, strict=True)
+            if reason is not None
+        },
     )
 
 

@@ -192,12 +192,15 @@ class ShearDataset(NotebookView):
         Small-amplitude data on the same fluid, where there are any.
     provenance
         Where the data come from, in words.
+    set_aside
+        Runs of the folder that cannot be fitted, by name, with the reason.
     """
 
     name: str
     runs: tuple[ShearRun, ...]
     linear_sweep: LinearSweep | None = None
     provenance: str = ""
+    set_aside: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self):
         names = [run.name for run in self.runs]
@@ -217,6 +220,11 @@ class ShearDataset(NotebookView):
         for run in self.runs:
             if run.name == name:
                 return run
+        if name in self.set_aside:
+            raise InputError(
+                f"The run {name!r} of {self.name!r} cannot be used: {self.set_aside[name]}. Name "
+                "another."
+            )
         raise InputError(
             f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
         )
@@ -231,6 +239,19 @@ class ShearDataset(NotebookView):
         """Which runs were thinned when they were read, in sentences; empty if none was."""
         runs = [run for run in self.runs if "thinned" in run.metadata]
         return " ".join(f"{run.name}: {run.metadata['thinned']}." for run in runs)
+
+    @property
+    def left_out(self) -> str:
+        """Which runs were set aside and why, in sentences, one for each reason."""
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.set_aside.items():
+            reasons.setdefault(reason, []).append(name)
+        return " ".join(
+            f"{names[0]} is set aside: {reason}."
+            if len(names) == 1
+            else f"{names[0]} and {len(names) - 1} more runs like it are set aside: {reason}."
+            for reason, names in reasons.items()
+        )
 
     def table(self) -> pd.DataFrame:
         """Return the runs as a table, one line each; units are in the names of the columns."""
@@ -249,6 +270,7 @@ class ShearDataset(NotebookView):
             table[name] = ["measured" if there else None for there in table[name]]
         yield table
         yield self.thinned
+        yield self.left_out
 
     def select(self, names: Sequence[str]) -> "ShearDataset":
         """Return the data set of the named runs, in the order given.
