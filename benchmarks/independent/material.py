@@ -1,0 +1,184 @@
+"""What every simulated material answers: its stresses in a shear flow from rest."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from independent.flow import Flow
+
+TOLERANCE = 1e-9
+"""Tolerance of the integrator, relative, and absolute in the scale of each state."""
+
+
+@dataclass(frozen=True)
+class Stresses:
+    """Shear stress and normal stress differences in Pa, each of the shape of the times."""
+
+    sigma12: np.ndarray
+    N1: np.ndarray
+    N2: np.ndarray
+
+    def __add__(self, other: "Stresses") -> "Stresses":
+        return Stresses(self.sigma12 + other.sigma12, self.N1 + other.N1, self.N2 + other.N2)
+
+
+class Material(ABC):
+    """Anything that has stresses in a shear flow."""
+
+    @abstractmethod
+    def respond(self, flow: Flow, times: np.ndarray) -> Stresses:
+        """Return the stresses in a flow from rest, at increasing times in s from 0 on."""
+
+
+class RateLaw(Material):
+    """A material whose state obeys an ordinary differential equation in time.
+
+    Written for the full stress tensor, in Pa and s; integrated by `scipy.integrate.solve_ivp` with
+    the method of order 8 of Hairer, Nørsett & Wanner 1993 (DOP853), from jump to jump.
+    """
+
+    modulus: float
+
+    @abstractmethod
+    def rest(self) -> np.ndarray:
+        """Return the state at rest, shape (m,)."""
+
+    def scale(self) -> np.ndarray:
+        """Return the size of each state that counts as one, shape (m,): 1 for a conformation."""
+        return np.ones(len(self.rest()))
+
+    @abstractmethod
+    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return the time derivative of the state at a shear rate in 1/s, shape (m,)."""
+
+    @abstractmethod
+    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return the extra stress tensor in Pa, shape (3, 3)."""
+
+    def respond(self, flow: Flow, times: np.ndarray) -> Stresses:
+        """Return the stresses in a flow from rest; see `Material.respond`."""
+        times = np.asarray(times, float)
+        rates = np.asarray(flow.rate(times), float)
+
+        def change(t, state):
+            return self.change(state, float(flow.rate(t)))
+
+        states = integrate(change, self.rest(), times, flow.jumps, self.scale())
+        return differences(
+            [self.stress(state, rate) for state, rate in zip(states, rates, strict=True)]
+        )
+
+
+def integrate(
+    change, start: np.ndarray, times: np.ndarray, jumps=(), scale: float | np.ndarray = 1.0
+) -> np.ndarray:
+    """Return the states at the times, shape (n, m), from a start at t = 0.
+
+    Raises
+    ------
+    ValueError
+        If the integrator gives up: the state runs away.
+    """
+    from scipy.integrate import solve_ivp
+
+    end = float(times[-1])
+    knots = [0.0, *(j for j in jumps if 0.0 < j < end), end]
+    states, state = np.empty((len(times), len(start))), np.asarray(start, float)
+    states[times <= 0.0] = state
+    for low, high in pairwise(knots):
+        # an open end, so that the rate inside a piece is never that after the jump
+        inside = (times > low) & (times <= high)
+        short = np.nextafter(high, low) if high in jumps else high
+        solution = solve_ivp(
+            lambda t, y, short=short: change(min(t, short), y),
+            (low, high),
+            state,
+            method="DOP853",
+            t_eval=np.unique(np.append(times[inside], high)),
+            rtol=TOLERANCE,
+            atol=TOLERANCE * scale,
+        )
+        if not solution.success:
+            raise ValueError(
+                f"The integration stopped at {low:g} to {high:g} s: {solution.message}"
+            )
+        states[inside] = solution.y.T[: np.count_nonzero(inside)]
+        state = solution.y[:, -1]
+    return states
+
+
+def differences(tensors: Sequence[np.ndarray]) -> Stresses:
+    """Return σ12, N1 = σ11 − σ22 and N2 = σ22 − σ33 of stress tensors, shape (n, 3, 3)."""
+    s = np.asarray(tensors, float)
+    return Stresses(s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2])
+
+
+def stretched(tensor: np.ndarray, rate: float) -> np.ndarray:
+    """Return L·T + T·Lᵀ with L_12 = γ̇, shape (3, 3)."""
+    turned = np.zeros((3, 3))
+    turned[0] = rate * tensor[1]
+    return turned + turned.T
+
+
+def rate_tensor(rate: float) -> np.ndarray:
+    """Return L + Lᵀ, shape (3, 3)."""
+    tensor = np.zeros((3, 3))
+    tensor[0, 1] = tensor[1, 0] = rate
+    return tensor
+
+
+class StressLaw(RateLaw):
+    """A rate law whose state is the extra stress tensor itself, nine numbers in Pa."""
+
+    def rest(self) -> np.ndarray:
+        """Return no stress."""
+        return np.zeros(9)
+
+    def scale(self) -> np.ndarray:
+        """Return the modulus, nine times."""
+        return np.full(9, self.modulus)
+
+    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return dσ/dt, flattened."""
+        return self.stress_change(state.reshape(3, 3), rate).ravel()
+
+    @abstractmethod
+    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+        """Return dσ/dt in Pa/s, shape (3, 3)."""
+
+    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return the state as a tensor."""
+        del rate
+        return state.reshape(3, 3)
+
+
+class Modes(RateLaw):
+    """Several rate laws side by side in one flow; their stresses add up."""
+
+    def __init__(self, *laws: RateLaw):
+        self.laws = laws
+        self.modulus = sum(law.modulus for law in laws)
+        self._cuts = np.cumsum([len(law.rest()) for law in laws])[:-1]
+
+    def rest(self) -> np.ndarray:
+        """Return the states at rest, one after another."""
+        return np.concatenate([law.rest() for law in self.laws])
+
+    def scale(self) -> np.ndarray:
+        """Return the scales, one after another."""
+        return np.concatenate([law.scale() for law in self.laws])
+
+    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return the time derivatives, one after another."""
+        parts = np.split(state, self._cuts)
+        changes = [law.change(p, rate) for law, p in zip(self.laws, parts, strict=True)]
+        return np.concatenate(changes)
+
+    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+        """Return the sum of the stresses."""
+        parts = np.split(state, self._cuts)
+        tensors = [law.stress(p, rate) for law, p in zip(self.laws, parts, strict=True)]
+        return np.sum(tensors, axis=0)
