@@ -80,6 +80,9 @@ class Comparison(NotebookView):
         sparse learner.
     known
         The known part as an equation; None where it is not wanted.
+    warnings
+        What a reader should know before believing anything else, one sentence each; shown in the
+        verdict.
     """
 
     name: str
@@ -98,6 +101,7 @@ class Comparison(NotebookView):
     seed: int = 0
     structure: Structure | None = None
     known: Equation | None = None
+    warnings: tuple[str, ...] = ()
 
     @property
     def physics(self) -> dict[str, Mapping[str, Any] | None]:
@@ -161,6 +165,7 @@ class Comparison(NotebookView):
         return table_of(self.rivals)
 
     def _shown(self) -> Iterable[Any]:
+        yield from self.warnings
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
             if self.known is not None:
@@ -224,6 +229,7 @@ class Comparison(NotebookView):
             ],
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,
+            "warnings": list(self.warnings),
             "statements": [
                 {"quantity": s.quantity, "undetermined": s.undetermined, "text": s.text}
                 for s in self.statements

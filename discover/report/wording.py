@@ -10,25 +10,38 @@ SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
 
 
+def known(value: float | None) -> bool:
+    """Return whether there is a number: JSON keeps what is not finite as None."""
+    return value is not None and math.isfinite(value)
+
+
 def percent(value: float | None) -> str:
     """Return a fraction as a percentage with two digits; a dash where there is none."""
-    if value is None:
+    if value is None or not math.isfinite(value):
         return "–"
     if value != 0 and abs(value) < 1e-5:
         return "< 0.001 %"
     return f"{100.0 * value:.2g} %" if abs(value) < 0.995 else f"{100.0 * value:.0f} %"
 
 
-def percent_range(values: Sequence[float] | None) -> str:
-    """Return the range of several fractions in brackets, to stand behind their mean."""
+def percent_range(values: Sequence[float | None] | None) -> str:
+    """Return the range of several fractions in brackets, to stand behind their mean.
+
+    Those that are None, where a law runs away, are counted.
+    """
     if values is None or len(values) < 2:
         return ""
-    return f" ({percent(min(values)).removesuffix(' %')} to {percent(max(values))})"
+    told = [value for value in values if value is not None and math.isfinite(value)]
+    lost = f"{len(values) - len(told)} of {len(values)} not predicted"
+    if not told:
+        return f" ({lost})"
+    text = f"{percent(min(told)).removesuffix(' %')} to {percent(max(told))}"
+    return f" ({text})" if len(told) == len(values) else f" ({text}; {lost})"
 
 
 def significant(value: float | None, digits: int = 4) -> str:
     """Return a number with so many digits; a dash where there is none."""
-    if value is None:
+    if value is None or math.isnan(value):
         return "–"
     if abs(value) < 1e-12 or not math.isfinite(value):
         return "0" if abs(value) < 1e-12 else f"{value}".replace("-", "−")
@@ -93,11 +106,14 @@ def effect_title(name: str) -> str:
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
-def interval(bounds: Sequence[float] | None) -> str:
-    """Return an interval with as many digits as tell two of its width."""
-    if bounds is None:
+def interval(bounds: Sequence[float | None] | None) -> str:
+    """Return an interval with as many digits as tell two of its width; a dash where none is known.
+
+    An interval of which an end is not known is none.
+    """
+    low, high = bounds or (None, None)
+    if low is None or high is None or math.isnan(low) or math.isnan(high):
         return "–"
-    low, high = bounds
     width = abs(high - low)
     if not 0.0 < width < math.inf:
         return f"{significant(low)} to {significant(high)}"
@@ -107,11 +123,12 @@ def interval(bounds: Sequence[float] | None) -> str:
     return f"({low} to {high}){_times_ten(power)}" if power else f"{low} to {high}"
 
 
-def estimate(value: float | None, bounds: Sequence[float] | None) -> str:
+def estimate(value: float | None, bounds: Sequence[float | None] | None) -> str:
     """Return a number with the digits that its interval leaves it, but no fewer than two."""
-    if value is None or bounds is None:
+    low, high = bounds or (None, None)
+    if value is None or low is None or high is None or not math.isfinite(value):
         return significant(value)
-    width = abs(bounds[1] - bounds[0])
+    width = abs(high - low)
     if value == 0 or not 0.0 < width < math.inf:
         return significant(value)
     digits = 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(width))
@@ -120,8 +137,8 @@ def estimate(value: float | None, bounds: Sequence[float] | None) -> str:
 
 def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:
     """Return the largest error of a quantity over flows."""
-    values = [row[quantity] for row in errors.values() if row[quantity] is not None]
-    return max(values, default=None)  # pyright: ignore[reportArgumentType]
+    values = [v for row in errors.values() if (v := row[quantity]) is not None and known(v)]
+    return max(values, default=None)
 
 
 def terms_text(outcome: LearnerOutcome) -> str:
