@@ -1,5 +1,6 @@
 """Check a data folder and say everything that is wrong or doubtful, not only the first thing."""
 
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -21,7 +22,7 @@ from discover.dataset.load import (
     read_run,
     resolve_folder,
 )
-from discover.dataset.run import LinearSweep, ShearRun, require_signal, same_samples
+from discover.dataset.run import LinearSweep, ShearRun, require_signal
 from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
 
@@ -199,6 +200,11 @@ def _sweep(
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
 
 
+def _digest(run: ShearRun) -> bytes:
+    """Return what tells runs of different samples apart, however many there are."""
+    return hashlib.sha256(run.time.tobytes() + run.shear_stress.tobytes()).digest()
+
+
 def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]:
     listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE}
     try:
@@ -210,9 +216,10 @@ def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]
             yield Finding(
                 "note", "runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used."
             )
-    for at, run in enumerate(runs):
-        first = next((other.name for other in runs[:at] if same_samples(run, other)), None)
-        if first is not None:
+    seen: dict[bytes, str] = {}
+    for run in runs:
+        first = seen.setdefault(_digest(run), run.name)
+        if first != run.name:
             yield Finding(
                 "warning",
                 "runs",

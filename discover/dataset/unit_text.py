@@ -1,8 +1,8 @@
 """Units as instruments and users write them, read by a small grammar of their own.
 
 Text from a file is never calculated: a unit is a product of known words with small exponents, and
-the only number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no units,
-and ``9**9**9`` is not worked out.
+the only number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no
+units, and ``9**9**9`` is not worked out.
 """
 
 import math
