@@ -14,8 +14,8 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
-from discover.dataset.load import INDEX_FILE
 from discover.dataset.importing.text_export import is_number
+from discover.dataset.load import INDEX_FILE
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import make_folder, write_text

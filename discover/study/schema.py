@@ -29,7 +29,7 @@ class Synthetic(Section):
     """Data computed from a known law instead of measured."""
 
     law: SyntheticLaw
-    parameters: dict[str, float] = {}
+    parameters: dict[str, float] = Field(default_factory=dict)
     protocol: Literal["paper"] = "paper"
     noise: Annotated[float, Field(ge=0, le=10)] = 0.0
     seed: Seed = 0
@@ -69,7 +69,7 @@ class Model(Section):
     modes: Literal["lve"] | None = None
     sweep_rad_s: tuple[Positive, Positive] | None = None
     solvent_viscosity_Pa_s: Annotated[float, Field(ge=0)] = 0.0
-    parameters: dict[str, float | Literal["fit"]] = {}
+    parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
     known_relaxation: bool = True
 
     @model_validator(mode="after")

@@ -91,8 +91,8 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated."""
 
-    columns: dict[QuantityName, str] = {}
-    units: dict[QuantityName, str] = {}
+    columns: dict[QuantityName, str] = Field(default_factory=dict)
+    units: dict[QuantityName, str] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
