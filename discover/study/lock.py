@@ -75,7 +75,7 @@ def lock_folder(folder: str | Path) -> FolderLock:
 
 
 def _open(path: Path) -> int:
-    """Open the lock file; a pipe or link that somebody put in its place is refused, not waited for."""
+    """Open the lock file; a pipe or link that somebody put in its place is refused."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     try:
         descriptor = os.open(path, flags, 0o644)
