@@ -2,7 +2,7 @@
 
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from discover.errors import InputError
 
@@ -30,6 +30,28 @@ _PLAIN = (
     (" after validation", ""),
 )
 """Words of pydantic and what users call it."""
+
+
+class Section(BaseModel):
+    """A table of a file that a user wrote: known keys alone, and every value of its own kind.
+
+    A whole number does where a number is wanted. Nothing else is turned into something else: true
+    is no 1, and "3" in quotes no 3.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lists(cls, content: Any) -> Any:
+        # files know lists alone, and what is read is not to change
+        if not isinstance(content, dict):
+            return content
+        return {key: _as_tuple(value) for key, value in content.items()}
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(map(_as_tuple, value)) if isinstance(value, list) else value
 
 
 def validated(model: type[_Model], content: object, where: str) -> _Model:
@@ -81,7 +103,12 @@ def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
 
 
 def _shown(value: object) -> str:
+    """Return a value as TOML spells it, about."""
     try:
+        if isinstance(value, bool):
+            return str(value).lower()
+        if isinstance(value, tuple):
+            return f"[{', '.join(map(_shown, value))}]"
         return repr(value)
     except ValueError:  # Python does not print integers of thousands of digits
         return "a number of thousands of digits"

@@ -4,17 +4,25 @@ import logging
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from multiprocessing import resource_tracker
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from discover.batch.progress import now_and_then
 from discover.batch.status import StudyStatus
 from discover.errors import InputError
 from discover.last_words import last_words
+
+if TYPE_CHECKING:  # dask is optional
+    from distributed import LocalCluster
+
+_log = logging.getLogger(__name__)
+_TRIES = 3  # starts of the workers; what kills them once, such as a short lack of memory, passes
 
 Job = tuple[str, str, str, str, int | None, bool]
 """Study file, name, task, folder, seed, overwrite: what `discover.batch.run.run_one` takes."""
@@ -57,6 +65,10 @@ def run_on_cluster(
             "Several workers need dask: install discover-rheology[batch], or leave --workers out."
         ) from None
     with _local_client(workers) if scheduler is None else _client_of(scheduler) as client:
+        if client is None:
+            for i, job in enumerate(jobs):
+                end(i, run(*job, progress=partial(say, i)))
+            return
         topic = f"discover-{uuid4()}"
         client.subscribe_topic(topic, lambda event: say(*event[1]))
         futures = {}
@@ -85,9 +97,12 @@ def _client_of(scheduler: str) -> Iterator[Any]:
 
 @contextmanager
 def _local_client(workers: int) -> Iterator[Any]:
-    """Yield a client of workers on this machine, which all end with the context."""
+    """Yield a client of workers on this machine, which all end with the context.
+
+    Yields None, with a word in the log, if no workers can be started.
+    """
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     others = set(multiprocessing.active_children())
     started: list[LocalCluster] = []
@@ -104,9 +119,10 @@ def _local_client(workers: int) -> Iterator[Any]:
     with last_words(kill_workers), dask.config.set({"distributed.worker.profile.enabled": False}):
         # the cluster's threads start every worker, so what they cannot hear no worker hears
         with _deaf_to_interrupts():
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address=":0", host="127.0.0.1"
-            )
+            cluster = _start(workers, others)
+        if cluster is None:
+            yield None
+            return
         started.append(cluster)
         try:
             with Client(cluster) as client:
@@ -118,6 +134,29 @@ def _local_client(workers: int) -> Iterator[Any]:
             with suppress(Exception):
                 cluster.close()
             logging.disable(level)
+
+
+def _start(workers: int, others: Collection[BaseProcess]) -> "LocalCluster | None":
+    """Return workers on this machine; a start in which one of them is killed is tried again."""
+    from distributed import LocalCluster
+
+    reason: Exception | None = None
+    for _ in range(_TRIES):
+        try:
+            return LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # on this machine alone
+            )
+        except (RuntimeError, OSError, TimeoutError) as error:
+            reason = error
+            for process in set(multiprocessing.active_children()) - set(others):
+                process.kill()
+    _log.warning(
+        "No workers could be started (%s); the studies run one after the other instead.", reason
+    )
+    return None
 
 
 @contextmanager

@@ -53,7 +53,7 @@ class StudyRow:
     effects
         Effects that a closed loop added.
     verdict
-        Of the closed loop.
+        Of the closed loop, or of the comparison.
     error_before, error_after
         On its held-out runs, or on the fitted ones where none were held out.
     """
@@ -99,6 +99,7 @@ def _comparison(content: Mapping[str, Any]) -> StudyRow:
         len(content["rivals"]),
         tuple(map(str, content["undetermined"])),
         {str(rule): tuple(map(str, terms)) for rule, terms in chosen.items()},
+        verdict=str(content.get("verdict", "")),
     )
 
 

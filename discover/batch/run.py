@@ -77,7 +77,7 @@ def run_batch(
                     end(i, run_one(*job, progress=partial(so_far.say, i)))
             else:
                 summary.write_soon()  # once it was written, it takes no time on Ctrl-C
-                run_on_cluster(run_one, jobs, workers, scheduler, so_far.say, end)
+                run_on_cluster(run_one, jobs, min(workers, len(jobs)), scheduler, so_far.say, end)
     finally:
         result = summary.write()  # what had ended before Ctrl-C is on the page too
     return result

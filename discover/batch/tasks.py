@@ -106,11 +106,11 @@ def run_compare(
         return there
     from discover.comparison.run_comparison import compare
     from discover.report.comparison_report import write_comparison
-    from discover.report.verdicts import comparison_verdict
+    from discover.report.comparison_verdict import comparison_verdict
 
     comparison = compare(study, seed, progress, folder, settle=fit_declared)
     write_comparison(comparison, folder, study.model.known_relaxation, study.text)
-    return _end("compare", folder, comparison_verdict(comparison))
+    return _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
 
 
 def run_close_loop(

@@ -14,6 +14,7 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
+from discover.dataset.importing.text_export import is_number
 from discover.dataset.load import INDEX_FILE
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
@@ -55,7 +56,10 @@ def merge_mapping(
         content[key] = {**content.get(key, {}), **_pairs(options or (), example)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
-        numbers = _pairs(filter(None, rest.split(",")), "radius_mm=25")
+        numbers = {
+            key: _number(value, f"--geometry {key}")
+            for key, value in _pairs(filter(None, rest.split(",")), "radius_mm=25").items()
+        }
         content["geometry"] = {"type": kind.strip().replace("-", "_"), **numbers}
     if blocks:
         content["blocks"] = list(blocks)
@@ -74,6 +78,13 @@ def _pairs(options, example: str) -> dict[str, str]:
             raise InputError(f"Cannot read {option!r}; write it as name=value, such as {example}.")
         pairs[key.strip()] = value.strip()
     return pairs
+
+
+def _number(text: str, where: str) -> float:
+    # float() also reads 1_2, nan and digits of other scripts
+    if not is_number(text):
+        raise InputError(f"{where} must be a number; got {text!r}. Write it as 25 or 0.5.")
+    return float(text)
 
 
 def sources_of(

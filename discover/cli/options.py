@@ -12,7 +12,9 @@ OutOption = Annotated[
 ]
 SeedOption = Annotated[
     int | None,
-    typer.Option("--seed", min=0, help="Seed of noise and learners, instead of the study's."),
+    typer.Option(
+        "--seed", min=0, max=2**32 - 1, help="Seed of noise and learners, instead of the study's."
+    ),
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]

@@ -54,7 +54,7 @@ def batch(
     studies: Annotated[list[Path], typer.Argument(help="Study files.", show_default=False)],
     out: OutOption = None,
     workers: Annotated[
-        int, typer.Option("--workers", min=1, help="Processes on this machine.")
+        int, typer.Option("--workers", min=1, max=1024, help="Processes on this machine.")
     ] = 1,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Address of a dask scheduler, host:port.")

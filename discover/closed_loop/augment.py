@@ -10,11 +10,14 @@ from scipy.stats import t as student
 from discover.closed_loop.attribution import CandidateScore, with_other_inner
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
+    FEWEST_FOLDS,
     NO_PRIOR,
     Fit,
     Prior,
     fit_batch,
-    left_out_errors,
+    left_out_parts,
+    part_errors,
+    run_errors,
 )
 from discover.closed_loop.run_batch import RunBatch
 from discover.statistics import least_squares_covariance
@@ -54,11 +57,15 @@ class Choice:
         The candidate and the fit with it.
     left_out
         Error of each fitted run when left out.
+    parts
+        Errors of the parts that are left out together, when they are fitted and when they are not,
+        shape (2, parts).
     """
 
     candidate: CandidateScore
     fit: Fit
     left_out: Float[np.ndarray, " runs"]
+    parts: Float[np.ndarray, "2 parts"]
 
 
 def evidence(
@@ -139,11 +146,16 @@ def refit(
     for candidate, trial in zip(leaders, fits, strict=True):
         if not trial.usable or samples < len(trial.free) + FEWEST_SAMPLES:
             continue
-        left_out = left_out_errors(model, batch, trial, prior)
+        parts = left_out_parts(model, batch, trial, prior)
+        left_out = run_errors(parts, weight)
+        errors = [
+            part_errors([(held, trial.residual**2) for held, _ in parts], weight),
+            part_errors(parts, weight),
+        ]
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
         candidate.evidence = evidence(fit, trial, weight, effective, n_candidates)
-        choices.append(Choice(candidate, trial, left_out))
+        choices.append(Choice(candidate, trial, left_out, np.array(errors)))
     return choices
 
 
@@ -205,18 +217,40 @@ def choose(
     if not earned:
         return None
     best = simplest(earned, model)
-    best.candidate.aliases = aliases_of(best, earned)
+    # what failed to earn a place by a hair is an alias as well as what earned it
+    best.candidate.aliases = aliases_of(best, choices)
     return best
 
 
 def aliases_of(best: Choice, choices: Sequence[Choice]) -> tuple[str, ...]:
-    """Return the effects whose refit is as good as that of the one chosen."""
-    own = best.candidate.evidence or 0.0
+    """Return the effects that these data cannot tell from the one chosen.
+
+    There is evidence for them, and either it differs by less than `INDISTINGUISHABLE`, or they are
+    near in what they fit and in what they predict of parts left out: the mean excess over the parts
+    is no larger than its standard error, the rule of one standard error   [Breiman et al. 1984,
+    Classification and Regression Trees, ch. 3] for errors that are paired. Evidence alone would
+    not do: it takes what is left for noise, and where neither effect explains the data it is not.
+    """
     return tuple(
         choice.candidate.effect
         for choice in choices
-        if choice is not best and abs(own - (choice.candidate.evidence or 0.0)) < INDISTINGUISHABLE
+        if choice is not best
+        and (choice.candidate.evidence or 0.0) > 0.0
+        and (
+            abs((best.candidate.evidence or 0.0) - (choice.candidate.evidence or 0.0))
+            < INDISTINGUISHABLE
+            or _near(best, choice)
+        )
     )
+
+
+def _near(best: Choice, other: Choice) -> bool:
+    excess = other.parts - best.parts
+    count = excess.shape[1]
+    if count < FEWEST_FOLDS:
+        return False
+    error = np.std(excess, axis=1, ddof=1) / np.sqrt(count)
+    return bool(np.all(np.mean(excess, axis=1) <= error))
 
 
 def prune(

@@ -33,6 +33,9 @@ from discover.effects import (
 )
 from discover.laws import LAWS, AbstractConstitutiveLaw
 
+# Of the upper end of its range, to which the first trial of a parameter is kept
+_TRIAL_SHARE = 0.5
+
 # Calls side by side: one uses a single core, whatever the number of runs
 _WORKERS = min(os.cpu_count() or 1, 4)
 
@@ -74,8 +77,10 @@ class _Program:
         self.added = AddedTerms(self._constitutive, self.slices)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self._states = [e for e in effects if isinstance(e, StateEffect)]
-        self._kinematic = [e for e in effects if isinstance(e, KinematicEffect)]
-        self._series = [e for e in self._kinematic if isinstance(e, SeriesElement)]
+        kinematic = [e for e in effects if isinstance(e, KinematicEffect)]
+        self._upstream = [e for e in kinematic if e.shapes_command]
+        self._downstream = [e for e in kinematic if not e.shapes_command]
+        self._series = [e for e in kinematic if isinstance(e, SeriesElement)]
         self._signal = [e for e in effects if isinstance(e, SignalEffect)]
         over_runs = jax.vmap(self._predict_run, in_axes=(None, None, None, 0))
         self.predict = eqx.filter_jit(over_runs)
@@ -87,14 +92,21 @@ class _Program:
 
     def _predict_run(self, numbers, used, theta, run):
         instrument_times = run.times / run.clock_factor
+        # what lies upstream of the tool first. A series element changes no rate here: slip and
+        # compliance stand between the driven tool and the fluid, and the tool moves on as
+        # commanded. So it does with a wrong gap: the angle is right, and the nominal rate of the
+        # tool is the angle's over the nominal gap
         rate = run.commanded_rate
-        for effect in self._kinematic:
+        for effect in self._upstream:
+            rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+        tool_rate = rate[::2]
+        for effect in self._downstream:
             rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
         times = run.times[::2]
         stress, felt = self._integrate(numbers, used, theta, times, rate)
         stress = stress + numbers.solvent_viscosity * felt + self._beside(theta, felt)
         for effect in self._signal:
-            record = Record(times, felt, stress, run.clock_factor, run.strain_before)
+            record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
             stress = effect.recorded_stress(self._values(theta, effect), record)
         return stress[run.sample_index]
 
@@ -192,12 +204,19 @@ class AugmentedModel:
         )
         self.slices, self.size = self._program.slices, self._program.size
         parameters = [p for effect in self.effects for p in effect.parameters]
-        self.low = np.array([-10.0, -10.0, *(p.low for p in [*free, *parameters])])
-        self.high = np.array([10.0, 10.0, *(p.high for p in [*free, *parameters])])
         sizes = {"one": 1.0} | dict(scales or {})
-        self.first_trial = np.array(
-            [0.01] * (2 + len(free)) + [p.first_trial * sizes.get(p.scale, 1.0) for p in parameters]
-        )
+        units = [sizes.get(p.range_scale, 1.0) for p in parameters]
+        lows = [p.low * unit for p, unit in zip(parameters, units, strict=True)]
+        highs = [p.high * unit for p, unit in zip(parameters, units, strict=True)]
+        self.low = np.array([-10.0, -10.0, *(p.low for p in free), *lows])
+        self.high = np.array([10.0, 10.0, *(p.high for p in free), *highs])
+        trials = [p.first_trial * sizes.get(p.scale, 1.0) for p in parameters]
+        # well inside the range, whatever the data's own size suggests
+        trials = [
+            float(np.clip(trial, max(low, _TRIAL_SHARE * low), _TRIAL_SHARE * high))
+            for trial, low, high in zip(trials, lows, highs, strict=True)
+        ]
+        self.first_trial = np.array([0.01] * (2 + len(free)) + trials)
 
     @cached_property
     def _numbers(self) -> _Numbers:

@@ -83,6 +83,8 @@ def _state(search: "Search") -> dict[str, Any]:
         "aliases": search.aliases,
         "support": search.support,
         "left_out": search.left_out,
+        "not_named": search.not_named,
+        "refused": sorted(search.refused),
         "known": [[at, *pair] for at, pair in search.known.items()],
     }
 
@@ -112,4 +114,6 @@ def _set(search: "Search", state: dict[str, Any]) -> None:
     search.aliases = {name: tuple(others) for name, others in state["aliases"].items()}
     search.support = dict(state["support"])
     search.left_out = state["left_out"]
+    search.not_named = dict(state.get("not_named", {}))
+    search.refused = set(state.get("refused", ()))
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

@@ -241,7 +241,25 @@ def _step(jacobian, residual, damping, known=None):
 def left_out_errors(
     model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> Float[np.ndarray, " runs"]:
-    """Return the relative error of each run where it is left out of the fit.
+    """Return the relative error of each run left out of the fit; see `left_out_parts`."""
+    return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
+
+
+def run_errors(
+    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
+    weight: Float[np.ndarray, "runs n"],
+) -> Float[np.ndarray, " runs"]:
+    """Return the relative error of each run, from parts as in `part_errors`."""
+    squares = np.zeros(len(weight))
+    for held, missed in parts:
+        squares += np.sum(np.where(held, missed, 0.0), axis=1)
+    return np.minimum(np.sqrt(squares), _MISSED)
+
+
+def left_out_parts(
+    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
+) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
+    """Return which samples are left out together, and the squared residuals without them.
 
     Runs are left out one after another. Of fewer than `FEWEST_FOLDS` runs each is left out in parts
     instead, stretches of equal length: to leave out one run of three would ask for an extrapolation
@@ -270,12 +288,31 @@ def left_out_errors(
         theta = fit.theta.copy()
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)
-    squares = np.zeros(len(weighted))
-    for left_out, residual in zip(folds, model.residuals(trials, batch), strict=True):
-        with np.errstate(over="ignore", invalid="ignore"):
-            missed = np.sum(np.where(left_out, residual**2, 0.0), axis=1)
-        squares += np.where(np.isfinite(missed), missed, np.inf)
-    return np.minimum(np.sqrt(squares), _MISSED)
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = [residual**2 for residual in model.residuals(trials, batch)]
+    squares = [np.where(np.isfinite(missed), missed, np.inf) for missed in squares]
+    return list(zip(folds, squares, strict=True))
+
+
+def part_errors(
+    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
+    weight: Float[np.ndarray, "runs n"],
+) -> Float[np.ndarray, " parts"]:
+    """Return the relative error of each part, from squared weighted residuals.
+
+    Parameters
+    ----------
+    parts
+        Which samples it holds, and squared residuals.
+    weight
+        Weights of the runs, zero at padding.
+    """
+    samples = np.count_nonzero(np.asarray(weight) > 0, axis=1)
+    shares = [
+        float(np.sum(np.sum(np.where(held, squares, 0.0), axis=1) * samples)) / held.sum()
+        for held, squares in parts
+    ]
+    return np.minimum(np.sqrt(shares), _MISSED)
 
 
 FEWEST_FOLDS = 4

@@ -17,7 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
-from discover.closed_loop.judgement import HeldOut, judge
+from discover.closed_loop.judgement import HeldOut, Judgement, judge
 from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
@@ -185,7 +185,8 @@ def run_loop(
             "autocorrelation": float(np.mean(summary.autocorrelation)),
             "worst_run": judgement.worst.name,
             "worst_run_error": float(judgement.worst.errors[-1]),
-            "description": judgement.description,
+            "description": _with_refusals(judgement, search),
+            "not_named": {n: text for n, text in search.not_named.items() if n not in active},
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
@@ -306,6 +307,14 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
     if linear.active and linear.explained:
         search.adopt(linear)
         search.keeper.save(search)
+
+
+def _with_refusals(judgement: Judgement, search: Search) -> str:
+    """Return the verdict's reasons, with the effects that fitted and cannot be what is missing."""
+    refused = [search.not_named[name] for name in sorted(search.refused)]
+    if not judgement.structured or not refused:
+        return judgement.description
+    return f"{judgement.description} {' '.join(f'{text}.' for text in refused)}"
 
 
 def _stage(search: Search, name: str, bounds, error) -> Stage:

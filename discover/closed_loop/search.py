@@ -8,6 +8,7 @@ from discover.closed_loop.attribution import CandidateScore, attribute
 from discover.closed_loop.augment import (
     BARE_MENTION,
     IMPROVEMENT,
+    Choice,
     aliases_of,
     choose,
     drop_undecided,
@@ -29,6 +30,7 @@ from discover.closed_loop.least_squares import (
     left_out_errors,
 )
 from discover.closed_loop.leftover import Leftover
+from discover.closed_loop.physical_range import at_an_end, undetermined
 from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
@@ -88,6 +90,11 @@ class Search:
         Mean and standard deviation of parameters determined there, by position.
     rounds
         How often the whole was examined again.
+    not_named
+        Effects that fitted best only with a value that they cannot have, or that the data leave
+        open; and why, in a sentence without its stop.
+    refused
+        Those of them that were in the model and are no candidates any more.
     """
 
     def __init__(
@@ -114,6 +121,12 @@ class Search:
         self.path: list[np.ndarray] = []
         self.left_out = float("inf")
         self.known: dict[int, tuple[float, float]] = {}
+        self.not_named: dict[str, str] = {}
+        self.refused: set[str] = set()
+
+    def candidate(self, effect: AbstractEffect) -> bool:
+        """Whether an effect may be added."""
+        return effect.name not in self.refused and self.admitted(effect)
 
     @property
     def prior(self) -> Prior:
@@ -189,7 +202,46 @@ class Search:
         self._leave_out()
 
     def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
-        """Add effects until none earns its place, and see that each still deserves its own."""
+        """Add effects until none earns its place, and see that each still deserves its own.
+
+        What then has a value at the end of its physical range, or one that the data leave open, is
+        taken out again, and the search goes on without it.
+        """
+        while True:
+            self._add_all(max_effects, say, look_ahead)
+            refused = self._refuse()
+            if not refused:
+                break
+            self.rounds = 0
+            say(f"no finding: {self.not_named[refused]}")
+            self.keeper.save(self)
+
+    def _refuse(self) -> str:
+        """Take out one effect whose parameters are no finding, and return its name."""
+        names = [name for name in reversed(self.active) if name not in self.settled]
+        if not names:
+            return ""
+        bounds = intervals(self.model, self.batch, self.fit)
+        ends = np.take_along_axis(
+            np.asarray(self.batch.times)[:, ::2], np.asarray(self.batch.sample_index), axis=1
+        )
+        longest = float(np.max(ends))
+        for name in names:
+            reason = at_an_end(self.model, self.fit.theta, [name]) or undetermined(
+                self.model, self.fit.theta, bounds, name, longest
+            )
+            if not reason:
+                continue
+            self.not_named[name] = reason
+            self.refused.add(name)
+            self.fit = self._without(name)
+            self.active.remove(name)
+            self._fit_path()
+            self._leave_out()
+            return name
+        return ""
+
+    def _add_all(self, max_effects: int, say: Callable[[str], None], look_ahead: bool) -> None:
         while self.rounds < _ROUNDS:
             while len(self.active) < max_effects:
                 name = self.advance()
@@ -233,9 +285,9 @@ class Search:
         before, left_out, active = self.fit, self.left_out, list(self.active)
         fit, kept = before, list(active)
         while len(kept) < max_effects:
-            leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.admitted).leading
+            leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.candidate).leading
             choices = refit(self.model, self.batch, fit, leading, self.n_candidates, self.prior)
-            choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
+            choices = self._possible(choices, kept)
             if not choices:
                 break
             best = max(choices, key=lambda choice: choice.candidate.evidence or -np.inf)
@@ -289,13 +341,13 @@ class Search:
         others = [other for other in self.active if other != name]
 
         def rival(effect: AbstractEffect) -> bool:
-            return effect.name != name and self.admitted(effect)
+            return effect.name != name and self.candidate(effect)
 
         leading = attribute(self.model, self.batch, without, others, LEADERS, rival).leading
         current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
         asked = [current, *leading][:_COMPARED]
         choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
-        choices = [c for c in choices if self._predictable(c.fit.theta)]
+        choices = self._possible(choices, others)
         own_choice = next((c for c in choices if c.candidate is current), None)
         if own_choice is None:
             return False
@@ -342,12 +394,12 @@ class Search:
     def advance(self) -> str | None:
         """Add the effect that earns its place, and return its name, or None."""
         attribution = attribute(
-            self.model, self.batch, self.fit, self.active, LEADERS, self.admitted
+            self.model, self.batch, self.fit, self.active, LEADERS, self.candidate
         )
         choices = refit(
             self.model, self.batch, self.fit, attribution.leading, self.n_candidates, self.prior
         )
-        choices = [choice for choice in choices if self._predictable(choice.fit.theta)]
+        choices = self._possible(choices, self.active)
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         # what cannot be told from noise gives no reason to add anything
@@ -431,6 +483,24 @@ class Search:
         self.left_out = float(
             np.mean(left_out_errors(self.model, self.batch, self.fit, self.prior))
         )
+
+    def _possible(self, choices: Sequence[Choice], others: Sequence[str]) -> list[Choice]:
+        """Return the choices that a fluid or an instrument can be, and that predict every flow.
+
+        What is at an end of its physical range cannot win; of the others in the model none may be
+        driven there.
+        """
+        possible = []
+        for choice in choices:
+            theta, name = choice.fit.theta, choice.candidate.effect
+            if not self._predictable(theta):
+                continue
+            reason = at_an_end(self.model, theta, [name])
+            if reason and (choice.candidate.evidence or 0.0) > BARE_MENTION:
+                self.not_named.setdefault(name, reason)
+            if not reason and not at_an_end(self.model, theta, others):
+                possible.append(choice)
+        return possible
 
     def _predictable(self, theta: np.ndarray) -> bool:
         # flows are commanded before they are measured: a law that cannot be integrated through a

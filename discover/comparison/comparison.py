@@ -7,14 +7,17 @@ from typing import Any
 import pandas as pd
 
 from discover.comparison.equations import outcome_equation
+from discover.comparison.explanation import Explanation
 from discover.comparison.flows import Flow, Stresses, relative_errors
-from discover.comparison.identifiability import Rival, Statement
+from discover.comparison.identifiability import Rival
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
+from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.comparison.truth import TrueTerm
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
 from discover.notebook_view import NotebookView, table_of
+from discover.statistics import FitVerdict
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class Comparison(NotebookView):
         sparse learner.
     known
         The known part as an equation; None where it is not wanted.
+    explanation
+        Whether any law explains the training runs.
     warnings
         What a reader should know before believing anything else, one sentence each; shown in the
         verdict.
@@ -101,7 +106,13 @@ class Comparison(NotebookView):
     seed: int = 0
     structure: Structure | None = None
     known: Equation | None = None
+    explanation: Explanation = field(default_factory=Explanation)
     warnings: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> FitVerdict:
+        """Whether a law found explains the training runs."""
+        return self.explanation.verdict
 
     @property
     def physics(self) -> dict[str, Mapping[str, Any] | None]:
@@ -165,6 +176,8 @@ class Comparison(NotebookView):
         return table_of(self.rivals)
 
     def _shown(self) -> Iterable[Any]:
+        for name, left in self.explanation.lack_of_fit.items():
+            yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
         yield from self.warnings
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
@@ -173,8 +186,9 @@ class Comparison(NotebookView):
         yield self.terms_table()
         yield self.errors_table()
         for statement in self.statements:
-            left = "Not determined by these data" if statement.undetermined else "Assumed"
-            yield f"{left}: {statement.quantity}. {statement.text}"
+            open_ = "Not determined by these data"
+            said = open_ if statement.undetermined else "Determined if the law is in the library"
+            yield f"{said}: {statement.quantity}. {statement.text}"
         if self.rivals:
             yield "Laws that these data do not tell from the one found by sparse regression:"
             yield self.rivals_table()
@@ -205,6 +219,7 @@ class Comparison(NotebookView):
                 ],
                 "errors": self._errors(name, self.judged),
                 "training_errors": self._errors(name, self.flows_of("training")),
+                "intervals_hold": IN_LIBRARY if self.explanation.in_library else "no",
                 "train_seconds": outcome.train_seconds,
                 "message": outcome.message,
                 "law": None if self.known is None else equation_to_json(self.equation(name)),
@@ -212,6 +227,7 @@ class Comparison(NotebookView):
             }
         content = {
             "study": self.name,
+            **self.explanation.to_json(),
             "data": self.data_summary,
             "known_part": self.known_part,
             "seed": self.seed,
@@ -230,10 +246,7 @@ class Comparison(NotebookView):
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,
             "warnings": list(self.warnings),
-            "statements": [
-                {"quantity": s.quantity, "undetermined": s.undetermined, "text": s.text}
-                for s in self.statements
-            ],
+            "statements": [statement.to_json() for statement in self.statements],
             "structure": None if self.structure is None else self.structure.to_json(),
             "physics": self.physics,
             "sweep": [

@@ -93,25 +93,6 @@ class Rival:
         }
 
 
-@dataclass(frozen=True)
-class Statement:
-    """Something the data leave open.
-
-    Attributes
-    ----------
-    quantity
-        ``"N1"``, ``"N2"``.
-    undetermined
-        True if the data do not decide it at all; False if they do only with an assumption.
-    text
-        The statement for a reader.
-    """
-
-    quantity: str
-    undetermined: bool
-    text: str
-
-
 def find_rivals(
     terms: Sequence[RecoveredTerm],
     met: Iterable[Mapping[str, Any]],
@@ -224,68 +205,6 @@ def _judge(rival: Rival, reference, model, seen, unseen) -> Rival | None:
         # among the flows of the comparison if one of them will do
         place if separation > SEPARATED else rival.separated_by,
     )
-
-
-def undetermined_quantities(
-    flows: Sequence[Flow],
-    normal_stresses_used: bool,
-    rivals: Sequence[Rival],
-    structure: Structure | None = None,
-) -> list[Statement]:
-    """Return what the training data leave open, with the reason.
-
-    Parameters
-    ----------
-    flows
-        The flows; the training ones say what was measured.
-    normal_stresses_used
-        Whether measured normal stresses were part of the fit.
-    rivals
-        From `find_rivals`.
-    structure
-        From `structure_of`, where the sparse learner ran; it decides where there is one.
-    """
-    at = law_structure(structure)
-    if at is not None:
-        return [
-            Statement(q.quantity, q.open, q.text) for q in at.quantities if q.verdict != "measured"
-        ]
-    measured = [flow.reference for flow in flows if flow.kind == "training" and not flow.is_truth]
-    seen = {q for q in ("N1", "N2") if normal_stresses_used and any(q in m for m in measured)}
-    statements = []
-    if "N2" not in seen:
-        example = next(
-            (
-                r
-                for r in rivals
-                if (r.errors_to_chosen.get("N2") or 0.0) > SEPARATED
-                and (r.errors_to_chosen.get("sigma12") or 0.0) <= EXACT
-            ),
-            None,
-        )
-        text = (
-            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act "
-            "on σ33 alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law "
-            "that fits."
-        )
-        if example is not None:
-            text += (
-                " Checked by simulation: "
-                + " ".join(f"{value:+.3g} {name}" for name, value in example.terms.items())
-                + f" gives the same σ12 but an N2 that differs by "
-                f"{100.0 * (example.errors_to_chosen['N2'] or 0.0):.2g} % of N1."
-            )
-        statements.append(Statement("N2", True, text))
-    if "N1" not in seen:
-        statements.append(
-            Statement(
-                "N1",
-                False,
-                "N1 was not measured. It follows from the upper convected derivative that the "
-                "model assumes together with the terms found, and is as good as that assumption.",
-            )
-        )
-    return statements
 
 
 def law_structure(structure: Structure | None) -> LawStructure | None:

@@ -6,15 +6,16 @@ from dataclasses import replace
 
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.equations import known_equation
+from discover.comparison.explanation import Explanation, explain
 from discover.comparison.flows import Flow, comparison_flows, predict
 from discover.comparison.identifiability import (
     find_rivals,
     physics_of,
     structure_of,
-    undetermined_quantities,
 )
 from discover.comparison.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.statements import make_statements
 from discover.comparison.training import (
     Progress,
     require_numbers,
@@ -26,6 +27,7 @@ from discover.comparison.truth import TrueTerm, true_terms
 from discover.dataset.run import ShearDataset
 from discover.errors import InputError
 from discover.laws.registry import LAWS, make_law
+from discover.statistics.residual import Expectation
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -97,17 +99,21 @@ def compare(
             done += 1
         assert options.sweep is not None
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
+    normal = options.use_normal_stresses
+    explanation = explain(outcomes, flows, expectation_of(study, model), normal)
+    outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen = outcomes.get("tensor_sindy")
     rivals, structure, following = [], None, NextMeasurement()
-    if chosen is not None:
+    if chosen is not None and explanation.verdict != "no_signal":
         library = study_library(study)
         met = chosen.details.get("rivals", ())
         rivals = find_rivals(chosen.terms, met, model, flows, library, chosen.predictions)
-        structure = structure_of(
-            chosen.terms, data.fit.runs, library, model, options.use_normal_stresses
-        )
+        structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
+    if chosen is not None and explanation.in_library:
+        # bands and experiments take it that the law, or a rival, is the fluid's
         judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+        judged = judged or [flow for flow in flows if flow.kind == "training"]
         following = next_measurement(
             chosen, rivals, model.fluid, judged, following_options, learner_seed
         )
@@ -123,14 +129,37 @@ def compare(
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         rivals=rivals,
-        statements=undetermined_quantities(flows, options.use_normal_stresses, rivals, structure),
+        statements=make_statements(explanation, flows, rivals, structure, following.bands, normal),
         structure=structure,
         sweep=points,
         distillations=distillations,
         next_measurement=following,
         seed=learner_seed,
         known=known_equation(model),
+        explanation=explanation,
     )
+
+
+def expectation_of(study: Study, model: DeclaredModel) -> Expectation:
+    """Return what a complete law may leave of a study's runs, as the closed loop has it."""
+    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
+    return Expectation(study.loop.noise, linear_error)
+
+
+def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:
+    """Return an outcome without the claims that its data do not bear."""
+    if explanation.verdict == "no_signal":
+        message = "The records hold no signal, so what was fitted to them is no law"
+        return replace(outcome, terms=(), message=message, details={})
+    if outcome.learner == "tensor_sindy" and not explanation.in_library:
+        tested = int(outcome.details.get("tested") or 0)
+        text = f"{tested} other laws were tried. " if tested else ""
+        text += (
+            "No law in the library explains these data, so ruling out others says nothing; the "
+            "laws below are those that describe the data about as well as the best."
+        )
+        return replace(outcome, details={**outcome.details, "rivals_text": text})
+    return outcome
 
 
 def _outcome(

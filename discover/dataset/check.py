@@ -1,7 +1,8 @@
 """Check a data folder and say everything that is wrong or doubtful, not only the first thing."""
 
+import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,8 @@ from discover.dataset.load import (
     read_run,
     resolve_folder,
 )
-from discover.dataset.run import LinearSweep, ShearRun, require_signal, same_samples
-from discover.dataset.table import Table, read_table
+from discover.dataset.run import LinearSweep, ShearRun, require_signal
+from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
 
 _RUN_QUANTITIES = (
@@ -34,6 +35,7 @@ _RUN_QUANTITIES = (
     units.SECOND_NORMAL_STRESS_DIFFERENCE,
     units.STRAIN,
 )
+_SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
@@ -62,6 +64,7 @@ def check_folder(
     findings = [*_clock(index, clock_factor), *_before(index)]
     runs: list[ShearRun] = []
     unused: dict[str, list[str]] = {}
+    converted: dict[str, list[str]] = {}
     for row, name in enumerate(index.columns["file"]):
         try:
             reason = reason_to_set_aside(index, row, rate_before=True)
@@ -74,12 +77,13 @@ def check_folder(
             findings.append(Finding("error", "run", name, str(error)))
             continue
         findings += doubts_of_run(runs[-1])
-        findings += _unused_columns(root, name, unused)
+        findings += _columns(root, name, unused, converted)
     for column, files in unused.items():
-        where = files[0] if len(files) == 1 else f"{files[0]} and {len(files) - 1} more files"
-        text = f"The column {column} in {where} is not used."
+        text = f"The column {shown(column)} in {_files(files)} is not used."
         findings.append(Finding("note", "columns", files[0], text))
-    sweep, spectrum, said = _sweep(root)
+    sweep, spectrum, said = _sweep(root, converted)
+    for text, files in converted.items():
+        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
     findings += against_linear_theory(runs, sweep, spectrum)
     findings += doubts_among_runs(runs)
@@ -125,19 +129,28 @@ def _before(index: Table) -> Iterator[Finding]:
             )
 
 
-def _unused_columns(root: Path, name: str, unused: dict[str, list[str]]) -> Iterator[Finding]:
-    """Collect the columns nobody reads; yield those that look like a slip of the pen."""
+def _files(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
+
+
+def _columns(
+    root: Path, name: str, unused: dict[str, list[str]], converted: dict[str, list[str]]
+) -> Iterator[Finding]:
+    """Collect columns that nobody reads and conversions; yield what looks like a slip."""
     try:
         columns = tuple(read_table(root / name, name).columns)
         found = [units.find_column(columns, quantity) for quantity in _RUN_QUANTITIES]
     except InputError:
         return
+    pairs = list(zip(_RUN_QUANTITIES, found, strict=True))
+    _note_conversions(name, pairs, converted)
     used = {column[0] for column in found if column is not None}
-    missing = [q for q, column in zip(_RUN_QUANTITIES, found, strict=True) if column is None]
+    missing = [q for q, column in pairs if column is None]
     for column in columns:
         if column in used:
             continue
         meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
+        slips = [q for q in missing if column.startswith(f"{q.stem}_")]
         if meant and column.lower() != "strain":
             yield Finding(
                 "warning",
@@ -146,12 +159,31 @@ def _unused_columns(root: Path, name: str, unused: dict[str, list[str]]) -> Iter
                 f"The column {column} in {name} is not read. If it holds {meant[0].stem}, rename "
                 f"it to {meant[0].column}.",
             )
+        elif slips:
+            yield Finding(
+                "warning",
+                "columns",
+                name,
+                f"The column {shown(column)} in {name} is not read: it ends in no unit of "
+                f"{slips[0].stem}. If it holds that, rename it to {slips[0].column}.",
+            )
         else:
             unused.setdefault(column, []).append(name)
 
 
+def _note_conversions(
+    name: str,
+    found: Iterable[tuple[units.Quantity, tuple[str, float] | None]],
+    converted: dict[str, list[str]],
+) -> None:
+    for quantity, column in found:
+        text = "" if column is None else units.conversion_note(*column, quantity)
+        if text:
+            converted.setdefault(text, []).append(name)
+
+
 def _sweep(
-    root: Path,
+    root: Path, converted: dict[str, list[str]]
 ) -> tuple[LinearSweep | None, RelaxationSpectrum | None, list[Finding]]:
     try:
         sweep = find_sweep(root)
@@ -163,12 +195,20 @@ def _sweep(
             "declared or fitted, and a wrong one looks like a missing effect."
         )
         return None, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
+    columns = tuple(read_table(root / SWEEP_FILE).columns)
+    pairs = [(quantity, units.find_column(columns, quantity)) for quantity in _SWEEP_QUANTITIES]
+    _note_conversions(SWEEP_FILE, pairs, converted)
     try:
         spectrum = relaxation_spectrum(sweep)
     except (InputError, RuntimeError, np.linalg.LinAlgError) as error:
         text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
         return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
+
+
+def _digest(run: ShearRun) -> bytes:
+    """Return what tells runs of different samples apart, however many there are."""
+    return hashlib.sha256(run.time.tobytes() + run.shear_stress.tobytes()).digest()
 
 
 def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]:
@@ -182,9 +222,10 @@ def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]
             yield Finding(
                 "note", "runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used."
             )
-    for at, run in enumerate(runs):
-        first = next((other.name for other in runs[:at] if same_samples(run, other)), None)
-        if first is not None:
+    seen: dict[bytes, str] = {}
+    for run in runs:
+        first = seen.setdefault(_digest(run), run.name)
+        if first != run.name:
             yield Finding(
                 "warning",
                 "runs",

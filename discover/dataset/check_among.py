@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.dataset.finding import Finding
 from discover.dataset.run import ShearRun
@@ -26,15 +27,15 @@ def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
         Those that load; less than two start-ups say nothing.
     """
     start_ups = [run for run in runs if _is_start_up(run)]
-    for run in start_ups:
-        others = [other for other in start_ups if other is not run]
-        for what, quantity, rises in (
-            ("The stress", _largest, True),
-            ("The time at which the stress rises", _half_time, False),
-        ):
-            ratios = [_outside(quantity, other, run, rises) for other in others]
-            # of two nobody knows which is wrong, and both are named
-            ratio = min(ratios, key=lambda r: abs(np.log(r)), default=1.0)
+    if len(start_ups) < 2:
+        return
+    rates = np.array([abs(run.shear_rate[0]) for run in start_ups])
+    for what, quantity, rises in (
+        ("The stress", _largest, True),
+        ("The time at which the stress rises", _half_time, False),
+    ):
+        values = np.array([quantity(run) for run in start_ups])
+        for run, ratio in zip(start_ups, _least_outside(values, rates, rises), strict=True):
             if abs(np.log(ratio)) < np.log(_UNIT_FACTOR):
                 continue
             large = f"{ratio:.2g} times too large"
@@ -63,11 +64,21 @@ def _half_time(run: ShearRun) -> float:
     return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
 
 
-def _outside(quantity, other: ShearRun, run: ShearRun, rises: bool) -> float:
-    """Return by which factor a quantity of a run is outside what another allows; 1 inside."""
-    value, reference = quantity(run), quantity(other)
-    if value <= 0.0 or reference <= 0.0:
-        return 1.0
-    share = abs(run.shear_rate[0] / other.shear_rate[0])
-    bounds = sorted([reference, reference * (share if rises else 1.0 / share)])
-    return value / float(np.clip(value, *bounds))
+def _least_outside(
+    values: Float[np.ndarray, " n"], rates: Float[np.ndarray, " n"], rises: bool
+) -> Float[np.ndarray, " n"]:
+    """Return by which factor each run is outside what the others allow; 1 inside.
+
+    Of two nobody knows which is wrong, and both are named; of more, a run is held against the one
+    that it fits best.
+    """
+    found = np.ones(len(values))
+    if not np.all(values > 0.0):
+        return found
+    for i in range(len(values)):
+        reference, share = np.delete(values, i), rates[i] / np.delete(rates, i)
+        bound = reference * (share if rises else 1.0 / share)
+        low, high = np.minimum(reference, bound), np.maximum(reference, bound)
+        ratios = values[i] / np.clip(values[i], low, high)
+        found[i] = ratios[np.argmin(np.abs(np.log(ratios)))]
+    return found

@@ -46,6 +46,8 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
             "instrument at high frequency, a shift of one column, or too large an amplitude do "
             "that.",
         )
+    if sweep.thinned:
+        yield Finding("note", "samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
     yield from _inertia(sweep)
     if len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency):
         yield Finding(

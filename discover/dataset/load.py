@@ -13,7 +13,7 @@ from discover.dataset.kind_of_test import reason_to_set_aside, stress_was_impose
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 from discover.dataset.sequence import in_sequence
 from discover.dataset.table import Table, read_bytes, read_table
-from discover.dataset.thinning import MOST_SAMPLES, thin
+from discover.dataset.thinning import MOST_SAMPLES, thin, thin_sweep
 from discover.errors import InputError
 from discover.protocols.shear import ShearProtocol, measured_rate, start_up
 
@@ -398,7 +398,7 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 
 def read_sweep(path: Path) -> LinearSweep:
-    """Return a linear frequency sweep, sorted by frequency.
+    """Return a linear frequency sweep, sorted by frequency; one of very many is thinned.
 
     Raises
     ------
@@ -418,4 +418,6 @@ def read_sweep(path: Path) -> LinearSweep:
                 "Remove that line."
             )
     order = np.argsort(frequency, kind="stable")
-    return LinearSweep(frequency[order], storage[order], loss[order])
+    keep, note = thin_sweep(frequency[order])
+    order = order[keep]
+    return LinearSweep(frequency[order], storage[order], loss[order], note)

@@ -171,11 +171,14 @@ class LinearSweep:
         In rad/s, shape (n,), increasing.
     storage_modulus, loss_modulus
         In Pa, shape (n,).
+    thinned
+        How it was thinned when it was read, in words; empty if it was not.
     """
 
     angular_frequency: Float[np.ndarray, " n"]
     storage_modulus: Float[np.ndarray, " n"]
     loss_modulus: Float[np.ndarray, " n"]
+    thinned: str = ""
 
 
 @dataclass(frozen=True)
@@ -236,9 +239,13 @@ class ShearDataset(NotebookView):
 
     @property
     def thinned(self) -> str:
-        """Which runs were thinned when they were read, in sentences; empty if none was."""
-        runs = [run for run in self.runs if "thinned" in run.metadata]
-        return " ".join(f"{run.name}: {run.metadata['thinned']}." for run in runs)
+        """What was thinned when it was read, in sentences; empty if nothing was."""
+        said = [
+            (run.name, run.metadata["thinned"]) for run in self.runs if "thinned" in run.metadata
+        ]
+        if self.linear_sweep is not None and self.linear_sweep.thinned:
+            said.append(("the linear sweep", self.linear_sweep.thinned))
+        return " ".join(f"{name}: {text}." for name, text in said)
 
     @property
     def left_out(self) -> str:

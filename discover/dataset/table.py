@@ -23,6 +23,9 @@ LARGEST_FILE = 300_000_000
 LARGEST_VALUE = 1e15
 """No rheometer quantity in SI units is larger; squares of such numbers still compute."""
 
+SMALLEST_VALUE = 1e-100
+"""What is nearer to zero is zero: no instrument tells them apart, and its square is no number."""
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _IMPORT = "discover data import"
@@ -57,7 +60,7 @@ class Table:
         return ", ".join(names[:12]) + more
 
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
-        """Return a column as finite numbers.
+        """Return a column as finite numbers, those next to nothing as 0.
 
         Raises
         ------
@@ -83,7 +86,7 @@ class Table:
                 f"than any measurement (the limit is {LARGEST_VALUE:g}). Correct or remove that "
                 "line."
             )
-        return values
+        return np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values)
 
     def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
         """Return a known quantity in SI units, or None if no column holds it.
@@ -100,7 +103,15 @@ class Table:
         if found is None:
             return None
         column, factor = found
-        return self.numbers(column) * factor
+        values = self.numbers(column) * factor
+        if np.any(np.abs(values) > LARGEST_VALUE):
+            row = int(np.argmax(np.abs(values)))
+            raise InputError(
+                f"{column} in {self.name} holds {self.columns[column][row]} on line "
+                f"{self.lines[row]}, which is {values[row]:g} {quantity.unit}, more than any "
+                "measurement. Correct that line, or the unit in the heading."
+            )
+        return values
 
     def required(self, quantity: Quantity) -> Float[np.ndarray, " n"]:
         """Return a known quantity in SI units.

@@ -13,6 +13,9 @@ MOST_SAMPLES = 20_000
 """A record with more samples is thinned: they cost time and say nothing new about a law."""
 
 
+MOST_FREQUENCIES = 400
+"""A sweep with more is thinned: 40 a decade over ten decades, where instruments give 5 to 20."""
+
 _FOLLOWED = 1e-3
 """Error of the strain, over its range, up to which the samples kept follow the rate."""
 
@@ -63,6 +66,33 @@ def thin(
             f"; the strain between them is then off by {100 * lost:.2g} % of its range, so the "
             "rate varies faster than the samples kept: give a shorter record"
         )
+    return keep, note
+
+
+def thin_sweep(
+    angular_frequency: Float[np.ndarray, " n"], most: int = MOST_FREQUENCIES
+) -> tuple[Bool[np.ndarray, " n"], str]:
+    """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
+
+    Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
+    were recorded.
+
+    Parameters
+    ----------
+    angular_frequency
+        In rad/s, positive and increasing; some may be repeated.
+    most
+        How many may stay.
+    """
+    n = len(angular_frequency)
+    if n <= most:
+        return np.ones(n, dtype=bool), ""
+    position = np.log(angular_frequency)
+    keep = np.zeros(n, dtype=bool)
+    if position[-1] > position[0]:
+        keep[_nearest(position, np.linspace(position[0], position[-1], most - 2))] = True
+    keep[[0, -1]] = True
+    note = f"kept {int(keep.sum()):,} of {n:,} frequencies, evenly in log frequency"
     return keep, note
 
 

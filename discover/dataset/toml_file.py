@@ -1,11 +1,19 @@
 """TOML files that users write by hand: studies and mappings."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
+
+_DEEPEST_KEY = 16
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+# the library's time grows with the square of the parts, and with their square again in its errors
+_DEEP_KEY = re.compile(
+    rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST_KEY},}}+[ \t]*+[=\]]"
+)
 
 LARGEST_FILE = 1_000_000
 """Bytes; what is written by hand is a page of text."""
@@ -38,6 +46,13 @@ def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]
         raise InputError(
             f"{path} is not UTF-8 text, so it is not a {kind}. Save it as UTF-8."
         ) from None
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:
+        line = text[: deep.start()].count("\n") + 1
+        raise InputError(
+            f"{path} has a key of more than {_DEEPEST_KEY} parts on line {line}, so it is not a "
+            f"{kind}. {example}"
+        )
     try:
         return tomllib.loads(text), text
     except RecursionError:

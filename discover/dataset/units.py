@@ -1,11 +1,10 @@
 """Units in column names: ``stress_kPa`` is read as stress and converted to Pa."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
+from discover.dataset.unit_text import Unit, read_heading, read_unit
 from discover.errors import InputError
 
 
@@ -20,7 +19,7 @@ class Quantity:
     column
         Name of the column in SI units.
     unit
-        That unit, as pint writes it; empty for a pure number.
+        That unit; empty for a pure number.
     """
 
     stem: str
@@ -28,26 +27,17 @@ class Quantity:
     unit: str
 
 
-TIME = Quantity("time", "time_s", "second")
-SHEAR_RATE = Quantity("shear_rate", "shear_rate_1_s", "1/second")
-SHEAR_STRESS = Quantity("stress", "stress_Pa", "pascal")
-FIRST_NORMAL_STRESS_DIFFERENCE = Quantity("N1", "N1_Pa", "pascal")
-SECOND_NORMAL_STRESS_DIFFERENCE = Quantity("N2", "N2_Pa", "pascal")
+TIME = Quantity("time", "time_s", "s")
+SHEAR_RATE = Quantity("shear_rate", "shear_rate_1_s", "1/s")
+SHEAR_STRESS = Quantity("stress", "stress_Pa", "Pa")
+FIRST_NORMAL_STRESS_DIFFERENCE = Quantity("N1", "N1_Pa", "Pa")
+SECOND_NORMAL_STRESS_DIFFERENCE = Quantity("N2", "N2_Pa", "Pa")
 STRAIN = Quantity("strain", "strain", "")
-ANGULAR_FREQUENCY = Quantity("omega", "omega_rad_s", "radian/second")
-STORAGE_MODULUS = Quantity("Gp", "Gp_Pa", "pascal")
-LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "pascal")
+ANGULAR_FREQUENCY = Quantity("omega", "omega_rad_s", "rad/s")
+STORAGE_MODULUS = Quantity("Gp", "Gp_Pa", "Pa")
+LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "Pa")
 
 
-@cache
-def _registry():
-    # pint takes a noticeable time to load; files in SI units never need it
-    import pint
-
-    return pint.UnitRegistry()
-
-
-@cache
 def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
 
@@ -64,25 +54,35 @@ def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     InputError
         If the suffix is a unit of something else.
     """
-    if not re.fullmatch(r"[A-Za-z0-9_]{1,30}", suffix):
+    unit = read_heading(suffix)
+    if unit is None:
         return None
-    words = [re.sub(r"(?<=[A-Za-z])(\d)$", r"**\1", word) for word in suffix.split("_") if word]
-    registry = _registry()
-    try:
-        unit = registry.parse_expression("/".join(words))
-        unit = registry.Quantity(unit)
-    except Exception:  # pint raises many kinds for a word that is no unit
-        return None
-    # pint counts a cycle and a radian alike as one; a rheologist's Hz is 2π rad/s
-    cycles = 2.0 * math.pi if quantity is ANGULAR_FREQUENCY and "hertz" in str(unit) else 1.0
-    try:
-        return cycles * float(unit.to(quantity.unit).magnitude)
-    except Exception as error:
+    factor = factor_to(unit, quantity)
+    if factor is None:
         raise InputError(
-            f"The column {quantity.stem}_{suffix} has the unit {unit.units:~}, which is not a unit "
-            f"of {quantity.stem}. Name the column {quantity.column}, or give another unit of "
-            f"{quantity.unit or 'a pure number'} after the underscore."
-        ) from error
+            f"The column {quantity.stem}_{suffix} has the unit {suffix.replace('_', '/')}, which "
+            f"is not a unit of {quantity.stem}. Name the column {quantity.column}, or give another "
+            f"unit of {quantity.unit or 'a pure number'} after the underscore."
+        )
+    return factor
+
+
+def factor_to(unit: Unit, quantity: Quantity) -> float | None:
+    """Return the factor from a unit to the SI unit of a quantity, or None if it is another's."""
+    wanted = read_unit(quantity.unit)
+    if wanted is None or wanted.dimension != unit.dimension:
+        return None
+    cycles = 2.0 * math.pi if unit.cycles and "rad" in quantity.unit else 1.0
+    return cycles * unit.factor / wanted.factor
+
+
+def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
+    """Say in words how a column becomes SI; empty if it is in SI units already."""
+    if factor == 1.0:
+        return ""
+    return f"{column} is read as {quantity.stem}, times {factor:.6g}" + (
+        f" to {quantity.unit}" if quantity.unit else ""
+    )
 
 
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import ClassVar, Literal, NamedTuple
 
@@ -30,7 +30,10 @@ Scale = Literal[
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """A parameter of an effect.
+    """A parameter of an effect, with the range that it can have in a laboratory.
+
+    A value outside of the range is not fitted, and one that a fit drives to the end of it is no
+    finding: what the data ask for is then another effect.
 
     Attributes
     ----------
@@ -41,7 +44,13 @@ class EffectParameter:
     unit
         SI unit; empty for a pure number.
     low, high
-        Admissible range.
+        Physical range, in the unit or, where `range_scale` names one, in a property of the data.
+    range_source
+        Where the range comes from: literature, or the argument in a sentence.
+    range_scale
+        Data property in which `low` and `high` are measured; ``one`` where they are in `unit`.
+    ends
+        Those of `low` and `high` that something real can have, such as no recovery at all.
     scale
         Data property in which `first_trial` is measured.
     first_trial
@@ -55,6 +64,9 @@ class EffectParameter:
     high: float = jnp.inf
     scale: Scale = "one"
     first_trial: float = 0.1
+    range_source: str = field(kw_only=True)
+    range_scale: Scale = field(default="one", kw_only=True)
+    ends: tuple[Literal["low", "high"], ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -210,6 +222,10 @@ class Record:
         Time on the instrument's clock is ``times / clock_factor``.
     strain_before
         Strain, added up without regard to its sign, that the sample had seen in earlier runs.
+    tool_rate
+        Of the driven tool, as a nominal shear rate in 1/s, shape (n,); by default that of the
+        fluid. The two differ where the fluid slips, where something between them gives way, and
+        where the gap is not what the nominal rate is computed with.
     """
 
     times: Float[Array, " n"]
@@ -217,6 +233,11 @@ class Record:
     stress: Float[Array, " n"]
     clock_factor: Float[Array, ""]
     strain_before: Float[Array, ""] | float = 0.0
+    tool_rate: Float[Array, " n"] = None  # type: ignore[assignment]  # set below
+
+    def __post_init__(self):
+        if self.tool_rate is None:
+            object.__setattr__(self, "tool_rate", self.shear_rate)
 
     @property
     def instrument_times(self) -> Float[Array, " n"]:
@@ -244,7 +265,8 @@ class KinematicEffect(AbstractEffect):
     shapes_command
         Whether it acts on the way from the command to the tool. A rate that was measured at the
         tool contains it already, so it is then no candidate; what lies between the tool and the
-        fluid, such as slip or a wrong gap, still is.
+        fluid, such as slip or a wrong gap, still is. The tool's own rate, which its inertia and
+        friction follow, is the command with these effects and without the others.
     """
 
     shapes_command: bool = False

@@ -35,7 +35,18 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
     """Return the effect that adds this term with a free coefficient."""
     return LibraryTerm(
         name=term.name,
-        parameters=(EffectParameter("coefficient", "c", first_trial=0.01),),
+        parameters=(
+            EffectParameter(
+                "coefficient",
+                "c",
+                low=-10.0,
+                high=10.0,
+                first_trial=0.01,
+                range_source="with stresses over the modulus and rates times the relaxation time, "
+                "the coefficients of known laws are of order one (Bird, Armstrong & Hassager 1987, "
+                "ch. 7); ten times leaves room",
+            ),
+        ),
         equation=rf"h \mathrel{{+}}= c\,{term.latex()}",
         source="Smith 1971, Int. J. Eng. Sci. 9, 899: isotropic functions of two tensors",
         check="A flow of another kind, such as step strain or extension.",

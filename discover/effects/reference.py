@@ -1,7 +1,5 @@
 """The dictionary as a page to read: docs/effects.md is what this writes."""
 
-import math
-
 from discover.effects.base import AbstractEffect, EffectParameter
 from discover.effects.registry import named_effects
 
@@ -20,7 +18,9 @@ def reference_page() -> str:
         "",
         "Written by `python -m discover.effects.reference > docs/effects.md`; a test holds the",
         "two together. What follows is what the closed loop may add to a declared law. The first",
-        "parameter of an effect is its amplitude: at zero it changes nothing. Any term of the",
+        "parameter of an effect is its amplitude: at zero it changes nothing. A parameter has the",
+        "range that it can have in a laboratory; one that a fit drives to the end of it, or leaves",
+        "open over decades, is no finding, and the effect is not named. Any term of the",
         "tensor library, such as `tr(sigma)*sigma`, is a candidate too. An effect of your own is",
         "one file: see [adding an effect](adding-an-effect.md).",
     ]
@@ -38,11 +38,11 @@ def _entry(effect: AbstractEffect) -> list[str]:
         "",
         f"$${effect.equation}$$",
         "",
-        "| parameter | symbol | unit | admissible |",
-        "|---|---|---|---|",
+        "| parameter | symbol | unit | physical range | because |",
+        "|---|---|---|---|---|",
         *(
             f"| `{parameter.name}` | ${parameter.symbol}$ | {parameter.unit or '–'} "
-            f"| {_admissible(parameter)} |"
+            f"| {_range(parameter)} | {parameter.range_source} |"
             for parameter in effect.parameters
         ),
         "",
@@ -52,15 +52,23 @@ def _entry(effect: AbstractEffect) -> list[str]:
     ]
 
 
-def _admissible(parameter: EffectParameter) -> str:
-    low, high = parameter.low, parameter.high
-    if math.isinf(low) and math.isinf(high):
-        return "any"
-    if math.isinf(high):
-        return f"≥ {low:g}"
-    if math.isinf(low):
-        return f"≤ {high:g}"
-    return f"{low:g} to {high:g}"
+_PROPERTIES = {
+    "run_time": "length of a run",
+    "strain": "strain of a run",
+    "stress": "rms stress",
+    "inverse_stress": "1/(rms stress)",
+    "fluidity": "largest rate/(rms stress)",
+    "viscosity": "(rms stress)/(largest rate)",
+    "stress_rate": "(rms stress)/(length of a run)",
+}
+"""Properties of the data in which ranges are measured; medians over the fitted runs."""
+
+
+def _range(parameter: EffectParameter) -> str:
+    text = f"{parameter.low:g} to {parameter.high:g}"
+    if parameter.range_scale != "one":
+        text += f" × {_PROPERTIES[parameter.range_scale]}"
+    return text
 
 
 if __name__ == "__main__":

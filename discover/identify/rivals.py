@@ -124,13 +124,13 @@ class RivalTable(SentenceAndTable):
         """One sentence for a reader."""
         if not self.rivals:
             return (
-                f"Of {self.tested} other laws tried, none much larger, the data rule out every one "
-                f"at {100 * LEVEL:.0f} %."
+                f"If the law is in the library: of {self.tested} other laws tried, none much "
+                f"larger, the data rule out every one at {100 * LEVEL:.0f} %."
             )
         ties = sum(r.evidence.test == "tie" for r in self.rivals)
         text = (
-            f"Of {self.tested} other laws tried, the data do not rule out {len(self.rivals)} at "
-            f"{100 * LEVEL:.0f} %"
+            f"If the law is in the library: of {self.tested} other laws tried, the data do not "
+            f"rule out {len(self.rivals)} at {100 * LEVEL:.0f} %"
         )
         text += f", of which {ties} predict the same to integration error" if ties else ""
         return text + (

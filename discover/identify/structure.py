@@ -365,8 +365,8 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
         )
         return QuantityVerdict(quantity, "assumed", text)
     text = (
-        f"{quantity} is determined by {what} within this library of {n_terms} terms and the "
-        "convected derivative that was assumed"
+        f"If the law is in this library of {n_terms} terms, with the convected derivative that was "
+        f"assumed, {what} determines {quantity}"
     )
     feeble = [d for d in weak if d.changes[quantity] > 0.1]
     if feeble:

@@ -34,4 +34,14 @@ class FenePeterlin(AbstractConstitutiveLaw):
         return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
 
 
-NAMED = {"fene_p": NamedLaw("FENE-P", FenePeterlin, {"L2": (3.0 + 1e-6, 1e6)})}
+NAMED = {
+    "fene_p": NamedLaw(
+        "FENE-P",
+        FenePeterlin,
+        {"L2": (3.0 + 1e-6, 1e6)},
+        {
+            "L2": "Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already; at a million, "
+            "longer than of any polymer, the springs are Hooke's"
+        },
+    )
+}

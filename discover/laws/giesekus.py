@@ -20,4 +20,11 @@ class Giesekus(AbstractConstitutiveLaw):
         return self.mobility * square(stress)
 
 
-NAMED = {"giesekus": NamedLaw("Giesekus", Giesekus, {"alpha": (0.0, 1.0)})}
+NAMED = {
+    "giesekus": NamedLaw(
+        "Giesekus",
+        Giesekus,
+        {"alpha": (0.0, 1.0)},
+        {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
+    )
+}

@@ -19,4 +19,11 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
 
 
-NAMED = {"johnson_segalman": NamedLaw("Johnson–Segalman", JohnsonSegalman, {"xi": (0.0, 2.0)})}
+NAMED = {
+    "johnson_segalman": NamedLaw(
+        "Johnson–Segalman",
+        JohnsonSegalman,
+        {"xi": (0.0, 2.0)},
+        {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
+    )
+}

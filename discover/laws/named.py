@@ -1,7 +1,7 @@
 """A law that can be asked for by name."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from discover.laws.base import AbstractConstitutiveLaw
 
@@ -17,12 +17,15 @@ class NamedLaw:
     build
         Makes the law from its parameters, in the order of `parameters`.
     parameters
-        Name and admissible range of each parameter.
+        Name and physical range of each parameter.
+    range_sources
+        Where each range comes from: literature, or the argument in a sentence.
     """
 
     title: str
     build: Callable[..., AbstractConstitutiveLaw]
     parameters: Mapping[str, tuple[float, float]]
+    range_sources: Mapping[str, str] = field(default_factory=dict)
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

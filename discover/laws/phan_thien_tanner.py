@@ -33,9 +33,15 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
         return jnp.expm1(self.extensibility * trace(stress)) * stress
 
 
+_RANGE = {"epsilon": (0.0, 10.0)}
+_RANGE_SOURCE = {
+    "epsilon": "Phan-Thien & Tanner 1977: fast extension of linear PTT ends at 2 Gλ/ε, which ten "
+    "puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1"
+}
+
 NAMED = {
-    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, {"epsilon": (0.0, 10.0)}),
+    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, _RANGE, _RANGE_SOURCE),
     "ptt_exponential": NamedLaw(
-        "exponential PTT", ExponentialPhanThienTanner, {"epsilon": (0.0, 10.0)}
+        "exponential PTT", ExponentialPhanThienTanner, _RANGE, _RANGE_SOURCE
     ),
 }

@@ -33,7 +33,12 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
         learners=[LEARNER_TITLES.get(name, name) for name in learners],
         symbols=list(_SYMBOLS.values()),
         comparisons=[
-            {"study": study, "cells": _cells(row, learners), "row": row}
+            {
+                "study": study,
+                "verdict": row.verdict.replace("_", " "),
+                "cells": _cells(row, learners),
+                "row": row,
+            }
             for study, row in pairs
             if row.learners
         ],
@@ -55,7 +60,7 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
                 "row": row,
             }
             for study, row in pairs
-            if row.verdict
+            if row.verdict and not row.learners
         ],
     )
 

@@ -1,6 +1,7 @@
 """Templates → one self-contained page. The only place that knows jinja2."""
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -56,6 +57,15 @@ def render(template: str, **content: Any) -> str:
     content
         Its variables.
     """
+    return (
+        _environment()
+        .get_template(template)
+        .render(version=__version__, style_sheet=Markup(style_sheet()), **content)
+    )
+
+
+@cache
+def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("discover.report"),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -72,6 +82,4 @@ def render(template: str, **content: Any) -> str:
         spoken=spoken,
         safe_svg=Markup,
     )
-    return environment.get_template(template).render(
-        version=__version__, style_sheet=Markup(style_sheet()), **content
-    )
+    return environment

@@ -1,24 +1,19 @@
-"""The verdict of a report: what was found, how sure, what to measure next. One sentence each."""
+"""The verdict on a closed loop: what was found, how sure, what to measure next."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from discover.closed_loop.judgement import ONLY_NOISE
 from discover.closed_loop.result import LoopResult, Stage
-from discover.comparison.comparison import Comparison
-from discover.comparison.next_measurement import NextMeasurement
 from discover.report.wording import (
-    LEARNERS,
-    SYMBOLS,
     effect_title,
     estimate,
     interval,
     percent,
+    sentence,
     significant,
     spoken,
-    terms_text,
-    worst,
 )
 from discover.statistics.residual import FEWEST_TESTED
 
@@ -40,110 +35,9 @@ _NOT_CARRIED = "What explains the fitted runs does not carry over to the runs he
 _MOST_NAMES = 3
 
 
-def comparison_verdict(comparison: Comparison) -> list[str]:
-    """Return the verdict on a comparison: three sentences, in the order of `QUESTIONS`."""
-    return [_found(comparison), _how_sure(comparison), _next(comparison)]
-
-
 def loop_verdict(result: LoopResult) -> list[str]:
     """Return the verdict on a closed loop: three sentences, in the order of `QUESTIONS`."""
     return [_loop_found(result), _loop_sure(result), _loop_next(result)]
-
-
-def _sentence(parts: Iterable[str]) -> str:
-    text = "; ".join(part for part in parts if part)
-    return text[:1].upper() + text[1:] + "."
-
-
-def _found(comparison: Comparison) -> str:
-    parts = []
-    sparse = comparison.outcomes.get("tensor_sindy")
-    if sparse is not None:
-        text = f"sparse regression found {terms_text(sparse)}"
-        if comparison.truth is not None:
-            wanted = {t.term for t in comparison.truth}
-            found = {t.term for t in sparse.terms}
-            if found == wanted:
-                text += ", exactly the terms of the law that made the data"
-            else:
-                missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
-                extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
-                text += ", against the law that made the data"
-                text += f" missing: {missing}, and too many: {extra}"
-        parts.append(text)
-    network = comparison.outcomes.get("tbnn_ude")
-    if network is not None and network.terms:
-        largest = max(network.terms, key=lambda t: abs(t.coefficient))
-        parts.append(
-            f"put into words, the neural network's largest term is "
-            f"{significant(largest.coefficient)} {spoken(largest.term)}"
-        )
-    elif network is not None:
-        parts.append("put into words, the neural network found no term")
-    return _sentence(parts)
-
-
-def _how_sure(comparison: Comparison) -> str:
-    parts = []
-    judged = comparison.judged
-    for name in comparison.outcomes:
-        errors = {flow.name: comparison.errors(name, flow) for flow in judged}
-        said = [
-            f"{symbol} by {percent(value)}"
-            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
-            if (value := worst(errors, quantity.split()[0])) is not None
-        ]
-        if said:
-            flows = "flows" if len(judged) > 1 else "the flow"
-            missed = f"{LEARNERS[name].lower()} misses {', '.join(said)} at most"
-            parts.append(f"{missed} in {flows} that no fit saw")
-    if not parts:
-        parts.append("nothing was held out, so no prediction was put to the test")
-    if comparison.undetermined:
-        names = " and ".join(comparison.undetermined)
-        parts.append(
-            f"not determined by these data: {names}, shown as the choice of the simplest law that "
-            "fits"
-        )
-    for name, report in comparison.physics.items():
-        failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
-        if failed:
-            parts.append(
-                f"{LEARNERS[name].lower()}'s law fails {len(failed)} of the checks of physical "
-                f"soundness ({', '.join(failed)})"
-            )
-    return _sentence(parts)
-
-
-def _next(comparison: Comparison) -> str:
-    following = comparison.next_measurement
-    if following.proposals:
-        return _proposal(following)
-    if comparison.undetermined:
-        names = " and ".join(comparison.undetermined)
-        return f"Measure {names}: nothing else decides between laws that give the same σ12."
-    rates = [float(np.max(np.abs(f.shear_rate))) for f in comparison.flows_of("training")]
-    unit = "" if comparison.noise is not None else " 1/s"
-    return (
-        "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
-        f"a shear rate above {significant(max(rates), 3)}{unit}."
-    )
-
-
-def _proposal(following: NextMeasurement) -> str:
-    best = following.proposals[0]
-    n_rivals = len(following.laws) - 1
-    laws = "the one rival law" if n_rivals == 1 else f"the {n_rivals} rival laws"
-    leave = f"{laws} that these data leave"
-    if not best.falling:
-        return f"None of the experiments allowed is expected to rule out {leave}."
-    what = " and ".join(SYMBOLS[name] for name in best.observed)
-    fall = len(best.falling)
-    outcome = leave if fall == n_rivals else f"{fall} of {leave}"
-    return (
-        f"Measure {what} in {best.experiment.title}: at {percent(following.noise)} noise it is "
-        f"expected to rule out {outcome}."
-    )
 
 
 def _loop_found(result: LoopResult) -> str:
@@ -164,8 +58,8 @@ def _loop_found(result: LoopResult) -> str:
             verdict = _UNKNOWN_NOISE
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
-        return _sentence([*parts, verdict if not parts else verdict[:1].lower() + verdict[1:]])
-    return _sentence([verdict, *parts])
+        return sentence([*parts, verdict if not parts else verdict[:1].lower() + verdict[1:]])
+    return sentence([verdict, *parts])
 
 
 def _loop_sure(result: LoopResult) -> str:
@@ -193,7 +87,7 @@ def _loop_sure(result: LoopResult) -> str:
         if stage.aliases:
             others = _several([*map(effect_title, stage.aliases)], "or")
             parts.append(f"these data cannot tell {effect_title(stage.effect)} from {others}")
-    return _sentence(parts)
+    return sentence(parts)
 
 
 def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:

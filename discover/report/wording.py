@@ -2,12 +2,18 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from discover.comparison.outcome import LearnerOutcome
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+
+
+def sentence(parts: Iterable[str]) -> str:
+    """Return one sentence of several parts, without those that are empty."""
+    text = "; ".join(part for part in parts if part)
+    return text[:1].upper() + text[1:] + "."
 
 
 def known(value: float | None) -> bool:
@@ -141,14 +147,14 @@ def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> fl
     return max(values, default=None)
 
 
-def terms_text(outcome: LearnerOutcome) -> str:
-    """Return the law's terms as plain text."""
+def terms_text(outcome: LearnerOutcome, intervals: bool = True) -> str:
+    """Return the law's terms as plain text, with or without the intervals of the coefficients."""
     if not outcome.terms:
         return "no term at all"
     parts = []
     for term in outcome.terms:
         text = f"{estimate(term.coefficient, term.ci95)} {spoken(term.term)}"
-        if term.ci95 is not None:
+        if intervals and term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)

@@ -12,7 +12,7 @@ PART_SUFFIX = ".discover-part"
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a text file so that no reader ever sees half of it.
+    r"""Write a text file so that no reader ever sees half of it.
 
     The text goes to a temporary file in the same folder, which then takes the name.
 
@@ -21,7 +21,7 @@ def write_text(path: str | Path, text: str) -> Path:
     path
         The file; its folder must exist.
     text
-        The content, written as UTF-8.
+        The content, written as UTF-8; what UTF-8 cannot hold as ``\udcff``.
 
     Raises
     ------
@@ -35,7 +35,8 @@ def write_text(path: str | Path, text: str) -> Path:
         dir=path.parent, prefix=f".{path.name}.", suffix=PART_SUFFIX
     )
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+        # a file's name that is no UTF-8 comes as half characters, and may stand in a title
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import socket
+import stat
 import weakref
 from pathlib import Path
 
@@ -52,7 +53,7 @@ def lock_folder(folder: str | Path) -> FolderLock:
     if held is not None and held._finalizer.alive:
         return held
     for _ in range(20):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        descriptor = _open(path)
         owner = _owner(descriptor)
         if not _take(descriptor, owner):
             os.close(descriptor)
@@ -71,6 +72,27 @@ def lock_folder(folder: str | Path) -> FolderLock:
     lock = FolderLock(path, descriptor)
     _held[str(path)] = lock
     return lock
+
+
+def _open(path: Path) -> int:
+    """Open the lock file; a pipe or link that somebody put in its place is refused."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    try:
+        descriptor = os.open(path, flags, 0o644)
+    except OSError as error:
+        if not (path.is_symlink() or path.is_dir()):
+            raise
+        raise InputError(_no_lock(path)) from error
+    if stat.S_ISREG(os.fstat(descriptor).st_mode):
+        return descriptor
+    os.close(descriptor)
+    raise InputError(_no_lock(path))
+
+
+def _no_lock(path: Path) -> str:
+    return (
+        f"{path} is no plain file, so the folder cannot be locked. Remove it, or use another --out."
+    )
 
 
 def _take(descriptor: int, owner: dict) -> bool:

@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,10 +21,10 @@ STATE_FILE = "study.json"
 class RunFolder:
     """The folder that a command writes to.
 
-    ``state/study.json`` holds the study's fingerprint and whether it is complete; every finished
-    part lies beside it as JSON, so that a run that was stopped goes on where it was. A part carries
-    the fingerprint and a hash: one that was damaged, edited or left by another study is computed
-    again. While the object lives, no other process can open the folder.
+    ``state/study.json`` holds the study's fingerprint, whether it is complete, and then the hash of
+    every result; every finished part lies beside it as JSON, so that a run that was stopped goes on
+    where it was. A part carries the fingerprint and a hash: one that was damaged, edited or left by
+    another study is computed again. While the object lives, no other process can open the folder.
 
     Parameters
     ----------
@@ -45,7 +46,11 @@ class RunFolder:
         self.path = make_folder(path)
         self.fingerprint = fingerprint
         self._state = self.path / STATE_FOLDER
+        self._written: dict[str, str] = {}
         self._lock = _locked(self.path)
+        figures = self.path / "figures"
+        for folder in (self._state, figures):
+            _refuse_link(folder)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home
@@ -61,8 +66,10 @@ class RunFolder:
                     "was changed. Use --overwrite to replace them, or another --out."
                 )
         self.complete = bool(found and found.get("complete") is True)
-        for folder in (self.path, make_folder(self._state), make_folder(self.path / "figures")):
+        for folder in (self.path, make_folder(self._state), make_folder(figures)):
             _sweep_up(folder)
+        files = (found or {}).get("files")
+        self._files: dict[str, Any] = files if isinstance(files, dict) else {}
         if found is None:
             self._write_state(False)
 
@@ -85,18 +92,19 @@ class RunFolder:
 
     def write(self, name: str, text: str) -> Path:
         """Write one of the results."""
-        return write_text(self.path / name, text)
+        written = write_text(self.path / name, text)
+        self._written[name] = _digest(written)
+        return written
 
     def holds(self, *names: str) -> bool:
-        """Return whether results of these names are there, those in JSON undamaged."""
-        return all(
-            (self.path / name).is_file()
-            and (not name.endswith(".json") or _read_json(self.path / name) is not None)
-            for name in names
+        """Return whether results of these names, and all others, are as they were written."""
+        return set(names) <= set(self._files) and all(
+            digest == _digest(self.path / name) for name, digest in self._files.items()
         )
 
     def finish(self) -> None:
         """Mark the study as complete; called last."""
+        self._files |= self._written
         self._write_state(True)
         self.complete = True
         self._lock.release()
@@ -105,7 +113,9 @@ class RunFolder:
         return any(file.name != STATE_FILE for file in self._state.glob("*.json"))
 
     def _write_state(self, complete: bool) -> None:
-        content = {"fingerprint": self.fingerprint, "complete": complete}
+        content: dict[str, Any] = {"fingerprint": self.fingerprint, "complete": complete}
+        if complete:
+            content["files"] = self._files
         write_text(self._state / STATE_FILE, json.dumps(content))
 
 
@@ -117,6 +127,22 @@ def _locked(folder: Path):
             f"The folder {folder} cannot be written to: {error.strerror}. Choose another with "
             "--out."
         ) from None
+
+
+def _refuse_link(folder: Path) -> None:
+    if os.path.islink(folder):
+        raise InputError(
+            f"{folder} is a link, and nothing is written to where a link leads. Remove it, or use "
+            "another --out."
+        )
+
+
+def _digest(path: Path) -> str:
+    """Return the hash of a file; empty if it cannot be read."""
+    try:
+        return hashlib.sha256(read_bytes(path, path.name)).hexdigest()
+    except InputError:
+        return ""
 
 
 def _remove(folder: Path) -> None:

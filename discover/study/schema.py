@@ -3,9 +3,10 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from discover.laws.registry import LAWS
+from discover.validation import Section
 
 
 def _known_law(name: str) -> str:
@@ -24,22 +25,18 @@ Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Synthetic(_Section):
+class Synthetic(Section):
     """Data computed from a known law instead of measured."""
 
     law: SyntheticLaw
-    parameters: dict[str, float] = {}
+    parameters: dict[str, float] = Field(default_factory=dict)
     protocol: Literal["paper"] = "paper"
     noise: Annotated[float, Field(ge=0, le=10)] = 0.0
     seed: Seed = 0
     samples: Annotated[int, Field(ge=10, le=100_000)] = 201
 
 
-class Data(_Section):
+class Data(Section):
     """Where the runs come from and which of them no fit may see."""
 
     folder: str | None = None
@@ -55,13 +52,15 @@ class Data(_Section):
     def _one_source(self):
         if (self.folder is None) == (self.synthetic is None):
             raise ValueError('write either folder = "..." or synthetic = {...}, not both or none')
+        if self.fit == ():
+            raise ValueError("fit names no run; name some, or leave it out to fit all not held out")
         both = set(self.fit or ()) & set(() if self.held_out == "each" else self.held_out)
         if both:
             raise ValueError(f"the run {sorted(both)[0]!r} is both in fit and in held_out")
         return self
 
 
-class Model(_Section):
+class Model(Section):
     """The declared law: the known part of what is to be found."""
 
     law: LawName = "ucm"
@@ -70,7 +69,7 @@ class Model(_Section):
     modes: Literal["lve"] | None = None
     sweep_rad_s: tuple[Positive, Positive] | None = None
     solvent_viscosity_Pa_s: Annotated[float, Field(ge=0)] = 0.0
-    parameters: dict[str, float | Literal["fit"]] = {}
+    parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
     known_relaxation: bool = True
 
     @model_validator(mode="after")
@@ -82,7 +81,7 @@ class Model(_Section):
         return self
 
 
-class Loop(_Section):
+class Loop(Section):
     """How far the closed loop may go."""
 
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
@@ -93,19 +92,24 @@ class Loop(_Section):
 
     @model_validator(mode="after")
     def _window(self):
+        if self.effects == ():
+            raise ValueError(
+                "effects names no effect; name some, leave it out for all, or write "
+                "max_effects = 0 for none"
+            )
         if self.strain is not None and not 0 <= self.strain[0] < self.strain[1]:
             raise ValueError(f"strain must be [low, high] with 0 <= low < high; got {self.strain}")
         return self
 
 
-class Library(_Section):
+class Library(Section):
     """Candidate terms: tensors × invariants up to a degree, plus closed forms."""
 
     degree: Annotated[int, Field(ge=0, le=2)] = 1
     closed_forms: tuple[Literal["exp", "saturating"], ...] = ()
 
 
-class Sweep(_Section):
+class Sweep(Section):
     """The same comparison again over laws and values of one parameter, as synthetic data.
 
     The paper's study of linear and exponential PTT over the extensibility is one.
@@ -116,7 +120,7 @@ class Sweep(_Section):
     values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
 
 
-class NextExperiment(_Section):
+class NextExperiment(Section):
     """What the user could measure next."""
 
     flows: Annotated[
@@ -133,7 +137,7 @@ class NextExperiment(_Section):
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
 
 
-class Compare(_Section):
+class Compare(Section):
     """Which learners, which candidate terms, which flows they are judged on."""
 
     learners: tuple[Literal["tensor_sindy", "tbnn_ude"], ...] = ("tensor_sindy", "tbnn_ude")
@@ -159,7 +163,7 @@ class Compare(_Section):
         return self
 
 
-class Study(_Section):
+class Study(Section):
     """One study: data, declared model, and what to do with them."""
 
     data: Data

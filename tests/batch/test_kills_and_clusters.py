@@ -243,6 +243,49 @@ def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
     assert results(tmp_path / "out") == calm
 
 
+@pytest.mark.parametrize("deaths", [1, 99])
+def test_workers_killed_while_they_start_do_not_end_the_batch(
+    studies, calm, tmp_path, monkeypatch, caplog, deaths
+):
+    distributed = pytest.importorskip("distributed")
+    starts = []
+    workers = distributed.LocalCluster
+
+    def start(**options):
+        starts.append(options)
+        if len(starts) <= deaths:
+            raise RuntimeError("Nanny failed to start.")  # as it does when its worker is killed
+        return workers(**options | {"processes": False, "protocol": "tcp://"})
+
+    monkeypatch.setattr(distributed, "LocalCluster", start)
+    result = batch.run_batch(studies, tmp_path / "out", workers=2)
+    assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
+    assert results(tmp_path / "out") == calm
+    assert len(starts) == min(deaths + 1, 3)
+    assert ("one after the other" in caplog.text) == (deaths > 2)
+
+
+def test_nobody_on_the_network_can_reach_the_workers():
+    psutil = pytest.importorskip("psutil")
+    with cluster._local_client(1):
+        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+        ports = [
+            connection.laddr.ip
+            for process in processes
+            for connection in process.net_connections("tcp")
+            if connection.status == psutil.CONN_LISTEN
+        ]
+    assert len(ports) >= 3  # scheduler, worker, the worker's nanny, their pages
+    assert set(ports) == {"127.0.0.1"}
+
+
+def test_no_more_workers_start_than_there_are_studies(studies, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(batch, "run_on_cluster", lambda run, jobs, n, *rest: asked.append(n))
+    batch.run_batch(studies, tmp_path / "out", workers=1000)
+    assert asked == [len(studies)]
+
+
 def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_path):
     class Future:
         def exception(self):

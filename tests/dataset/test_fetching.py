@@ -3,6 +3,7 @@
 import hashlib
 import os
 import subprocess
+import tracemalloc
 import zipfile
 from dataclasses import replace
 
@@ -120,6 +121,36 @@ def test_a_package_that_does_not_hold_the_set_is_the_users_mistake(package, tmp_
                 if case == "twice":
                     archive.writestr(f"again/{name}", content)
     with pytest.raises(InputError):
+        fetch(CATALOGUE["polyisoprene"], other)
+
+
+def packed(path, name, content, kind=zipfile.ZIP_DEFLATED):
+    with zipfile.ZipFile(path, "w", kind) as archive:
+        archive.writestr(name, content)
+    return path
+
+
+def test_a_package_that_lies_about_its_sizes_is_not_unpacked_whole(package, tmp_path):
+    name = "data/PI/shear/slow.shear"
+    other = packed(tmp_path / "other.whl", name, bytes(200_000_000))
+    raw = bytearray(other.read_bytes())
+    for at in (raw.index(b"PK\x03\x04") + 22, raw.index(b"PK\x01\x02") + 24):
+        raw[at : at + 4] = (4096).to_bytes(4, "little")  # the size that it claims
+    other.write_bytes(raw)
+    tracemalloc.start()
+    with pytest.raises(InputError, match="Download made-up"):
+        fetch(CATALOGUE["polyisoprene"], other)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 20_000_000
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [(zipfile.ZIP_BZIP2, "packed"), (zipfile.ZIP_DEFLATED, "too large")]
+)
+def test_a_package_that_is_too_large_unpacked_is_refused(package, tmp_path, kind, words):
+    other = packed(tmp_path / "o.whl", "data/PI/shear/slow.shear", bytes(30_000_000), kind)
+    with pytest.raises(InputError, match=words):
         fetch(CATALOGUE["polyisoprene"], other)
 
 

@@ -5,6 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.closed_loop.run_batch import data_scales
+from discover.dataset import ShearRun
 from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
@@ -21,6 +23,7 @@ from discover.effects.filters import first_order_lag
 from discover.effects.reference import reference_page
 from discover.errors import InputError
 from discover.laws import LAWS, FenePeterlin
+from discover.protocols import start_up
 from tensor_library.algebra import from_shear
 from tensor_library.terms import parse_term
 
@@ -60,6 +63,11 @@ def response(effect, amplitude):
     return effect.recorded_stress(values, record()) - SIGNAL
 
 
+def run():
+    flow = start_up(1.0)
+    return ShearRun("run", np.asarray(TIMES), flow, np.ones(len(TIMES)), np.asarray(SIGNAL))
+
+
 def record(clock_factor=1.0):
     return Record(TIMES, jnp.cos(TIMES), SIGNAL, jnp.asarray(clock_factor))
 
@@ -77,6 +85,31 @@ def test_an_effect_says_where_it_comes_from_and_how_to_confirm_it(effect):
     assert effect.equation
     assert effect.visible
     assert effect.parameters[0].low <= 0.0 <= effect.parameters[0].high
+
+
+@pytest.mark.parametrize("effect", [*NAMED, library_effects()[0]], ids=lambda e: e.name)
+def test_every_parameter_has_a_physical_range_and_says_where_it_comes_from(effect):
+    for parameter in effect.parameters:
+        assert -np.inf < parameter.low < parameter.high < np.inf
+        assert len(parameter.range_source) > 20
+        if parameter.range_scale != "one":
+            assert parameter.range_scale in data_scales([run()])
+    # an inner constant that scales nothing in its equation has no zero
+    for parameter in effect.parameters[1:]:
+        assert parameter.low > 0.0 or "low" in parameter.ends
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
+def test_every_parameter_of_a_declared_law_has_a_range_with_a_source(law):
+    for name, (low, high) in law.parameters.items():
+        assert -np.inf < low < high < np.inf
+        assert len(law.range_sources[name]) > 20
+
+
+def test_no_liquid_is_warmed_by_more_than_its_heat_capacity_allows():
+    heating = make_effect("viscous_heating").parameters[0]
+    # 0.1 1/K in water, 4.2 MJ/(m³ K), and 0.03 1/K in oil, 1.7 MJ/(m³ K), are possible; 25 is not
+    assert heating.low < 0.1 / 4.2e6 < 0.03 / 1.7e6 * 10 < heating.high < 1e-5
 
 
 @pytest.mark.parametrize(

@@ -19,11 +19,8 @@ from discover.equations.mathml import law_element, term_element
 from discover.identify.bands import PredictionBand
 from discover.laws import Fluid, make_law
 from discover.learners.result import LearnerResult, RecoveredTerm
-from discover.report.comparison_report import (
-    _error_rows,
-    safe_name,
-    write_comparison,
-)
+from discover.report.comparison_report import safe_name, write_comparison
+from discover.report.comparison_tables import error_rows
 from discover.report.mathtext import formula
 from discover.report.palette import style_sheet
 from discover.report.plots.flows import curves, flow_picture, training_picture
@@ -289,7 +286,7 @@ def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, pa
     chosen = np.ones((flow.times.size, 3))
     band = PredictionBand(flow.times, chosen, 0.9 * chosen, 1.1 * chosen, chosen, chosen, 0.0)
     following = NextMeasurement(bands={flow.key: band})
-    row = _error_rows(replace(comparison, next_measurement=following))[0]["cells"]
+    row = error_rows(replace(comparison, next_measurement=following))[0]["cells"]
     widths = [cell["half_width"] for cell in row]
     assert widths[:3] == widths[6:] == [None] * 3  # before, and one network
     assert widths[3:6] == pytest.approx([0.1] * 3)

@@ -9,6 +9,7 @@ from discover.dataset.fetching.catalogue import PublicDataset
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
 
+_PIECE = 1 << 16  # bytes unpacked at a time
 _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a rheometer
 
 
@@ -67,9 +68,20 @@ def _checked(archive, members, name: str, digest: str) -> bytes:
 
 
 def _read(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bytes:
-    if member.file_size > _LARGEST_MEMBER:
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        # the others cannot be unpacked a little at a time
         raise InputError(
-            f"{member.filename} in the package is far too large for a data file. "
-            "Download the package again."
+            f"{member.filename} in the package is packed in a way that no wheel is. Download the "
+            "package again."
         )
-    return archive.read(member)
+    content = bytearray()
+    with archive.open(member) as stream:
+        # what an archive says of sizes need not be so
+        while piece := stream.read(_PIECE):
+            content += piece
+            if len(content) > _LARGEST_MEMBER:
+                raise InputError(
+                    f"{member.filename} in the package is far too large for a data file. "
+                    "Download the package again."
+                )
+    return bytes(content)

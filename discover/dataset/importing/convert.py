@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.mapping import Geometry, Mapping, Source
-from discover.dataset.importing.quantities import QUANTITIES, guess_columns, to_si
+from discover.dataset.importing.quantities import QUANTITIES, factor_to_si, guess_columns
 from discover.dataset.importing.text_export import Block, is_number, read_blocks
 from discover.dataset.load import INDEX_FILE, SWEEP_FILE
 from discover.dataset.table import read_bytes, shown
@@ -78,7 +78,7 @@ def import_files(
                     f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
                 )
                 continue
-            values, dropped = _values(block, found, mapping, path.name)
+            values, factors, dropped = _values(block, found, mapping, path.name)
             run = _run(values, mapping)
             if name in folder.files or name in (INDEX_FILE, SWEEP_FILE):
                 raise InputError(f"Two runs would be named {name}; rename one of the files.")
@@ -86,7 +86,7 @@ def import_files(
             index.append((name, path.name, block.name))
             _note_names(seen, block, found)
             used += 1
-            folder.said.append(_summary(name, path.name, block, found, run, dropped))
+            folder.said.append(_summary(name, path.name, block, found, factors, run, dropped))
         if not used:
             raise InputError(_no_run(path, blocks, given, mapping.geometry))
         sources.append(_source(path, False))
@@ -172,8 +172,8 @@ def _or(names: tuple[str, ...]) -> str:
 
 def _values(
     block: Block, found: dict[str, int], mapping: Mapping, name: str
-) -> tuple[dict[str, np.ndarray], int]:
-    """Return the found columns in SI units, and how many rows were dropped."""
+) -> tuple[dict[str, np.ndarray], dict[str, float], int]:
+    """Return the found columns in SI units, their factors, and how many rows were dropped."""
     whole = [
         all(row[at] != "" and is_number(row[at]) for at in found.values()) for row in block.cells
     ]
@@ -184,13 +184,14 @@ def _values(
             f"{name}: no row from line {block.line} on has numbers in all of {names}. Name other "
             "columns."
         )
-    values = {}
+    values, factors = {}, {}
     for key, at in found.items():
         column, unit = block.columns[at]
         unit = str(mapping.units.get(key, unit))  # type: ignore[call-overload]
         raw = np.array([float(row[at]) for row in rows])
-        values[key] = to_si(raw, key, unit, column, name)
-    return values, len(block.cells) - len(rows)
+        factors[key] = factor_to_si(key, unit, column, name)
+        values[key] = raw * factors[key]
+    return values, factors, len(block.cells) - len(rows)
 
 
 def _run(values: dict[str, np.ndarray], mapping: Mapping) -> dict[str, np.ndarray]:
@@ -218,10 +219,10 @@ def _sweep(path: Path, mapping: Mapping, said: list[str], seen: dict[str, set[st
     for _, block in _blocks(path, mapping.model_copy(update={"blocks": None})):
         found = guess_columns(block, given, sweep=True)
         if set(_SWEEP) <= set(found):
-            values, dropped = _values(block, found, mapping, path.name)
+            values, factors, dropped = _values(block, found, mapping, path.name)
             _note_names(seen, block, found)
             table = {QUANTITIES[key].column: values[key] for key in _SWEEP}
-            said.append(_summary(SWEEP_FILE, path.name, block, found, table, dropped))
+            said.append(_summary(SWEEP_FILE, path.name, block, found, factors, table, dropped))
             return _csv(table)
     raise InputError(
         f"{path.name} holds no sweep: a block with angular frequency, storage and loss modulus is "
@@ -241,11 +242,18 @@ def _csv(table: dict[str, Float[np.ndarray, " _"]]) -> str:
 
 
 def _summary(
-    target: str, source: str, block: Block, found: dict[str, int], run: dict, dropped: int
+    target: str,
+    source: str,
+    block: Block,
+    found: dict[str, int],
+    factors: dict[str, float],
+    run: dict,
+    dropped: int,
 ) -> str:
     understood = ", ".join(
         f"{key} = {block.columns[at][0]}"
         + (f" [{block.columns[at][1]}]" if block.columns[at][1] else "")
+        + (f" × {factors[key]:.6g}" if factors[key] != 1.0 else "")
         for key, at in found.items()
     )
     samples = len(next(iter(run.values())))

@@ -5,10 +5,10 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from discover.dataset.toml_file import read_toml
-from discover.validation import validated
+from discover.validation import Section, validated
 
 MAPPING_FILE = "import.toml"
 
@@ -29,11 +29,7 @@ QuantityName = Literal[
 ]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Geometry(_Section):
+class Geometry(Section):
     """The tool, needed where the file holds torque, angle or force instead of stress and strain.
 
     Cone and plate: σ12 = 3M/(2πR³), γ = θ/β, N1 = 2F/(πR²). Plates: σ12 = 2M/(πR³), γ = θR/h at the
@@ -42,9 +38,10 @@ class Geometry(_Section):
     """
 
     type: Literal["cone_plate", "plate_plate"]
-    radius_mm: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
-    angle_deg: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = None
-    gap_mm: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    # tools are made from 2 mm to 50 mm, cones from 0.3°, gaps from some µm; the bounds are wider
+    radius_mm: Annotated[float, Field(ge=0.01, le=1000)]
+    angle_deg: Annotated[float, Field(ge=0.001, le=10)] | None = None
+    gap_mm: Annotated[float, Field(ge=1e-4, le=100)] | None = None
 
     @model_validator(mode="after")
     def _complete(self):
@@ -74,7 +71,7 @@ class Geometry(_Section):
         return 2.0 / (math.pi * (self.radius_mm * 1e-3) ** 2)
 
 
-class Layout(_Section):
+class Layout(Section):
     """How the text is laid out; whatever is left out is found from the file."""
 
     delimiter: Literal["tab", "semicolon", "comma"] | None = None
@@ -83,7 +80,7 @@ class Layout(_Section):
     encoding: str | None = None
 
 
-class Source(_Section):
+class Source(Section):
     """A file that was imported, with its hash."""
 
     file: str
@@ -91,14 +88,14 @@ class Source(_Section):
     sweep: bool = False
 
 
-class Mapping(_Section):
+class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated."""
 
-    columns: dict[QuantityName, str] = {}
-    units: dict[QuantityName, str] = {}
+    columns: dict[QuantityName, str] = Field(default_factory=dict)
+    units: dict[QuantityName, str] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
-    start_time_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    start_time_s: float = 0.0
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
 

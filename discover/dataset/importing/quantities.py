@@ -3,12 +3,10 @@
 import re
 from collections.abc import Mapping
 
-import numpy as np
-from jaxtyping import Float
-
 from discover.dataset import units
 from discover.dataset.importing.text_export import Block
 from discover.dataset.table import shown
+from discover.dataset.unit_text import read_unit
 from discover.dataset.units import Quantity
 from discover.errors import InputError
 
@@ -19,10 +17,10 @@ QUANTITIES: dict[str, Quantity] = {
     "strain": units.STRAIN,
     "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
     "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE,
-    "torque": Quantity("torque", "torque_N_m", "newton*meter"),
-    "angular_velocity": Quantity("angular_velocity", "angular_velocity_rad_s", "radian/second"),
-    "angle": Quantity("angle", "angle_rad", "radian"),
-    "normal_force": Quantity("normal_force", "normal_force_N", "newton"),
+    "torque": Quantity("torque", "torque_N_m", "N*m"),
+    "angular_velocity": Quantity("angular_velocity", "angular_velocity_rad_s", "rad/s"),
+    "angle": Quantity("angle", "angle_rad", "rad"),
+    "normal_force": Quantity("normal_force", "normal_force_N", "N"),
     "omega": units.ANGULAR_FREQUENCY,
     "Gp": units.STORAGE_MODULUS,
     "Gpp": units.LOSS_MODULUS,
@@ -94,15 +92,11 @@ def _plain(name: str) -> str:
     return re.sub(r"[\s_]+", " ", name).strip(" :").lower()
 
 
-def to_si(
-    values: Float[np.ndarray, " n"], key: str, unit: str, column: str, name: str
-) -> Float[np.ndarray, " n"]:
-    """Return values in SI units.
+def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
+    """Return the factor from a column's unit to SI.
 
     Parameters
     ----------
-    values
-        As in the file.
     key
         What they are, from `QUANTITIES`.
     unit
@@ -120,42 +114,23 @@ def to_si(
     if not unit:
         own = units.find_column([column], quantity)
         if own is not None:
-            return values * own[1]
+            return own[1]
         if not quantity.unit:
-            return values
+            return 1.0
         raise InputError(
             f"{name} gives no unit for {shown(column)}. Give it, as in --unit {key}="
             f"{quantity.column.removeprefix(quantity.stem + '_').replace('_', '/')}."
         )
-    registry = units._registry()
-    text = _pint_spelling(unit)
-    try:
-        if not re.fullmatch(r"[\w*/%.()µμΩ°^ -]{1,40}", text):
-            raise ValueError(unit)
-        parsed = registry.Quantity(1.0, registry.parse_units(text))
-    except Exception as error:  # pint raises many kinds for what is no unit
+    found = read_unit(unit)
+    if found is None:
         raise InputError(
             f"{name}: the unit {shown(unit)!r} of {shown(column)} is not known. Give it in "
             f"another way, as in --unit {key}={quantity.unit or '%'}."
-        ) from error
-    # pint counts a cycle and a radian alike as one
-    cycles = 2.0 * np.pi if key in ("omega", "angular_velocity") and "hertz" in str(parsed) else 1.0
-    try:
-        factor = parsed.to(quantity.unit).magnitude
-    except Exception as error:
+        )
+    factor = units.factor_to(found, quantity)
+    if factor is None:
         raise InputError(
             f"{name}: {shown(column)} is in {shown(unit)}, which is no unit of {key}. Name "
             f"another column for {key}, or correct the unit with --unit {key}=…."
-        ) from error
-    return values * (cycles * float(factor))
-
-
-def _pint_spelling(unit: str) -> str:
-    text = unit.strip()
-    if text in ("", "-", "1", "—"):
-        return "dimensionless"
-    for mark, plain in (("·", "*"), ("⋅", "*"), ("⁻¹", "**-1"), ("²", "**2"), ("³", "**3"),
-                        ("%", "percent"), ("°C", "degC"), ("°", "degree"), ("μ", "µ")):  # fmt: skip
-        text = text.replace(mark, plain)
-    text = re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", "*", text)  # N.m
-    return re.sub(r"(?<=[A-Za-z])(-?\d)", r"**\1", text)  # cm2, s-1
+        )
+    return factor

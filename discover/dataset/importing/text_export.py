@@ -8,6 +8,7 @@ than are used here and brings piblin, mastercurves, openpyxl and numdifftools al
 four lines; it does not read RheoCompass, and TRIOS' other text export neither.
 """
 
+import codecs
 import csv
 import io
 import re
@@ -121,13 +122,13 @@ def _decode(content: bytes, name: str, encoding: str | None) -> str:
             encoding = "utf-16-le"
         else:
             encoding = "utf-8-sig"
+    if not _is_encoding(encoding):
+        raise InputError(
+            f"There is no encoding {encoding[:60]!r} of text; try utf-8, utf-16 or cp1252."
+        )
     try:
         text = content.decode(encoding)
-    except LookupError:
-        raise InputError(
-            f"There is no encoding {encoding!r}; try utf-8, utf-16 or cp1252."
-        ) from None
-    except UnicodeDecodeError:
+    except UnicodeError:
         # instruments on Windows write µ, ° and · so; every byte has a meaning in latin-1
         text = content.decode("cp1252", "replace") if encoding == "utf-8-sig" else None
     if text is None:
@@ -135,6 +136,19 @@ def _decode(content: bytes, name: str, encoding: str | None) -> str:
     if "\0" in text:
         raise InputError(f"{name} is not text. Export it as text or CSV from the rheometer.")
     return text
+
+
+_NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape", "utf-7")
+"""Encodings of Python in which no instrument writes a file."""
+
+
+def _is_encoding(name: str) -> bool:
+    try:
+        known = codecs.lookup(name).name
+        "0".encode(name)  # some are no encodings of text
+    except (LookupError, ValueError):
+        return False
+    return known.replace("-", "_") not in {other.replace("-", "_") for other in _NO_TEXT}
 
 
 def _delimiter(lines: list[str]) -> str:

@@ -27,8 +27,25 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
 EFFECT = ConvectiveConstraintRelease(
     name="convective_constraint_release",
     parameters=(
-        EffectParameter("c", "c", low=0.0, high=1.0, first_trial=0.01),
-        EffectParameter("beta", r"\beta", low=0.0, high=1.0, first_trial=0.5),
+        EffectParameter(
+            "c",
+            "c",
+            low=0.0,
+            high=1.0,
+            first_trial=0.01,
+            range_source="1/3 is the law of Likhtman & Graham without stretch, in which the flow "
+            "leaves the length of the chains as it is; three times that is no such flow any more",
+        ),
+        EffectParameter(
+            "beta",
+            r"\beta",
+            low=0.0,
+            high=1.0,
+            first_trial=0.5,
+            range_source="Likhtman & Graham 2003: the share of released constraints that counts, "
+            "from none to all",
+            ends=("low", "high"),
+        ),
     ),
     equation=(
         r"h \mathrel{+}= c\,\mathrm{tr}(\sigma\cdot\dot\gamma)"

@@ -41,7 +41,17 @@ def shares_of_fene_p(inverse: float) -> tuple[TermShare, ...]:
 
 EFFECT = FiniteExtensibility(
     name="finite_extensibility",
-    parameters=(EffectParameter("q", "q", low=0.0, high=0.3, first_trial=0.005),),
+    parameters=(
+        EffectParameter(
+            "q",
+            "q",
+            low=0.0,
+            high=0.3,
+            first_trial=0.005,
+            range_source="Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already, so that "
+            "q is below 1/3",
+        ),
+    ),
     equation=(
         r"h \mathrel{+}= q\,\mathrm{tr}(\sigma)\,\sigma - \frac{q}{1 - 3q}"
         r"\left[\mathrm{tr}(\sigma\cdot\dot\gamma) - (1 + q\,\mathrm{tr}\,\sigma)\,"

@@ -19,7 +19,16 @@ class GiesekusMobility(ConstitutiveEffect):
 
 EFFECT = GiesekusMobility(
     name="giesekus_mobility",
-    parameters=(EffectParameter("alpha", r"\alpha", low=0.0, high=1.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "alpha",
+            r"\alpha",
+            low=0.0,
+            high=1.0,
+            first_trial=0.01,
+            range_source="Giesekus 1982: a mobility that no stress can make negative",
+        ),
+    ),
     equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
     source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
     check="A second normal stress difference N2/N1 near −α/2 at low rates.",

@@ -18,7 +18,17 @@ class NonAffineMotion(ConstitutiveEffect):
 
 EFFECT = NonAffineMotion(
     name="non_affine_motion",
-    parameters=(EffectParameter("xi", r"\xi", low=0.0, high=2.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "xi",
+            r"\xi",
+            low=0.0,
+            high=2.0,
+            first_trial=0.01,
+            range_source="Johnson & Segalman 1977: from the upper (0) to the lower (2) convected "
+            "derivative",
+        ),
+    ),
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",
     source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
     check="N2/N1 near −ξ/2 at all rates, and a stress that oscillates in fast start-up.",

@@ -22,7 +22,17 @@ class ExponentialNetworkLoss(ConstitutiveEffect):
 
 EFFECT = ExponentialNetworkLoss(
     name="ptt_exponential",
-    parameters=(EffectParameter("epsilon", r"\varepsilon", low=0.0, high=10.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "epsilon",
+            r"\varepsilon",
+            low=0.0,
+            high=10.0,
+            first_trial=0.01,
+            range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at "
+            "2 Gλ/ε, which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
+        ),
+    ),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
     check="An extensional viscosity with a maximum; no second normal stress difference.",

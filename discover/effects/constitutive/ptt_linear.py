@@ -19,7 +19,17 @@ class LinearNetworkLoss(ConstitutiveEffect):
 
 EFFECT = LinearNetworkLoss(
     name="ptt_linear",
-    parameters=(EffectParameter("epsilon", r"\varepsilon", low=0.0, high=10.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "epsilon",
+            r"\varepsilon",
+            low=0.0,
+            high=10.0,
+            first_trial=0.01,
+            range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at "
+            "2 Gλ/ε, which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
+        ),
+    ),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
     check="No second normal stress difference; a bounded extensional viscosity.",

@@ -14,8 +14,29 @@ class RelaxationMode(ModeEffect):
 EFFECT = RelaxationMode(
     name="relaxation_mode",
     parameters=(
-        EffectParameter("G", "G_+", "Pa", low=0.0, scale="stress", first_trial=0.05),
-        EffectParameter("lambda", r"\lambda_+", "s", low=1e-9, scale="run_time", first_trial=0.1),
+        EffectParameter(
+            "G",
+            "G_+",
+            "Pa",
+            low=0.0,
+            high=1e10,
+            scale="stress",
+            first_trial=0.05,
+            range_source="Ferry 1980, ch. 2: glasses have 1e9 Pa, and nothing that flows has more",
+        ),
+        EffectParameter(
+            "lambda",
+            r"\lambda_+",
+            "s",
+            low=1e-6,
+            high=30.0,
+            scale="run_time",
+            first_trial=0.1,
+            range_source="a mode that is a millionth of a run long cannot be told from a solvent, "
+            "one that is 30 runs long not from a spring (Davies & Anderssen 1997, J. Non-Newtonian "
+            "Fluid Mech. 73, 163: records determine times little beyond their own window)",
+            range_scale="run_time",
+        ),
     ),
     equation=(
         r"\sigma \mathrel{+}= G_+\,\sigma_+,\quad \lambda_+\overset{\nabla}{\sigma}_+ + \sigma_+"

@@ -14,7 +14,18 @@ class SolventViscosity(ConstitutiveEffect):
 EFFECT = SolventViscosity(
     name="solvent_viscosity",
     parameters=(
-        EffectParameter("eta_s", r"\eta_s", "Pa s", low=0.0, scale="viscosity", first_trial=0.01),
+        EffectParameter(
+            "eta_s",
+            r"\eta_s",
+            "Pa s",
+            low=0.0,
+            high=10.0,
+            scale="viscosity",
+            first_trial=0.01,
+            range_source="a part of the stress cannot exceed the whole in the fastest flow; ten "
+            "times leaves room for runs that differ",
+            range_scale="viscosity",
+        ),
     ),
     equation=r"\sigma \mathrel{+}= \eta_s\,\dot\gamma",
     source="Oldroyd 1950, Proc. R. Soc. A 200, 523",

@@ -28,9 +28,27 @@ class Thixotropy(StateEffect):
 EFFECT = Thixotropy(
     name="thixotropy",
     parameters=(
-        EffectParameter("breakdown", "k", low=0.0, first_trial=0.02),
         EffectParameter(
-            "build_up_time", r"t_\mathrm{b}", "s", low=1e-9, scale="run_time", first_trial=0.3
+            "breakdown",
+            "k",
+            low=0.0,
+            high=1e3,
+            first_trial=0.02,
+            range_source="a strain of 1/k breaks the structure: suspensions of attractive "
+            "particles, the most brittle, yield from 0.001 on (Bonn et al. 2017, Rev. Mod. Phys. "
+            "89, 035005)",
+        ),
+        EffectParameter(
+            "build_up_time",
+            r"t_\mathrm{b}",
+            "s",
+            low=1e-3,
+            high=1e6,
+            scale="run_time",
+            first_trial=0.3,
+            range_source="from the Brownian time 6πηa³/kT of particles of 0.1 µm in water, some "
+            "milliseconds, to structures that build up over weeks or never (Mewis & Wagner 2009)",
+            ends=("high",),
         ),
     ),
     equation=(

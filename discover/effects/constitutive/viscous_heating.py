@@ -26,9 +26,30 @@ class ViscousHeating(StateEffect):
 EFFECT = ViscousHeating(
     name="viscous_heating",
     parameters=(
-        EffectParameter("heating", "b", "1/Pa", low=0.0, scale="inverse_stress", first_trial=0.01),
         EffectParameter(
-            "heat_loss_time", r"t_\mathrm{h}", "s", low=1e-9, scale="run_time", first_trial=0.3
+            "heating",
+            "b",
+            "1/Pa",
+            low=0.0,
+            high=1e-6,
+            scale="inverse_stress",
+            first_trial=0.01,
+            range_source="−d ln a_T/dT is 0.01 to 0.1 1/K, and 0.8 at a glass transition (Ferry "
+            "1980, ch. 11: 2.303 · 17.44/51.6 K); the heat capacity per volume of liquids is 1 to "
+            "4 MJ/(m³ K)",
+        ),
+        EffectParameter(
+            "heat_loss_time",
+            r"t_\mathrm{h}",
+            "s",
+            low=1e-4,
+            high=1e5,
+            scale="run_time",
+            first_trial=0.3,
+            range_source="H²/(π² a) with the diffusivity of heat of liquids, a = 1e-7 m²/s, and a "
+            "gap H from 10 µm on; walls that insulate, and times shifted to another temperature, "
+            "make it longer without end (Winter 1977)",
+            ends=("high",),
         ),
     ),
     equation=(

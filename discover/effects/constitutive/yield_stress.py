@@ -25,7 +25,17 @@ class YieldStress(ConstitutiveEffect):
 
 EFFECT = YieldStress(
     name="yield_stress",
-    parameters=(EffectParameter("yield_strain", "Y", low=0.0, high=10.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "yield_strain",
+            "Y",
+            low=0.0,
+            high=10.0,
+            first_trial=0.01,
+            range_source="Bonn et al. 2017, Rev. Mod. Phys. 89, 035005: soft solids yield at "
+            "strains of 0.001 to 1, elastic gels at a few",
+        ),
+    ),
     equation=(
         r"h \mathrel{-}= \min\left(1, \frac{Y}{|\sigma_d|}\right)\sigma,"
         r"\quad \sigma_\mathrm{y} = Y\,G"

@@ -15,7 +15,17 @@ class RateRiseTime(KinematicEffect):
 EFFECT = RateRiseTime(
     name="rate_rise_time",
     parameters=(
-        EffectParameter("tau", r"\tau", "s", low=0.0, scale="sampling_time", first_trial=0.5),
+        EffectParameter(
+            "tau",
+            r"\tau",
+            "s",
+            low=0.0,
+            high=10.0,
+            scale="sampling_time",
+            first_trial=0.5,
+            range_source="motors answer in 0.01 to 0.1 s; a loop that holds the rate of a "
+            "stress-controlled instrument, badly tuned, needs seconds",
+        ),
     ),
     equation=(
         r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} ="

@@ -16,7 +16,18 @@ class WallSlip(SeriesElement):
 EFFECT = WallSlip(
     name="wall_slip",
     parameters=(
-        EffectParameter("slip", "s", "1/(Pa s)", low=0.0, scale="fluidity", first_trial=0.01),
+        EffectParameter(
+            "slip",
+            "s",
+            "1/(Pa s)",
+            low=0.0,
+            high=10.0,
+            scale="fluidity",
+            first_trial=0.01,
+            range_source="slip cannot exceed the deformation commanded, s σ = γ̇; ten times leaves "
+            "room for runs that differ",
+            range_scale="fluidity",
+        ),
     ),
     equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - s\,\sigma,\quad s = 2 b / H",
     source="Yoshimura & Prud'homme 1988, J. Rheol. 32, 53 (slip velocity b sigma, gap H)",

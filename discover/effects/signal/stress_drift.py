@@ -13,7 +13,20 @@ class StressDrift(SignalEffect):
 
 EFFECT = StressDrift(
     name="stress_drift",
-    parameters=(EffectParameter("drift", "d", "Pa/s", scale="stress_rate", first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "drift",
+            "d",
+            "Pa/s",
+            low=-2.0,
+            high=2.0,
+            scale="stress_rate",
+            first_trial=0.01,
+            range_source="at twice the stress over the length of a run, half of the record is the "
+            "drift of an instrument that measures nothing",
+            range_scale="stress_rate",
+        ),
+    ),
     equation=r"\sigma_\mathrm{rec} = \sigma + d\,t",
     source="Macosko 1994, Rheology, ch. 8: transducer drift",
     check="Record the stress of a sample at rest for as long as the longest run.",

@@ -13,7 +13,17 @@ class StressGain(SignalEffect):
 
 EFFECT = StressGain(
     name="stress_gain",
-    parameters=(EffectParameter("gain_error", "g", low=-0.9, high=10.0, first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "gain_error",
+            "g",
+            low=-0.8,
+            high=4.0,
+            first_trial=0.01,
+            range_source="a factor of five either way: the stress goes as 1/R³, and 25 mm entered "
+            "for plates of 40 mm make a factor of four (Macosko 1994, ch. 5)",
+        ),
+    ),
     equation=r"\sigma_\mathrm{rec} = (1 + g)\,\sigma",
     source="Macosko 1994, Rheology, ch. 8: calibration and sample radius",
     check="Calibrate the transducer with a dead weight; look at the filling of the gap.",

@@ -13,7 +13,20 @@ class StressOffset(SignalEffect):
 
 EFFECT = StressOffset(
     name="stress_offset",
-    parameters=(EffectParameter("offset", r"\sigma_0", "Pa", scale="stress", first_trial=0.01),),
+    parameters=(
+        EffectParameter(
+            "offset",
+            r"\sigma_0",
+            "Pa",
+            low=-1.0,
+            high=1.0,
+            scale="stress",
+            first_trial=0.01,
+            range_source="with more offset than stress in most records, what is recorded is the "
+            "zero of the transducer",
+            range_scale="stress",
+        ),
+    ),
     equation=r"\sigma_\mathrm{rec} = \sigma + \sigma_0",
     source="Macosko 1994, Rheology, ch. 8: transducer zero",
     check="Record the stress before the flow starts.",

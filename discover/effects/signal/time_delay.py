@@ -17,7 +17,17 @@ class TimeDelay(SignalEffect):
 EFFECT = TimeDelay(
     name="time_delay",
     parameters=(
-        EffectParameter("delay", r"\delta", "s", low=0.0, scale="sampling_time", first_trial=0.5),
+        EffectParameter(
+            "delay",
+            r"\delta",
+            "s",
+            low=0.0,
+            high=10.0,
+            scale="sampling_time",
+            first_trial=0.5,
+            range_source="channels read one after another differ by a millisecond, and programs "
+            "that average over a point by the seconds of that average",
+        ),
     ),
     equation=r"\sigma_\mathrm{rec}(t) = \sigma(t - \delta)",
     source="Macosko 1994, Rheology, ch. 8: data acquisition",

@@ -15,10 +15,21 @@ class TransducerLag(SignalEffect):
 EFFECT = TransducerLag(
     name="transducer_lag",
     parameters=(
-        EffectParameter("tau", r"\tau", "s", low=0.0, scale="sampling_time", first_trial=0.5),
+        EffectParameter(
+            "tau",
+            r"\tau",
+            "s",
+            low=0.0,
+            high=10.0,
+            scale="sampling_time",
+            first_trial=0.5,
+            range_source="transducers answer in 0.001 to 0.1 s, and filters behind them average "
+            "over seconds at most",
+        ),
     ),
     equation=r"\tau\,\frac{d\sigma_\mathrm{rec}}{dt} + \sigma_\mathrm{rec} = \sigma",
-    source="Mackay & Halley 1991, J. Rheol. 35, 1609: response of force transducers",
+    source="Doebelin 2004, Measurement Systems, ch. 3: instruments of first order; transducers of "
+    "rheometers: Macosko 1994, Rheology, ch. 8",
     check="Look up the filter of the transducer; strike it and record the response.",
     visible="tau of about 5 % of the time in which the stress changes, 0.05/omega in oscillation.",
 )

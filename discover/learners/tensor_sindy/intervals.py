@@ -12,6 +12,8 @@ from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.sensitivities import linearise
 from discover.statistics import NoiseModel, least_squares_covariance
 
+_FACTOR = 1.96  # an error of this many standard deviations is as rare as 5 %
+
 
 @dataclass(frozen=True)
 class ParameterUncertainty:
@@ -31,6 +33,8 @@ class ParameterUncertainty:
         Student's 95 % factor at the effective number of samples.
     noise
         The noise the residual shows.
+    floor
+        Relative misfit below which the integration itself is in doubt.
     """
 
     covariance: Float[np.ndarray, "p p"]
@@ -39,6 +43,15 @@ class ParameterUncertainty:
     numerical: Float[np.ndarray, " p"]
     factor: float
     noise: NoiseModel
+    floor: float = 0.0
+
+    @property
+    def total_covariance(self) -> Float[np.ndarray, "p p"]:
+        """Covariance of noise and of what integration cannot promise, as one more error.
+
+        The second has the shape of the fit: constants that exchange each other do so in it too.
+        """
+        return self.covariance + self.inverse * (self.floor / _FACTOR) ** 2
 
     @property
     def half_widths(self) -> Float[np.ndarray, " p"]:
@@ -86,14 +99,8 @@ def parameter_uncertainty(
     misfit_floor
         Relative misfit below which the integration itself is in doubt.
     """
-    n = len(problem.library)
-    residual, columns = linearise(problem, jnp.asarray(fit.dense(n)), jnp.asarray(fit.inner))
-    used = {problem.library.terms[i].closed_form for i in fit.support}
-    inner = tuple(i for i, form in enumerate(problem.library.forms) if form.name in used)
-    chosen = np.asarray(columns)[:, [*fit.support, *(n + i for i in inner)]]
-    covariance, inverse, noise = least_squares_covariance(
-        chosen, np.asarray(residual), _sequences(problem)
-    )
+    residual, chosen, inner = sensitivities_at(problem, fit)
+    covariance, inverse, noise = least_squares_covariance(chosen, residual, _sequences(problem))
     free = max(noise.effective_samples - chosen.shape[1], 1.0)
     return ParameterUncertainty(
         covariance=covariance,
@@ -103,7 +110,20 @@ def parameter_uncertainty(
         numerical=misfit_floor * np.sqrt(np.diag(inverse)),
         factor=float(student.ppf(0.975, free)),
         noise=noise,
+        floor=misfit_floor,
     )
+
+
+def sensitivities_at(
+    problem: TrajectoryProblem, fit: Fit
+) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows p"], tuple[int, ...]]:
+    """Return residual, sensitivities to a fit's parameters, and which inner ones those are."""
+    n = len(problem.library)
+    residual, columns = linearise(problem, jnp.asarray(fit.dense(n)), jnp.asarray(fit.inner))
+    used = {problem.library.terms[i].closed_form for i in fit.support}
+    inner = tuple(i for i, form in enumerate(problem.library.forms) if form.name in used)
+    chosen = np.asarray(columns)[:, [*fit.support, *(n + i for i in inner)]]
+    return np.asarray(residual), chosen, inner
 
 
 def _sequences(problem: TrajectoryProblem) -> list[np.ndarray]:

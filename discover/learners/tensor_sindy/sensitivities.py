@@ -24,6 +24,8 @@ from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from tensor_library.kinematics import rate_of_deformation
 
+_LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
+
 
 # Compiled as a part of the whole either way; as a unit of its own it is traced once and not once
 # for every stage of the integration.
@@ -115,6 +117,61 @@ def observe(
     run = partial(_solve_run, problem, active, coefficients, inner)
     observed = jax.vmap(run)(problem.protocols, problem.grids)
     return observed[..., 0], observed[..., 1:]
+
+
+@eqx.filter_jit
+def predict_many(
+    problem: TrajectoryProblem,
+    active: Int[Array, " q"],
+    coefficients: Float[Array, "laws q"],
+    inner: Float[Array, "laws m"],
+) -> Float[Array, "laws rows"]:
+    """Return the weighted predictions of many laws of the same terms, without sensitivities.
+
+    Parameters as in `observe`, with a leading axis of laws. Not finite where a law runs away.
+    """
+
+    def field(t, stress, args):
+        protocol, coefficients, inner = args
+        rate = problem.relaxation_time * protocol.shear_rate(t)
+
+        def mode(stress, rate):
+            terms = evaluate_active(
+                problem.library, active, stress, rate_of_deformation(rate), inner
+            )
+            known = problem.base.stress_rate(stress, rate)
+            return known - jnp.tensordot(coefficients, terms, axes=1)
+
+        return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
+
+    def seen(t, stress, args):
+        total = jnp.tensordot(problem.modulus, stress, axes=1)
+        shear = total[3] + problem.solvent_viscosity * args[0].shear_rate(t)
+        return jnp.stack([shear, total[0] - total[1], total[1] - total[2]])
+
+    def run(coefficients, inner, protocol, grid):
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(field),
+            ExponentialRungeKutta4((1.0 / problem.relaxation_time)[:, None]),
+            grid.times[0],
+            grid.times[-1],
+            None,
+            jnp.zeros((problem.modulus.shape[0], 4)),
+            args=(protocol, coefficients, inner),
+            saveat=diffrax.SaveAt(t0=True, steps=True, fn=seen),
+            stepsize_controller=diffrax.StepTo(grid.times),
+            adjoint=diffrax.ForwardMode(),
+            max_steps=grid.times.shape[0] - 1,
+            throw=False,
+        )
+        assert solution.ys is not None  # SaveAt asks for it
+        return solution.ys[grid.sample_index]
+
+    def law(numbers):
+        predicted = jax.vmap(partial(run, *numbers))(problem.protocols, problem.grids)
+        return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
+
+    return jax.lax.map(law, (coefficients, inner), batch_size=_LAWS_AT_ONCE)
 
 
 @eqx.filter_jit

@@ -184,6 +184,8 @@ def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> N
         # a small N2 would look large: always at least a hundredth of N1
         values.append(0.01 * np.max(np.abs(flow.reference["N1"])) * np.array([-1.0, 1.0]))
     joined = np.concatenate(values) if values else np.zeros(1)
+    joined = joined[np.isfinite(joined)]
+    joined = joined if joined.size else np.zeros(1)
     low, high = float(np.min(joined)), float(np.max(joined))
     margin = 0.15 * (high - low) or 1.0
     panel.set_ylim(low - margin, high + margin)

@@ -78,6 +78,8 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
             if prediction is not None and measured is not None:
                 size = float(np.sqrt(np.mean(measured**2))) or 1.0
                 values = (prediction["sigma12"] - measured) / size
+                if not np.all(np.isfinite(values)):
+                    continue
                 rows.append(ResidualRow(flow.title, flow.times, values))
         if rows:
             panels[title] = rows

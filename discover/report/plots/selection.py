@@ -46,15 +46,15 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
         left, middle = axes[0, 0], axes[0, 1]
         left.semilogy(
             sizes,
-            [100.0 * max(row["misfit"], 1e-9) for row in path],
+            [_percentage(row["misfit"]) for row in path],
             color=TRUTH,
             marker=".",
             label="runs fitted",
         )
-        if all(row["held_out"] is not None for row in path):
+        if any(row["held_out"] is not None for row in path):
             left.semilogy(
                 sizes,
-                [100.0 * max(row["held_out"], 1e-9) for row in path],
+                [_percentage(row["held_out"]) for row in path],
                 color=PURPLE,
                 marker=".",
                 linestyle="--",
@@ -62,8 +62,9 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             )
         left.set_ylabel("misfit of σ₁₂ (%)")
         make_percentage(left.yaxis)
-        bic = np.array([row["bic"] for row in path])
-        middle.plot(sizes, bic - bic.min(), color=BEFORE, marker=".")
+        bic = np.array([row["bic"] for row in path], dtype=float)
+        if np.any(np.isfinite(bic)):
+            middle.plot(sizes, bic - np.nanmin(bic), color=BEFORE, marker=".")
         middle.set_yscale("symlog", linthresh=10.0)
         middle.set_ylabel("BIC above the lowest")
         supports = [row["support"] for row in path]
@@ -73,7 +74,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
                 place = supports.index(chosen[rule])
                 left.plot(
                     sizes[place],
-                    100.0 * max(path[place]["misfit"], 1e-9),
+                    _percentage(path[place]["misfit"]),
                     marker=marker,
                     markersize=13 - 3 * offset,
                     fillstyle="none",
@@ -109,7 +110,12 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             drawing,
             "selection",
             "The best law of each size: its misfit, and its BIC above the lowest (linear below "
-            "10). Right: how often each term is chosen when half of the data are looked at; the "
-            "line marks what counts as stable. A pale bar beyond the full one: terms of identical "
-            "signature take each other's place.",
+            "10). A gap: a law that runs away in a run left out. Right: how often each term is "
+            "chosen when half of the data are looked at; the line marks what counts as stable. A "
+            "pale bar beyond the full one: terms of identical signature take each other's place.",
         )
+
+
+def _percentage(share: float | None) -> float:
+    """Return a share in per cent for a logarithmic axis; NaN, a gap, where there is none."""
+    return np.nan if share is None else 100.0 * max(share, 1e-9)

@@ -21,7 +21,7 @@ def loss_picture(comparison: Comparison) -> Picture:
     with figure(1, max(len(outcomes), 1), height=2.6) as (drawing, axes):
         for panel, (name, outcome) in zip(axes[0], outcomes.items(), strict=False):
             iterations, losses = outcome.loss_history
-            positive = np.maximum(losses, 1e-30)
+            positive = np.where(np.isfinite(losses), np.maximum(losses, 1e-30), np.nan)
             panel.semilogy(iterations, positive, color=LEARNER_STYLES[name]["color"])
             panel.set_title(LEARNER_TITLES[name])
             panel.set_xlabel(

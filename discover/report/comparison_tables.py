@@ -1,0 +1,263 @@
+"""The tables of a comparison's page, row by row, as the templates take them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.identifiability import EXACT, Rival
+from discover.comparison.outcome import LearnerOutcome
+from discover.equations.mathml import law_element, term_element, term_mathml
+from discover.laws.registry import LAWS
+from discover.learners.result import RecoveredTerm
+from discover.report.plots.flows import SYMBOLS
+from discover.report.plots.style import LEARNER_TITLES
+from discover.report.wording import (
+    RULES,
+    interval,
+    known,
+    selection_sentence,
+    significant,
+    spoken,
+)
+
+_COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
+
+
+def selection(comparison: Comparison) -> dict[str, Any] | None:
+    """Return the sparse learner's path, or None where there is none.
+
+    A misfit or a criterion is None where a law runs away in a run left out.
+    """
+    sparse = comparison.outcomes.get("tensor_sindy")
+    path = [] if sparse is None else sparse.details.get("path") or []
+    if sparse is None or not path:
+        return None
+    chosen = (sparse.details.get("selectors") or {}).get("chosen") or {}
+    lowest = min((row["bic"] for row in path if known(row["bic"])), default=0.0)
+    rows = [
+        {
+            "size": row["size"],
+            "math": " + ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
+            "misfit": row["misfit"],
+            "held_out": row["held_out"],
+            "range": list(_by_run(row).values()),
+            "bic": row["bic"] - lowest if known(row["bic"]) else None,
+            "rules": ", ".join(
+                RULES.get(rule, rule)
+                for rule, support in chosen.items()
+                if support == row["support"]
+            ),
+        }
+        for row in path
+    ]
+    spelled = titles(comparison)
+    runs = [
+        {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
+        for name in _by_run(path[0])
+    ]
+    return {"rows": rows, "runs": runs, "sentence": selection_sentence(sparse)}
+
+
+def _by_run(row: Mapping[str, Any]) -> Mapping[str, float | None]:
+    return row.get("held_out_by_run") or {}
+
+
+def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the errors in flows that no fit saw, with half of the band where there is one."""
+    rows = []
+    for flow in comparison.judged:
+        band = comparison.next_measurement.bands.get(flow.key)
+        widths = {} if band is None else band.widths(with_rivals=False)
+        cells = []
+        for who in ("before", *comparison.outcomes):
+            mine = widths if who == "tensor_sindy" else {}
+            cells += [
+                {"value": value, "half_width": None if value is None else _half(mine.get(name))}
+                for name, value in comparison.errors(who, flow).items()
+            ]
+        rows.append({"title": flow.title, "anchor": f"flow_{flow.name}", "cells": cells})
+    return rows
+
+
+def _half(width: float | None) -> float | None:
+    return None if width is None or not np.isfinite(width) else 0.5 * width
+
+
+def network_interval(comparison: Comparison) -> bool:
+    """Return whether the terms of the network have intervals; True without a network."""
+    network = comparison.outcomes.get("tbnn_ude")
+    return network is None or any(term.ci95 for term in network.terms)
+
+
+def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
+    """Return a law found, as mathematics, with how its fit ended."""
+    return {
+        "title": LEARNER_TITLES[outcome.learner],
+        "colour": _COLOURS[outcome.learner],
+        "math": law_element(outcome.terms, linear_relaxation),
+        "message": (outcome.message[:1].upper() + outcome.message[1:]).rstrip("."),
+        "seconds": outcome.train_seconds,
+    }
+
+
+def learner_columns(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the title of each learner, and whether its terms have intervals."""
+    return [
+        {"title": LEARNER_TITLES[name], "intervals": any(term.ci95 for term in outcome.terms)}
+        for name, outcome in comparison.outcomes.items()
+    ]
+
+
+def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the terms that were found, or should have been, learner by learner."""
+    truth = {t.term: t for t in comparison.truth or ()}
+    found: dict[str, dict[str, RecoveredTerm]] = {}
+    for name, outcome in comparison.outcomes.items():
+        for term in outcome.terms:
+            found.setdefault(term.term, {})[name] = term
+    rows = []
+    for name in dict.fromkeys([*truth, *found]):
+        cells, inner = [], []
+        if name in truth and truth[name].inner:
+            inner += [
+                f"truth: {spoken(key)} = {significant(value)}"
+                for key, value in truth[name].inner.items()
+            ]
+        for learner, outcome in comparison.outcomes.items():
+            term = found.get(name, {}).get(learner)
+            cells.append(
+                {
+                    "debiased": None if term is None else term.coefficient,
+                    "penalised": None if term is None else term.coefficient_penalised,
+                    "ci95": None if term is None else term.ci95,
+                    "intervals": any(t.ci95 for t in outcome.terms),
+                }
+            )
+            if term is not None:
+                inner += [
+                    f"{LEARNER_TITLES[learner]}: {spoken(key)} = {significant(value)}"
+                    + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
+                    for key, value in term.inner.items()
+                ]
+                inner += [
+                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {spoken(key)} = "
+                    f"{significant(value)} ({interval((low, high))})"
+                    for key, (value, low, high) in term.inner_at_one.items()
+                ]
+        true = truth.get(name)
+        rows.append(
+            {
+                "math": term_element(name),
+                "inner": ", ".join(inner),
+                "truth": (0.0 if true is None else true.coefficient),
+                "cells": cells,
+            }
+        )
+    return rows
+
+
+def coefficients(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the network's coefficients along the training runs."""
+    network = comparison.outcomes.get("tbnn_ude")
+    table = {} if network is None else network.details.get("coefficients", {})
+    return [
+        {"math": term_element(name), "mean": row["mean"], "spread": row["spread"]}
+        for name, row in table.items()
+    ]
+
+
+def proposals(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the experiments proposed, best first."""
+    following = comparison.next_measurement
+    return [
+        {
+            "title": proposal.experiment.title,
+            "observed": ", ".join(SYMBOLS[name] for name in proposal.observed),
+            "falling": f"{len(proposal.falling)} of {len(following.laws) - 1}",
+            "weakest": min(filter(known, proposal.evidence.values()), default=None),
+        }
+        for proposal in following.proposals
+    ]
+
+
+def rivals_text(comparison: Comparison) -> str:
+    """Return what the search says of the laws that the data do not rule out."""
+    sparse = comparison.outcomes.get("tensor_sindy")
+    text = "" if sparse is None else str(sparse.details.get("rivals_text", ""))
+    # the text is on laws that were fitted; a twin follows from mathematics and is never ruled out
+    exact = sum((r.errors_to_chosen["sigma12"] or 0.0) <= EXACT for r in comparison.rivals)
+    twins = "One law below gives" if exact == 1 else f"{exact} laws below give"
+    return f"{text} {twins} the same σ12 whatever the flow." if text and exact else text
+
+
+def titles(comparison: Comparison) -> dict[str, str]:
+    """Return the flows in the field's notation, by their names."""
+    return {flow.name: flow.title for flow in comparison.flows}
+
+
+def distillations(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return what simpler laws learn from the true one."""
+
+    def values(parameters: Mapping[str, float]) -> str:
+        return ", ".join(f"{spoken(k)} = {significant(v)}" for k, v in parameters.items())
+
+    return [
+        {
+            "teacher": LAWS[row["teacher"]].title,
+            "student": LAWS[row["student"]].title,
+            "penalised": values(row["penalised"]),
+            "debiased": values(row["debiased"]),
+            "misfit": row["misfit"],
+        }
+        for row in comparison.distillations
+    ]
+
+
+def structure(comparison: Comparison) -> dict[str, Any] | None:
+    """Return what the training flows could tell of the library; None where not looked at."""
+    if comparison.structure is None:
+        return None
+    relations = [spoken(relation.text) for relation in comparison.structure.relations]
+    return {"text": comparison.structure.text, "relations": relations}
+
+
+_MARKS = {True: "✓", False: "✗", None: "–"}
+
+
+def physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return one row for each check, with what every law says to it."""
+    reports = [report or {"checks": []} for report in comparison.physics.values()]
+    names = dict.fromkeys(check["name"] for report in reports for check in report["checks"])
+    rows = []
+    for name in names:
+        cells = []
+        for report in reports:
+            check = next((c for c in report["checks"] if c["name"] == name), None)
+            cells.append(
+                {"mark": _MARKS[None], "text": ""}
+                if check is None
+                else {"mark": _MARKS[check["passed"]], "text": check["text"]}
+            )
+        rows.append({"name": name, "cells": cells})
+    return rows
+
+
+def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
+    """Return a law that the data do not tell from the one found."""
+    sum_of_terms = "".join(
+        f"<mo>{'−' if value < 0 else '+'}</mo><mn>{abs(value):.3g}</mn>"
+        f"<mspace width='0.15em'/>{term_mathml(name, dict(rival.inner))}"
+        for name, value in rival.terms.items()
+    ).removeprefix("<mo>+</mo>")
+    place = rival.separated_by
+    return {
+        "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
+        "reason": rival.reason,
+        "errors": rival.errors_to_chosen,
+        "separated": f"{SYMBOLS[place['quantity']]} in "
+        f"{titles.get(place['protocol'], place['protocol'])}"
+        if place
+        else "nothing that was tried",
+    }

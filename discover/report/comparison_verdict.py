@@ -1,0 +1,189 @@
+"""The verdict on a comparison: what was found, how sure, what to measure next."""
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.next_measurement import NextMeasurement
+from discover.comparison.outcome import LearnerOutcome
+from discover.report.wording import (
+    LEARNERS,
+    SYMBOLS,
+    percent,
+    sentence,
+    significant,
+    spoken,
+    terms_text,
+    worst,
+)
+from discover.statistics import LackOfFit
+
+CORRELATED = 0.3
+"""A correlation of neighbours that is worth its number in a sentence."""
+
+
+def comparison_verdict(comparison: Comparison) -> list[str]:
+    """Return the verdict on a comparison: three sentences, in the order of `QUESTIONS`."""
+    return [_found(comparison), _how_sure(comparison), _next(comparison)]
+
+
+def _found(comparison: Comparison) -> str:
+    explanation = comparison.explanation
+    if explanation.verdict == "no_signal":
+        return (
+            "No signal: the records hold nothing that a law could be told from, so no law is "
+            "reported as found."
+        )
+    left = explanation.lack_of_fit
+    sparse = comparison.outcomes.get("tensor_sindy")
+    network = comparison.outcomes.get("tbnn_ude")
+    parts = []
+    if explanation.verdict == "explained":
+        names = " and ".join(_law_of(name) for name in explanation.by)
+        verb = "explains" if len(explanation.by) == 1 else "explain"
+        sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
+        rest = "is noise" if len(explanation.by) == 1 else "are noise"
+        parts.append(f"explained: {names} {verb} the data, and what is left ({sizes}) {rest}")
+    else:
+        several = "neither law explains" if len(left) > 1 else "the law does not explain"
+        parts.append(f"unexplained: {several} the data")
+    for name, one in left.items():
+        if one.verdict != "explained":
+            parts.append(f"{_law_of(name)} leaves {_left(one)}")
+    if sparse is not None and explanation.in_library:
+        parts.append(_terms_found(comparison, sparse))
+    elif sparse is not None:
+        parts.append(
+            f"its terms, {terms_text(sparse, intervals=False)}, describe the data and are no "
+            "finding"
+        )
+    if network is not None and network.terms and "tbnn_ude" in explanation.by:
+        largest = max(network.terms, key=lambda t: abs(t.coefficient))
+        parts.append(
+            f"put into words, the neural network's largest term is "
+            f"{significant(largest.coefficient)} {spoken(largest.term)}"
+        )
+    elif network is not None and "tbnn_ude" in explanation.by:
+        parts.append("put into words, the neural network found no term")
+    return sentence(parts)
+
+
+def _law_of(learner: str) -> str:
+    name = LEARNERS[learner]
+    return f"{name[:1].lower()}{name[1:]}'s law"
+
+
+def _left(one: LackOfFit) -> str:
+    """Return what a law leaves of the data, in words."""
+    if not np.isfinite(one.misfit):
+        return f"everything, for {one.reason}"
+    text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
+    if one.lag_one_correlation > CORRELATED:
+        text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
+    return text
+
+
+def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
+    text = f"if the law is in the library, it is {terms_text(sparse)}"
+    if comparison.truth is None:
+        return text
+    wanted = {t.term for t in comparison.truth}
+    found = {t.term for t in sparse.terms}
+    if found == wanted:
+        return f"{text}, exactly the terms of the law that made the data"
+    missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
+    extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
+    return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+
+
+def _how_sure(comparison: Comparison) -> str:
+    if comparison.verdict == "no_signal":
+        return "Nothing is determined by these data: neither a law nor N1 nor N2."
+    parts = []
+    judged = comparison.judged
+    for name in comparison.outcomes:
+        errors = {flow.name: comparison.errors(name, flow) for flow in judged}
+        said = [
+            f"{symbol} by {percent(value)}"
+            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            if (value := worst(errors, quantity.split()[0])) is not None
+        ]
+        if said:
+            flows = "flows" if len(judged) > 1 else "the flow"
+            missed = f"{LEARNERS[name].lower()} misses {', '.join(said)} at most"
+            parts.append(f"{missed} in {flows} that no fit saw")
+    if not parts:
+        parts.append("nothing was held out, so no prediction was put to the test")
+    parts += _determined(comparison)
+    for name, report in comparison.physics.items():
+        failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
+        if failed:
+            parts.append(
+                f"{LEARNERS[name].lower()}'s law fails {len(failed)} of the checks of physical "
+                f"soundness ({', '.join(failed)})"
+            )
+    return sentence(parts)
+
+
+def _determined(comparison: Comparison) -> list[str]:
+    """Return what is said of N1, N2 and the coefficients."""
+    parts = []
+    names = " and ".join(comparison.undetermined)
+    if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
+        parts.append(
+            f"since no law in the library explains the data, nothing is determined by them, "
+            f"neither {names.replace(' and ', ' nor ')} nor any coefficient"
+        )
+        return parts
+    if names:
+        parts.append(
+            f"not determined by these data: {names}, shown as the choice of the law that fits"
+        )
+    if decided := [s.quantity for s in comparison.statements if not s.undetermined]:
+        parts.append(
+            f"{' and '.join(decided)} follow{'s' if len(decided) == 1 else ''} from σ12 only if "
+            "the law is in the library"
+        )
+    return parts
+
+
+def _next(comparison: Comparison) -> str:
+    explanation = comparison.explanation
+    if explanation.verdict == "no_signal":
+        return (
+            "Measure where the stress stands out of the noise: at higher rates, with a more "
+            "sensitive transducer, or with a larger sample."
+        )
+    if "tensor_sindy" in comparison.outcomes and not explanation.in_library:
+        return (
+            "Before measuring more, find what the law lacks: discover close-loop tries effects of "
+            "the instrument and of the flow on the same runs, and [compare] library and max_terms "
+            "allow more terms."
+        )
+    following = comparison.next_measurement
+    if following.proposals:
+        return _proposal(following)
+    if comparison.undetermined:
+        names = " and ".join(comparison.undetermined)
+        return f"Measure {names}: nothing else decides between laws that give the same σ12."
+    rates = [float(np.max(np.abs(f.shear_rate))) for f in comparison.flows_of("training")]
+    unit = "" if comparison.noise is not None else " 1/s"
+    return (
+        "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
+        f"a shear rate above {significant(max(rates), 3)}{unit}."
+    )
+
+
+def _proposal(following: NextMeasurement) -> str:
+    best = following.proposals[0]
+    n_rivals = len(following.laws) - 1
+    laws = "the one rival law" if n_rivals == 1 else f"the {n_rivals} rival laws"
+    leave = f"{laws} that these data leave in the library"
+    if not best.falling:
+        return f"None of the experiments allowed is expected to rule out {leave}."
+    what = " and ".join(SYMBOLS[name] for name in best.observed)
+    fall = len(best.falling)
+    outcome = leave if fall == n_rivals else f"{fall} of {leave}"
+    return (
+        f"Measure {what} in {best.experiment.title}: at {percent(following.noise)} noise it is "
+        f"expected to rule out {outcome}."
+    )

@@ -1,0 +1,110 @@
+"""What stands after the underscore of a heading, and what `data check` says of it."""
+
+import math
+
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import check_folder, load_dataset
+from discover.dataset.unit_text import read_heading, read_unit
+from discover.errors import InputError
+
+# factor to SI, by hand: 1 dyn = 1e-5 N, 1 psi = 0.45359237 kg · 9.80665 m/s² / (0.0254 m)²
+HEADINGS = {
+    "kPa": 1e3, "mPa": 1e-3, "MPa": 1e6, "bar": 1e5, "mbar": 100.0, "dyn_cm2": 0.1, "N_mm2": 1e6,
+    "psi": 0.45359237 * 9.80665 / 0.0254**2, "lbf_in2": 0.45359237 * 9.80665 / 0.0254**2,
+    "pascal": 1.0, "kilopascals": 1e3, "1_min": 1 / 60, "ms": 1e-3, "us": 1e-6, "minutes": 60.0,
+    "percent": 0.01, "rad_s": 1.0, "Hz": 1.0,
+}  # fmt: skip
+WRITTEN = {
+    "kPa": 1e3, "1/s": 1.0, "s-1": 1.0, "s^-1": 1.0, "s**-1": 1.0, "s⁻¹": 1.0, "1/min": 1 / 60,
+    "N.m": 1.0, "mN·m": 1e-3, "µN m": 1e-6, "dyn/cm²": 0.1, "dyn/cm^2": 0.1, "N/(m.mm)": 1e3,
+    "%": 0.01, "rad/s": 1.0, "rpm": math.pi / 30, "deg": math.pi / 180, "°": math.pi / 180,
+    "-": 1.0, "": 1.0, "1": 1.0,
+}  # fmt: skip
+NO_UNITS = ("Pa_2", "10Pa", "2", "1", "1e3Pa", "s_2", "Pa_10", "Pa22", "Pa__2", "pi", "e", "Pas",
+            "mkPa", "Pa_", "__", "raw", "9**9")  # fmt: skip
+
+
+@pytest.mark.parametrize(("suffix", "factor"), HEADINGS.items())
+def test_units_in_headings_have_their_factors(suffix, factor):
+    unit = read_heading(suffix)
+    assert unit is not None
+    assert unit.factor == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(("text", "factor"), WRITTEN.items())
+def test_units_of_exports_have_their_factors(text, factor):
+    unit = read_unit(text)
+    assert unit is not None
+    assert unit.factor == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize("suffix", NO_UNITS)
+def test_a_heading_with_digits_other_than_exponents_has_no_unit(suffix):
+    assert read_heading(suffix) is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["9**9**9**9", "10Pa", "Pa*10", "s^9^9", "(" * 30, "((s))(", "Pa/", "/Pa", "Pa-s", "ms11"],
+)
+def test_a_unit_is_never_worked_out(text):
+    assert read_unit(text) is None
+
+
+def write(folder, table, sweep="omega_rad_s,Gp_Pa,Gpp_Pa\n0.1,1,5\n1,10,10\n10,15,5\n"):
+    (folder / "runs.csv").write_text("file\na.csv\n")
+    (folder / "a.csv").write_text(table)
+    (folder / "lve.csv").write_text(sweep)
+    return folder
+
+
+ROWS = "0.1,1,1\n0.2,1,2\n"
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["time_s,shear_rate_1_s,stress_Pa_2", "time_s,shear_rate_1_s,stress_10Pa",
+     "time_s_2,shear_rate_1_s,stress_Pa", "time_s,shear_rate_2_s,stress_Pa"],
+)  # fmt: skip
+def test_a_second_column_of_the_kind_is_not_taken_for_a_fraction(tmp_path, header):
+    with pytest.raises(InputError, match="ends in no unit that is known"):
+        load_dataset(write(tmp_path, f"{header}\n{ROWS}"))
+
+
+def test_a_second_column_beside_the_first_is_left_alone_and_said(tmp_path):
+    table = "time_s,shear_rate_1_s,stress_Pa,stress_Pa_2\n0.1,1,1,7\n0.2,1,2,7\n"
+    run = load_dataset(write(tmp_path, table)).runs[0]
+    assert run.shear_stress.tolist() == [1.0, 2.0]
+    assert "stress_Pa_2 in a.csv is not used" in " ".join(map(str, check_folder(tmp_path)))
+
+
+def test_a_normal_stress_that_is_not_read_for_its_heading_is_said(tmp_path):
+    table = "time_s,shear_rate_1_s,stress_Pa,N1_Pa_2\n0.1,1,1,7\n0.2,1,2,7\n"
+    said = [str(f) for f in check_folder(write(tmp_path, table)).of("warning")]
+    assert any("N1_Pa_2" in text and "no unit of N1" in text for text in said)
+
+
+def test_every_conversion_is_said(tmp_path):
+    sweep = "omega_Hz,Gp_kPa,Gpp_Pa\n0.1,1,5\n1,10,10\n10,15,5\n"
+    write(tmp_path, f"time_ms,shear_rate_1_min,stress_kPa\n{ROWS}", sweep)
+    said = " ".join(str(f) for f in check_folder(tmp_path) if f.subject == "units")
+    for words in ("time_ms is read as time, times 0.001 to s", "stress_kPa is read as stress, "
+                  "times 1000 to Pa", "shear_rate_1_min", "omega_Hz", "Gp_kPa"):  # fmt: skip
+        assert words in said
+    assert "Gpp" not in said
+
+
+def test_si_units_are_no_conversion(tmp_path):
+    write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}")
+    assert not [f for f in check_folder(tmp_path) if f.subject == "units"]
+
+
+def test_an_import_says_its_conversions(tmp_path):
+    (tmp_path / "x.csv").write_text("Time [s],Shear rate [1/s],Stress [kPa]\n" + ROWS)
+    arguments = ["data", "import", str(tmp_path / "x.csv"), "--out", str(tmp_path / "out")]
+    said = CliRunner().invoke(app, arguments).output
+    assert "stress = Stress [kPa] × 1000" in said
+    assert "Time [s] ×" not in said

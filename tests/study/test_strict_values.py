@@ -1,0 +1,73 @@
+"""Values of a study are of the kind that they are written as; nothing is turned into another."""
+
+import pytest
+
+from discover.errors import InputError
+from discover.study import parse_study, read_study
+
+
+def study(section, **values):
+    content = {"data": {"folder": "melt"}}
+    content[section] = {**content.get(section, {}), **values}
+    return parse_study(content)
+
+
+@pytest.mark.parametrize(
+    ("section", "values"),
+    [
+        ("model", {"modulus_Pa": True}),
+        ("model", {"modulus_Pa": "3"}),
+        ("model", {"parameters": {"alpha": True}}),
+        ("loop", {"max_effects": True}),
+        ("loop", {"max_effects": 2.0}),
+        ("loop", {"noise": True}),
+        ("loop", {"strain": [False, 1]}),
+        ("compare", {"quick": 1}),
+        ("compare", {"quick": "yes"}),
+        ("compare", {"seed": "7"}),
+    ],
+)
+def test_a_value_of_another_kind_is_refused_with_its_name(section, values):
+    (name,) = values
+    with pytest.raises(InputError, match=rf"{section}\.{name}.*should be.*; got"):
+        study(section, **values)
+
+
+def test_noise_of_synthetic_data_is_no_truth_value():
+    with pytest.raises(InputError, match="noise: should be a number; got true"):
+        parse_study({"data": {"synthetic": {"law": "giesekus", "noise": True}}})
+
+
+def test_whole_numbers_are_numbers_and_truth_values_are_truth_values():
+    model = study("model", modulus_Pa=3, parameters={"alpha": 0}).model
+    assert (model.modulus_Pa, model.parameters["alpha"]) == (3.0, 0.0)
+    assert study("compare", quick=True).compare.quick is True
+    assert study("loop", strain=[0, 25]).loop.strain == (0.0, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "remedy"),
+    [("data", "fit", "leave it out to fit all"), ("loop", "effects", "max_effects = 0")],
+)
+def test_an_empty_list_is_not_all_of_them(section, key, remedy):
+    with pytest.raises(InputError, match=remedy):
+        study(section, **{key: []})
+
+
+def test_no_run_held_out_may_be_written():
+    assert study("data", held_out=[]).data.held_out == ()
+
+
+@pytest.mark.parametrize("line", ["{} = 1", "[{}]", "x = {{ {} = 1 }}", '[data]\n"a".{} = 1'])
+def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path, line):
+    path = tmp_path / "deep.toml"
+    path.write_text(line.format(".".join(["a"] * 20_000)))
+    with pytest.raises(InputError, match="more than 16 parts"):
+        read_study(path)
+
+
+def test_dots_in_values_are_no_parts_of_a_key(tmp_path):
+    path = tmp_path / "good.toml"
+    name = ".".join(["run"] * 50) + ".csv"
+    path.write_text(f'[data]\nfolder = "."\nfit = ["{name}"]\n')
+    assert read_study(path).data.fit == (name,)
