@@ -6,12 +6,14 @@ from typing import Any
 
 import pandas as pd
 
+from discover.comparison.classical import ClassicalFit
 from discover.comparison.equations import outcome_equation
 from discover.comparison.explanation import Explanation
 from discover.comparison.flows import Flow, Stresses, relative_errors
 from discover.comparison.identifiability import Rival
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
+from discover.comparison.range import Placement, place
 from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.comparison.truth import TrueTerm
 from discover.equations import Equation, equation_to_json
@@ -85,6 +87,8 @@ class Comparison(NotebookView):
         The known part as an equation; None where it is not wanted.
     explanation
         Whether any law explains the training runs.
+    classical
+        The classical laws fitted to the same runs.
     warnings
         What a reader should know before believing anything else, one sentence each; shown in the
         verdict.
@@ -107,6 +111,7 @@ class Comparison(NotebookView):
     structure: Structure | None = None
     known: Equation | None = None
     explanation: Explanation = field(default_factory=Explanation)
+    classical: Sequence[ClassicalFit] = ()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -132,6 +137,10 @@ class Comparison(NotebookView):
     def undetermined(self) -> list[str]:
         """Quantities that the data do not decide."""
         return [s.quantity for s in self.statements if s.undetermined]
+
+    def placement(self, flow: Flow) -> Placement:
+        """Return whether a flow lies inside the range of those that were fitted."""
+        return place(flow, self.flows_of("training"))
 
     def errors(self, who: str, flow: Flow) -> dict[str, float | None]:
         """Return the errors of a learner, or of ``"before"``, in a flow."""
@@ -243,6 +252,8 @@ class Comparison(NotebookView):
                 {"term": t.term, "coefficient": t.coefficient, "inner": dict(t.inner)}
                 for t in self.truth
             ],
+            "classical": {fit.law: fit.to_json() for fit in self.classical},
+            "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,
             "warnings": list(self.warnings),

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
+from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.equations import known_equation
 from discover.comparison.explanation import Explanation, explain
@@ -117,6 +118,10 @@ def compare(
         following = next_measurement(
             chosen, rivals, model.fluid, judged, following_options, learner_seed
         )
+    classical = []
+    if explanation.verdict != "no_signal":
+        progress("the classical laws on the same runs", done / n_parts)
+        classical = fit_classical_laws(model, flows, study.model.known_relaxation)
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -137,6 +142,7 @@ def compare(
         seed=learner_seed,
         known=known_equation(model),
         explanation=explanation,
+        classical=classical,
     )
 
 

@@ -122,6 +122,15 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         titles = ["before", *(LEARNER_TITLES[name] for name in comparison.outcomes)]
         return {"columns": titles, "error_rows": tables.error_rows(comparison)}
 
+    def classical() -> Content | None:
+        rows = tables.law_rows(comparison) if comparison.classical else []
+        judged = [comparison.placement(flow).inside for flow in comparison.judged]
+        return (
+            {"law_rows": rows, "inside": True in judged, "beyond": False in judged}
+            if rows
+            else None
+        )
+
     def held_out_by_run() -> Content | None:
         found = tables.selection(comparison)
         return {"selection": found} if found and found["runs"] else None
@@ -156,6 +165,12 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
                     lambda: _unless_empty("coefficients", tables.coefficients(comparison)),
                 ),
             ],
+        ),
+        (
+            "classical",
+            "Against the classical laws",
+            "Classical laws",
+            [Part("The table of classical laws", "classical", classical)],
         ),
         (
             "selection-path",

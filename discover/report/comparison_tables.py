@@ -77,8 +77,73 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
                 {"value": value, "half_width": None if value is None else _half(mine.get(name))}
                 for name, value in comparison.errors(who, flow).items()
             ]
-        rows.append({"title": flow.title, "anchor": f"flow_{flow.name}", "cells": cells})
+        rows.append(
+            {
+                "title": flow.title,
+                "anchor": f"flow_{flow.name}",
+                "range": comparison.placement(flow).text,
+                "cells": cells,
+            }
+        )
     return rows
+
+
+def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return every law fitted to the runs, classical and learned: constants, misfit, errors.
+
+    Errors are means of σ12's over the flows that no fit saw, those inside the fitted range apart
+    from those beyond it.
+    """
+    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
+    rows = []
+    for fit in comparison.classical:
+        constants = ", ".join(
+            f"{spoken(name)} = {significant(value, 3)}" for name, value in fit.parameters.items()
+        )
+        rows.append(
+            {
+                "law": fit.title,
+                "constants": constants + (", the end of its range" if fit.at_bound else ""),
+                "number": len(fit.parameters),
+                "misfit": fit.misfit,
+                "criterion": fit.criterion,
+                **_mean_errors(fit.errors, placed),
+            }
+        )
+    for name, outcome in comparison.outcomes.items():
+        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
+        path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
+        left = comparison.explanation.lack_of_fit.get(name)
+        sparse = name == "tensor_sindy"
+        rows.append(
+            {
+                "law": LEARNER_TITLES[name],
+                "constants": "",
+                "number": sum(1 + len(t.inner) for t in outcome.terms) if sparse else None,
+                "misfit": None if left is None else left.misfit,
+                "criterion": path[chosen]["bic"] if path and chosen is not None else None,
+                **_mean_errors(errors, placed),
+            }
+        )
+    least = min((row["criterion"] for row in rows if row["criterion"] is not None), default=0.0)
+    for row in rows:
+        if row["criterion"] is not None:
+            row["criterion"] -= least
+    return rows
+
+
+def _mean_errors(
+    errors: Mapping[str, Mapping[str, float | None]], inside: Mapping[str, bool]
+) -> dict[str, float | None]:
+    """Return the mean error of σ12 inside the fitted range and beyond it."""
+    means: dict[str, float | None] = {}
+    for name, wanted in (("inside", True), ("beyond", False)):
+        flows = [flow for flow, is_inside in inside.items() if is_inside is wanted]
+        values = [errors[flow]["sigma12"] for flow in flows]
+        said = [value for value in values if value is not None]
+        # a law that cannot be integrated through one of the flows has no mean
+        means[name] = float(np.mean(said)) if said and len(said) == len(values) else None
+    return means
 
 
 def _half(width: float | None) -> float | None:
