@@ -1,15 +1,19 @@
 """What residuals say of noise, and noise of parameters."""
 
 from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.dead_records import holds_signal
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.noise_model import NoiseModel, noise_model
+from discover.statistics.outliers import isolated
 
 __all__ = [
     "FitVerdict",
     "LackOfFit",
     "NoiseModel",
+    "holds_signal",
     "independent_samples",
+    "isolated",
     "lack_of_fit",
     "least_squares_covariance",
     "noise_model",

@@ -1,27 +1,15 @@
 """What a residual is made of: noise, or structure."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.stats import chi2
 
 from discover.statistics.independent_samples import independent_samples
-
-LAGS = 12
-"""Neighbours up to which noise is tested for correlation."""
-
-FEWEST_TESTED = 2 * LAGS
-"""Samples of a run from which on that is done."""
+from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 
 FEWEST_FAST = 7
 """Samples of a run from which on its noise can be told by third differences."""
-
-SIGNIFICANCE = 1e-3
-"""Noise is taken for structure this often."""
-
-_LARGEST_CORRELATION = 0.9
 
 
 @dataclass(frozen=True)
@@ -93,7 +81,9 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
 
 
 def noise_floor(
-    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
+    residual: Float[np.ndarray, "runs n"],
+    weight: Float[np.ndarray, "runs n"],
+    measured: Float[np.ndarray, "runs n"] | None = None,
 ) -> float:
     """Return the relative noise, mean over runs.
 
@@ -105,8 +95,9 @@ def noise_floor(
     """
     rows = judging(weight)
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
+    measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    if not is_noise(residual, weight):
+    if not is_noise(residual, weight, measured):
         return float(np.mean(fast))
     sizes = np.sqrt(np.sum(residual**2, axis=1))
     samples = np.count_nonzero(weight > 0, axis=1)
@@ -133,56 +124,17 @@ def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
     return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST))
 
 
-def is_noise(residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]) -> bool:
+def is_noise(
+    residual: Float[np.ndarray, "runs n"],
+    weight: Float[np.ndarray, "runs n"],
+    measured: Float[np.ndarray, "runs n"] | None = None,
+) -> bool:
     """Return whether residuals may be noise, white or with a first-order correlation.
 
     Runs too short to be tested do not say that they are not; see `noise_probability`.
     """
-    probability = noise_probability(residual, weight)
+    probability = noise_probability(residual, weight, measured)
     return probability is None or probability > SIGNIFICANCE
-
-
-def noise_probability(
-    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
-) -> float | None:
-    """Return how probable residuals as structured as these are, if they are noise.
-
-    The noise may be white or have a first-order correlation. A portmanteau test   [Ljung & Box
-    1978, Biometrika 65, 297] of what an autoregression of first order leaves, once on the
-    correlations of all runs taken together, and once run by run, which finds patterns of their
-    own; and a test of the sum over runs sample by sample, which finds a pattern that all share,
-    since the noise of one run knows nothing of another's. The smallest probability counts three
-    times, for there are three tests. None if every run is too short.
-
-    Parameters
-    ----------
-    residual, weight
-        As in `summarise`.
-    """
-    rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
-    rows = [
-        row / np.sqrt(np.mean(row**2)) for row in rows if len(row) >= FEWEST_TESTED and np.any(row)
-    ]
-    if not rows:
-        return None
-    # noise of one instrument has one correlation
-    together = _correlations(rows, 1)[0][0]
-    rho = float(np.clip(together, 0.0, _LARGEST_CORRELATION))
-    first = np.sqrt(1.0 - rho**2)
-    white = [np.append(first * row[0], row[1:] - rho * row[:-1]) for row in rows]
-    white = [row / np.sqrt(np.mean(row**2)) for row in white]
-    shared, variance = _correlations(white, LAGS)
-    pooled = chi2.sf(float(np.sum(shared**2 / variance)), LAGS - 1)
-    own = 0.0
-    for row in white:
-        correlation, variance = _correlations([row], LAGS)
-        own += float(np.sum(correlation**2 / variance))
-    each = chi2.sf(own, LAGS * len(white) - 1)
-    length = min(len(row) for row in white)
-    common = np.sum([row[:length] for row in white], axis=0) / np.sqrt(len(white))
-    # one run shares its pattern with none
-    alike = chi2.sf(float(common @ common), length) if len(white) > 1 else 1.0
-    return float(min(1.0, 3.0 * min(pooled, each, alike)))
 
 
 STRUCTURE = 1.5
@@ -204,29 +156,46 @@ class Expectation:
     noise: float | None = None
     linear_error: float = 0.0
 
-    def floor(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+    def floor(
+        self,
+        residual: Float[np.ndarray, "runs n"],
+        weight: Float[np.ndarray, "runs n"],
+        measured: Float[np.ndarray, "runs n"] | None = None,
+    ) -> float:
         """Return the relative noise, known or estimated."""
-        return noise_floor(residual, weight) if self.noise is None else self.noise
+        return noise_floor(residual, weight, measured) if self.noise is None else self.noise
 
-    def size(self, residual: Float[np.ndarray, "runs n"], weight) -> float:
+    def size(
+        self,
+        residual: Float[np.ndarray, "runs n"],
+        weight: Float[np.ndarray, "runs n"],
+        measured: Float[np.ndarray, "runs n"] | None = None,
+    ) -> float:
         """Return the relative error that noise and linear error together explain."""
-        return float(np.hypot(self.floor(residual, weight), self.linear_error))
+        return float(np.hypot(self.floor(residual, weight, measured), self.linear_error))
 
-    def explains(self, residual: Float[np.ndarray, "runs n"], weight) -> bool:
-        """Return whether noise and the error of the linear data explain a residual."""
+    def explains(
+        self,
+        residual: Float[np.ndarray, "runs n"],
+        weight: Float[np.ndarray, "runs n"],
+        measured: Float[np.ndarray, "runs n"] | None = None,
+    ) -> bool:
+        """Return whether noise and the error of the linear data explain a residual.
+
+        It may not be larger than both together. Where it has a pattern that noise has not, the
+        pattern may not be larger than the error of the linear data, the only one that has any; or
+        the whole not larger than a noise that is given, of which only who gives it knows what is in
+        it.
+        """
         rows = judging(weight)
-        error = float(np.mean(np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))))
-        if error > STRUCTURE * self.size(residual, weight):
+        sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))
+        error = float(np.mean(sizes))
+        if error > STRUCTURE * self.size(residual, weight, measured):
             return False
-        # without an error of the linear data to allow for, what is left must look like noise
-        judged = self.noise is not None or self.linear_error > 0.0
-        return judged or is_noise(residual, weight)
-
-
-def _correlations(rows: Sequence[np.ndarray], lags: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return correlations at lags 1, 2, … over several rows, and their variance in white noise."""
-    total = sum(float(row @ row) for row in rows)
-    count = sum(len(row) for row in rows)
-    values = [sum(float(row[k:] @ row[:-k]) for row in rows) / total for k in range(1, lags + 1)]
-    pairs = np.array([sum(len(row) - k for row in rows) for k in range(1, lags + 1)])
-    return np.array(values), pairs / (count * (count + 2.0))
+        if is_noise(residual, weight, measured):
+            return True
+        if self.noise is not None:
+            return error <= float(np.hypot(self.noise, self.linear_error))
+        fast = summarise(np.asarray(residual)[rows], np.asarray(weight)[rows]).noise
+        pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
+        return pattern <= STRUCTURE * self.linear_error

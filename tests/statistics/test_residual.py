@@ -9,9 +9,9 @@ from discover.statistics.residual import (
     is_noise,
     judging,
     noise_floor,
-    noise_probability,
     tells_noise,
 )
+from discover.statistics.whiteness import noise_probability
 
 RUNS, SAMPLES = 6, 60
 WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))
@@ -57,7 +57,11 @@ def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
     left = noise() + smooth
     assert not Expectation().explains(left, WEIGHT)
     assert Expectation(linear_error=0.02).explains(left, WEIGHT)
-    assert Expectation(noise=0.015).explains(left, WEIGHT)
+    # an error of the linear data that is far smaller does not excuse it
+    assert not Expectation(linear_error=0.002).explains(left, WEIGHT)
+    # nor does a noise that is given, unless it is as large as the whole
+    assert Expectation(noise=0.02).explains(left, WEIGHT)
+    assert not Expectation(noise=0.015).explains(left, WEIGHT)
     assert not Expectation(noise=0.005).explains(left, WEIGHT)
 
 

@@ -1,0 +1,125 @@
+"""Samples of a record that stand alone: a knock, a spark, a lost bit."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import median_filter
+
+_WIDEST = 2  # samples side by side that may be off together
+_BESIDE = 3  # samples on either side by which they are judged
+_ABOVE_NOISE = 6.0
+"""Robust standard deviations of the noise. Three extrapolations must be missed by so much, to one
+side: of Gaussian noise one sample in more than ten thousand does."""
+_ABOVE_BENDS = 2.0
+"""Times the sharpest bend of what remains: a real peak, or step, leaves a record that is bent."""
+_NEIGHBOURHOOD = 31
+_PASSES = 5
+_SMOOTH = 5
+
+
+def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Return which samples of a record are outliers: off the record before and after them.
+
+    A sample, or two side by side, is an outlier if what the samples before it extrapolate to, what
+    those after it do, and what lies between both are all missed to the same side, by far more than
+    noise, which is told by third differences in the neighbourhood   [after Hampel 1974, J. Am.
+    Stat. Assoc. 69, 383, with lines for his median], and by more than the record without it bends.
+    So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. The
+    first and last three samples cannot be judged.
+
+    Parameters
+    ----------
+    record
+        Measured values of one run, in order.
+    """
+    left = np.arange(len(record))
+    for _ in range(_PASSES):
+        values = np.asarray(record, dtype=float)[left]
+        if len(values) < 2 * _BESIDE + _WIDEST:
+            break
+        found = np.zeros(len(values), dtype=bool)
+        for width in range(1, _WIDEST + 1):
+            found |= _apart(values, width)
+        if not np.any(found):
+            break
+        left = left[~found]
+    off = np.ones(len(record), dtype=bool)
+    off[left] = False
+    return off
+
+
+def stray(
+    residual: Float[np.ndarray, " n"], record: Float[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which samples are outliers of a fit.
+
+    Those of the record alone (`isolated`), and those that a model misses by far more than the
+    samples around, where the record too is off on its own: a step that a model takes a sample too
+    late is missed as much, but the record is level on one side of it.
+
+    Parameters
+    ----------
+    residual, record
+        Prediction minus measurement, and the measurement, of one run, in order.
+    """
+    off = isolated(record)
+    if len(record) < 2 * _BESIDE + _WIDEST:
+        return off
+    values = np.asarray(residual, dtype=float)
+    missed = values - median_filter(values, _SMOOTH, mode="nearest")
+    halfway = np.abs(np.convolve(values, [-0.5, 1.0, -0.5], "valid")) / np.sqrt(1.5)
+    size = min(_NEIGHBOURHOOD, len(halfway))
+    spread = np.pad(1.4826 * median_filter(halfway, size, mode="nearest"), 1, mode="edge")
+    start, excess, _ = _excess(np.asarray(record, dtype=float), 1)
+    alone = np.zeros(len(record))
+    alone[start] = excess
+    same = alone * -missed > 0.0
+    return off | (
+        same & (np.abs(missed) > _ABOVE_NOISE * spread) & (np.abs(alone) > 0.5 * np.abs(missed))
+    )
+
+
+def _apart(values: Float[np.ndarray, " n"], width: int) -> Bool[np.ndarray, " n"]:
+    """Return which groups of so many samples stand apart from those around them."""
+    start, excess, beside = _excess(values, width)
+    bends = np.max(np.abs(np.diff(beside, 2, axis=0)), axis=0)
+    noise = _local_noise(values)[start]
+    apart = np.abs(excess) > np.maximum(_ABOVE_NOISE * noise, _ABOVE_BENDS * bends)
+    # of neighbours the larger is taken first; the others are asked again without it
+    best = np.where(apart, np.abs(excess), -np.inf)
+    around = np.array([np.roll(best, k) for k in range(-_BESIDE, _BESIDE + 1)])
+    chosen = start[apart & (best >= np.max(around, axis=0))]
+    off = np.zeros(len(values), dtype=bool)
+    for i in range(width):
+        off[chosen + i] = True
+    return off
+
+
+def _excess(values: Float[np.ndarray, " n"], width: int):
+    """Return by how much groups are off what is beside them, to one side; 0 if to neither.
+
+    Returns
+    -------
+    The first sample of each group, its excess with a sign, and the samples beside it, in order.
+    """
+    start = np.arange(_BESIDE, len(values) - _BESIDE - width + 1)
+    before = np.array([values[start - k] for k in range(1, _BESIDE + 1)])
+    after = np.array([values[start + width - 1 + k] for k in range(1, _BESIDE + 1)])
+    missed = []
+    for i in range(width):
+        own, share = values[start + i], (i + 1.0) / (width + 1.0)
+        missed += [
+            own - before[0] - (i + 1.0) * (before[0] - before[1]),
+            own - after[0] - (width - i) * (after[0] - after[1]),
+            own - before[0] - share * (after[0] - before[0]),
+        ]
+    excess = np.maximum(np.min(missed, axis=0), 0.0) + np.minimum(np.max(missed, axis=0), 0.0)
+    return start, excess, np.concatenate([before[::-1], after])
+
+
+def _local_noise(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return the standard deviation of what changes from sample to sample, around each sample."""
+    fast = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
+    size = min(_NEIGHBOURHOOD, len(fast))
+    middle = np.clip(np.arange(len(values)) - 1 - size // 2, 0, len(fast) - size)
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(fast, size), axis=1)
+    return 1.4826 * medians[middle]
