@@ -33,11 +33,14 @@ class InUse(NamedTuple):
         That one tensor, by its position among those that occur in the library.
     others
         0 without other terms, i + 1 with the i-th alone, one past the last with several.
+    by_mode
+        1 where the terms of the law differ from mode to mode.
     """
 
     library: np.int32
     tensor: np.int32
     others: np.int32
+    by_mode: np.int32 = np.int32(0)
 
 
 class AddedTerms:

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.closed_loop.added_terms import AddedTerms
+from discover.closed_loop.added_terms import AddedTerms, InUse
 from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.integrator import Modes, Series, integrate
 from discover.closed_loop.run_batch import RunBatch
@@ -25,6 +25,7 @@ from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
+    ModeDependence,
     ModeEffect,
     Record,
     SeriesElement,
@@ -75,6 +76,7 @@ class _Program:
         self.size = position
         self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
         self.added = AddedTerms(self._constitutive, self.slices)
+        self._by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self._states = [e for e in effects if isinstance(e, StateEffect)]
         kinematic = [e for e in effects if isinstance(e, KinematicEffect)]
@@ -86,6 +88,14 @@ class _Program:
         self.predict = eqx.filter_jit(over_runs)
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
+
+    def in_use(self, theta: np.ndarray) -> InUse:
+        """Return the branches that a parameter vector takes."""
+        used = self.added.in_use(theta)
+        if self._by_mode is None:
+            return used
+        differ = theta[self.slices[self._by_mode.name].start] != 0.0
+        return used._replace(by_mode=np.int32(differ))
 
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
@@ -127,6 +137,25 @@ class _Program:
         )
         return LAWS[self.structure.law_name].build(*known.values())
 
+    def _terms_by_mode(self, law, added, theta, modes: Modes):
+        """Return the function by how much h of each mode differs from that of equal constants."""
+        by_mode = self._by_mode
+        assert by_mode is not None
+        factors = by_mode.factors(self._values(theta, by_mode), *modes)
+
+        def of_mode(stress, shear_rate):
+            zero = jnp.zeros_like(shear_rate)
+            return law.extra_term(stress, jnp.stack([zero, zero, zero, shear_rate]))
+
+        of_law = jax.vmap(of_mode, in_axes=(-1, 0), out_axes=-1)
+
+        def differing(stress, shear_rate):
+            # a mode that an effect adds stands after the declared ones, and is as they are in mean
+            declared = jnp.ones(len(shear_rate)).at[: len(factors)].set(factors)
+            return (declared - 1.0) * (of_law(stress, shear_rate) + added(stress, shear_rate))
+
+        return differing
+
     def _integrate(self, numbers, used, theta, times, rate):
         law = self._law(numbers, theta)
         # factors that are not fitted stay constants: no trial and no derivative passes through
@@ -138,13 +167,20 @@ class _Program:
         of_law = jax.vmap(law.stress_rate, in_axes=(-1, 0), out_axes=-1)
         added = self.added.rate(theta, used)
 
-        def modes_rate(stress, shear_rate):
-            return of_law(stress, shear_rate) - added(stress, shear_rate)
-
         extra = None
         if self._modes:
             pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
             extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
+
+        def modes_rate(stress, shear_rate):
+            same = of_law(stress, shear_rate) - added(stress, shear_rate)
+            if self._by_mode is None:
+                return same
+            differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))
+            return same - jax.lax.switch(
+                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, shear_rate
+            )
+
         series = None
         if self._series:
             pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
@@ -255,7 +291,7 @@ class AugmentedModel:
         program = self._program
 
         def one(theta: np.ndarray) -> np.ndarray:
-            used = program.added.in_use(theta)
+            used = program.in_use(theta)
             return np.asarray(program.predict(self._numbers, used, theta, batch))
 
         trials, out = list(thetas), []

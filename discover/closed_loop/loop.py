@@ -29,6 +29,7 @@ from discover.dataset import ShearDataset, ShearRun
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.effects import (
+    BY_MODE,
     AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
@@ -126,7 +127,9 @@ def run_loop(
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
     _require_samples(fitted_runs, declared)
-    model = AugmentedModel(declared, candidates, data_scales(fitted_runs))
+    # of one mode nothing can differ from another's
+    asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
+    model = AugmentedModel(declared, asked, data_scales(fitted_runs))
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 

@@ -30,11 +30,12 @@ from discover.closed_loop.least_squares import (
     left_out_errors,
 )
 from discover.closed_loop.leftover import Leftover
+from discover.closed_loop.mode_dependence import names_not_needed
 from discover.closed_loop.physical_range import at_an_end, undetermined
 from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
-from discover.effects import AbstractEffect
+from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.statistics.residual import summarise
 
@@ -126,7 +127,8 @@ class Search:
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""
-        return effect.name not in self.refused and self.admitted(effect)
+        known = effect.name in self.refused or isinstance(effect, ModeDependence)
+        return not known and self.admitted(effect)
 
     @property
     def prior(self) -> Prior:
@@ -215,6 +217,31 @@ class Search:
             self.rounds = 0
             say(f"no finding: {self.not_named[refused]}")
             self.keeper.save(self)
+        if look_ahead:
+            self._hold_against_modes(say)
+
+    def _hold_against_modes(self, say: Callable[[str], None]) -> None:
+        """Take out effects that constants that differ from mode to mode make needless.
+
+        Asked only where the names would explain the data: elsewhere nobody is to believe them.
+        """
+        names = [name for name in self.active if name not in self.settled]
+        if not names or not self.explained:
+            return
+        needless = names_not_needed(self.model, self.batch, self.fit, names, self.prior)
+        if not needless:
+            return
+        for name in needless:
+            self.refused.add(name)
+            self.not_named[name] = (
+                f"{name} fits, but is not needed where the constants of the law differ from one "
+                "relaxation mode to the next"
+            )
+        self.active = [name for name in self.active if name not in needless]
+        self.fit = self._fit(self.active, self.fit.theta)
+        self._fit_path()
+        self._leave_out()
+        say(f"not needed where constants differ from mode to mode: {', '.join(needless)}")
 
     def _refuse(self) -> str:
         """Take out one effect whose parameters are no finding, and return its name."""

@@ -12,14 +12,17 @@ from discover.effects.base import (
     StateEffect,
 )
 from discover.effects.library_term import LibraryTerm, library_effects, library_term
+from discover.effects.mode_dependence import BY_MODE, ModeDependence
 from discover.effects.registry import make_effect, named_effects
 
 __all__ = [
+    "BY_MODE",
     "AbstractEffect",
     "ConstitutiveEffect",
     "EffectParameter",
     "KinematicEffect",
     "LibraryTerm",
+    "ModeDependence",
     "ModeEffect",
     "Record",
     "SeriesElement",

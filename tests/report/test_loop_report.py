@@ -16,6 +16,7 @@ from discover.closed_loop.result import (
     Stage,
     StageParameter,
 )
+from discover.effects import make_effect
 from discover.report.loop_report import _noise_range, write_loop
 from discover.report.plots.cycles import in_last_cycle
 from discover.report.plots.loop_lissajous import lissajous_picture
@@ -241,6 +242,25 @@ def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path):
     assert row is not None
     assert 'class="formula"' in row[0]
     assert '<tr><td>gain</td><td class="text">–</td>' in page  # named as nobody names it
+
+
+def test_no_latex_shows_in_the_page_of_a_yield_stress(tmp_path):
+    effect = make_effect("yield_stress")
+    result = loop_result()
+    stage = replace(
+        result.stages[0],
+        effect=effect.name,
+        equation=effect.equation,
+        parameters={"yield_strain": StageParameter(0.1, (0.09, 0.11), "")},
+    )
+    records = tuple(replace(record, name=f"{i}.csv") for i, record in enumerate(result.records))
+    result = replace(result, stages=(stage,), records=records)
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d", "").read_text("utf-8")
+    # pictures keep what matplotlib drew in comments
+    hidden = r"<(script|style)\b.*?</\1>|<!--.*?-->"
+    body = re.sub(hidden, "", page[page.index("<body") :], flags=re.S)
+    assert 'class="formula"' in body
+    assert "\\" not in body
 
 
 def test_the_last_cycle_is_one_period_long():

@@ -15,6 +15,7 @@ import pytest
 from discover.comparison import compare
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
+from discover.effects import library_effects, named_effects
 from discover.equations.mathml import law_element, term_element
 from discover.identify.bands import PredictionBand
 from discover.laws import Fluid, make_law
@@ -22,7 +23,7 @@ from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import safe_name, write_comparison
 from discover.report.comparison_tables import error_rows
 from discover.report.comparison_verdict import comparison_verdict
-from discover.report.mathtext import formula
+from discover.report.mathtext import formula, plain
 from discover.report.palette import style_sheet
 from discover.report.plots.flows import curves, flow_picture, training_picture
 from discover.report.plots.pipkin import (
@@ -332,7 +333,26 @@ def test_file_names_stay_in_the_folder():
 
 def test_a_formula_that_cannot_be_set_is_shown_as_text():
     assert formula(r"\alpha\,\sigma", "a").startswith("<svg")
-    assert formula(r"\nonsense{<b>}", "b") == r"<code>\nonsense{&lt;b&gt;}</code>"
+    assert formula(r"\nonsense{<b>}", "b") == "<code>nonsense&lt;b&gt;</code>"
+
+
+@pytest.mark.parametrize(
+    "effect", [*named_effects().values(), *library_effects()[:3]], ids=lambda e: e.name
+)
+def test_every_effect_is_set_as_a_formula_and_no_latex_is_left_of_it(effect):
+    for latex in (effect.equation, *(parameter.symbol for parameter in effect.parameters)):
+        drawn = formula(latex, "a")
+        assert drawn.startswith("<svg")
+        assert "\\" not in drawn
+        assert not set(plain(latex)) & set("\\{}$")
+
+
+def test_a_formula_is_read_aloud_as_it_is_written():
+    assert plain(r"\sigma \mathrel{+}= \frac{Y}{t_\mathrm{b}}\,\dot\gamma") == "σ += Y/(t_b) γ̇"
+    assert (
+        plain(r"h - (e^{\varepsilon\,\mathrm{tr}\,\boldsymbol{\sigma}} - 1)")
+        == "h - (e^(ε tr σ) - 1)"
+    )
 
 
 def test_a_comparison_shows_itself_as_tables(comparison):
