@@ -11,6 +11,7 @@ from discover.dataset import units
 from discover.dataset.check_among import doubts_among_runs
 from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
 from discover.dataset.check_run import doubts_of_run
+from discover.dataset.check_start import doubts_of_start
 from discover.dataset.finding import Finding, Findings
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
@@ -85,6 +86,8 @@ def check_folder(
     for text, files in converted.items():
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
+    for run in runs:
+        findings += doubts_of_start(run, sweep, spectrum)
     findings += against_linear_theory(runs, sweep, spectrum)
     findings += doubts_among_runs(runs)
     findings += _folder(root, index, runs)

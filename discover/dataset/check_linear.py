@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.dataset.check_run import stress_noise
 from discover.dataset.finding import Finding
@@ -15,6 +16,13 @@ from discover.dataset.sweep_inertia import sweep_inertia
 _LINEAR_STRAIN = 0.2
 # What gap, loading and temperature leave open between two instruments' stresses
 _STRESS_TOLERANCE = 0.15
+# What they leave open where nothing is wrong with either: 1 % of the radius of the filling is 3 %
+# of the torque, 1 K some 3 % of a melt's viscosity, 10 µm some 1 % of a gap
+_SHARED_TOLERANCE = 0.07
+# Of a gain: samples of a run, change of the ratio within it, and runs
+_FEWEST_RATIOS = 5
+_STEADY_RATIO = 0.05
+_FEWEST_GAINS = 3
 # Below a Weissenberg number of one the Cox–Merz rule holds to some ten per cent for simple fluids;
 # above it laws differ, and it is theirs to say
 _COX_MERZ_FACTOR = 1.3
@@ -114,6 +122,7 @@ def against_linear_theory(
             f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
             "learned. Add faster runs.",
         )
+    yield from _shared_gain(start_ups, sweep, spectrum)
     for run in start_ups:
         yield from _duration(run, mean_time)
         yield from _small_strain(run, sweep, spectrum)
@@ -139,19 +148,62 @@ def _duration(run: ShearRun, mean_time: float) -> Iterator[Finding]:
         )
 
 
-def _small_strain(
+def _linear_ratios(
     run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
-) -> Iterator[Finding]:
-    """Hold the first stresses against σ(t) = γ̇ Σ G_k λ_k (1 − exp(−t/λ_k))."""
+) -> Float[np.ndarray, " n"]:
+    """Return the first stresses over σ(t) = γ̇ Σ G_k λ_k (1 − exp(−t/λ_k)), in their order."""
     rate = run.shear_rate[0]
     times = run.time[:, None] / spectrum.relaxation_time
     linear = rate * (-np.expm1(-times) @ (spectrum.modulus * spectrum.relaxation_time))
     use = (abs(rate) * run.time < _LINEAR_STRAIN) & (np.abs(linear) > 5 * stress_noise(run))
     # times shorter than those of the sweep are extrapolation
     use &= run.time > 1.0 / np.max(sweep.angular_frequency)
-    if np.sum(use) < 5:
+    return run.shear_stress[use] / linear[use]
+
+
+def _shared_gain(
+    start_ups: Sequence[ShearRun], sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> Iterator[Finding]:
+    """Yield by which factor all start-ups differ from the sweep, if it is one for all.
+
+    A run counts if its ratio to linear theory does not rise or fall while it is linear, as it does
+    after a slow start.
+    """
+    gains = []
+    for run in start_ups:
+        ratios = _linear_ratios(run, sweep, spectrum)
+        if len(ratios) < _FEWEST_RATIOS or np.any(ratios <= 0):
+            continue
+        half = len(ratios) // 2
+        if abs(np.log(np.median(ratios[half:]) / np.median(ratios[:half]))) < _STEADY_RATIO:
+            gains.append(float(np.log(np.median(ratios))))
+    if len(gains) < _FEWEST_GAINS:
         return
-    ratio = float(np.median(run.shear_stress[use] / linear[use]))
+    shared = float(np.median(gains))
+    scatter = 1.4826 * float(np.median(np.abs(np.array(gains) - shared)))
+    doubt = 3.0 * max(
+        scatter / np.sqrt(len(gains)), spectrum.best_error / np.sqrt(len(sweep.angular_frequency))
+    )
+    if abs(shared) < max(np.log1p(_SHARED_TOLERANCE), doubt) or min(gains) < 0 < max(gains):
+        return
+    yield Finding(
+        "warning",
+        "gain",
+        "",
+        f"In all {len(gains)} start-ups that tell it, the stress at small strain is "
+        f"{np.exp(shared):.3g} times what {SWEEP_FILE} foretells: a gain that the runs share, such "
+        "as another gap, radius, temperature or filling than in the sweep. Correct it, or let the "
+        'study fit it: [model] modes = "lve" with modulus_Pa = "fit".',
+    )
+
+
+def _small_strain(
+    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> Iterator[Finding]:
+    ratios = _linear_ratios(run, sweep, spectrum)
+    if len(ratios) < _FEWEST_RATIOS:
+        return
+    ratio = float(np.median(ratios))
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
         yield Finding(
             "warning",

@@ -12,7 +12,7 @@ from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.kind_of_test import reason_to_set_aside, stress_was_imposed
 from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 from discover.dataset.sequence import in_sequence
-from discover.dataset.table import Table, read_bytes, read_table
+from discover.dataset.table import Table, read_bytes, read_table, shown
 from discover.dataset.thinning import MOST_SAMPLES, thin, thin_sweep
 from discover.errors import InputError
 from discover.protocols.shear import ShearProtocol, measured_rate, start_up
@@ -409,13 +409,17 @@ def read_sweep(path: Path) -> LinearSweep:
     frequency = table.required(units.ANGULAR_FREQUENCY)
     storage = table.required(units.STORAGE_MODULUS)
     loss = table.required(units.LOSS_MODULUS)
-    for label, values in (("omega", frequency), ("G'", storage), ("G''", loss)):
-        if np.any(values <= 0):
+    for quantity, values in (
+        (units.ANGULAR_FREQUENCY, frequency),
+        (units.STORAGE_MODULUS, storage),
+        (units.LOSS_MODULUS, loss),
+    ):
+        found = units.find_column(tuple(table.columns), quantity)
+        if found is not None and np.any(values <= 0):
             row = int(np.argmax(values <= 0))
             raise InputError(
-                f"{label} in {table.name} must be positive; line {table.lines[row]} holds "
-                f"{values[row]:g}. "
-                "Remove that line."
+                f"{found[0]} in {table.name} must be positive; line {table.lines[row]} holds "
+                f"{shown(table.columns[found[0]][row])}. Remove that line."
             )
     order = np.argsort(frequency, kind="stable")
     keep, note = thin_sweep(frequency[order])

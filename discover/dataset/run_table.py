@@ -25,7 +25,7 @@ def run_line(run: ShearRun) -> dict[str, Any]:
         The run.
     """
     flow = _flow(run)
-    wave = _oscillation(run) if flow == _VARYING else None
+    wave = oscillation(run) if flow == _VARYING else None
     normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
     return {
         "run": run.name,
@@ -55,8 +55,8 @@ def _flow(run: ShearRun) -> str:
     return "step of rate" if run.rate_before else "start-up"
 
 
-def _oscillation(run: ShearRun) -> tuple[float, float] | None:
-    """Return frequency (rad/s) and amplitude (1/s) of the first harmonic of a rate about zero."""
+def oscillation(run: ShearRun) -> tuple[float, float] | None:
+    """Return frequency (rad/s) and amplitude (1/s) of a rate that alternates about zero."""
     time, rate = run.time, run.shear_rate
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)

@@ -1,9 +1,11 @@
 """Templates → one self-contained page. The only place that knows jinja2."""
 
+import os
 import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
@@ -45,6 +47,11 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     }
 
 
+def _as_link(name: str) -> str:
+    """Return a file's name as it stands in a link, be it UTF-8 or not."""
+    return quote(os.fsencode(name))
+
+
 def render(template: str, **content: Any) -> str:
     """Return a page.
 
@@ -81,5 +88,6 @@ def _environment() -> Environment:
         estimate=estimate,
         spoken=spoken,
         safe_svg=Markup,
+        as_link=_as_link,
     )
     return environment

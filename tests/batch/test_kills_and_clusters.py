@@ -50,7 +50,7 @@ def compare(path, out, seed, overwrite, progress):
             time.sleep(float(os.environ.get("SECONDS_A_PART", "0.08")))
             part = {"x": np.random.default_rng([i, int(1000 * noise)]).normal(size=500).tolist()}
             folder.save(f"part{i}", part)
-            with open(os.environ["COUNTS"], "a") as counts:
+            with open(os.environ["COUNTS"], "a", errors="replace") as counts:
                 counts.write(f"{folder.path.name} {i}\\n")
         numbers.append(part["x"])
     term = {"term": "sigma.sigma", "coefficient": noise}
@@ -241,6 +241,25 @@ def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
     assert len(result.failed) == 1
     assert "no law fits" in result.failed[0].text
     assert results(tmp_path / "out") == calm
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_name_that_is_no_utf_8_costs_no_study_its_place(studies, tmp_path, monkeypatch, workers):
+    distributed = pytest.importorskip("distributed")
+    start = distributed.LocalCluster
+    in_threads = {"processes": False, "protocol": "tcp://"}
+    monkeypatch.setattr(distributed, "LocalCluster", lambda **given: start(**given | in_threads))
+    odd = tmp_path / os.fsdecode(b"m\xe9lange.toml")
+    odd.write_text(STUDY.format(0.04))
+    broken = tmp_path / os.fsdecode(b"\xff.toml")
+    broken.write_text("[data")
+    out = tmp_path / "out"
+    result = batch.run_batch([*studies[:1], odd, broken], out, workers=workers)
+    assert [s.status for s in result.studies] == ["done", "done", "failed"]
+    assert result.failed[0].input_error
+    assert "m\\udce9lange" in (out / "index.html").read_text("utf-8")
+    assert len((out / "table.csv").read_text("utf-8").splitlines()) == 4
+    assert len(json.loads((out / "batch.json").read_text("utf-8"))["studies"]) == 3
 
 
 @pytest.mark.parametrize("deaths", [1, 99])

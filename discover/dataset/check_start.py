@@ -1,0 +1,109 @@
+"""Doubts about the state in which a run begins: it is taken as rest unless the study says more."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from discover.dataset.check_run import stress_noise
+from discover.dataset.finding import Finding
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.run_table import oscillation
+
+# A first stress below this share of the largest is near rest: start-ups are sampled so
+_FAR_FROM_REST = 0.25
+# Of a stress, this share may be more than a viscosity makes of the rate, or a transient less
+_NOTICEABLE = 0.2
+_TRANSIENT = 0.05
+# What thickening and another loading add to linear theory is less
+_LINEAR_FACTOR = 2.0
+_HARMONICS = (1, 2, 3, 5, 7)
+
+
+def doubts_of_start(
+    run: ShearRun, sweep: LinearSweep | None = None, spectrum: RelaxationSpectrum | None = None
+) -> Iterator[Finding]:
+    """Yield why a run that is taken as starting from rest cannot have started so.
+
+    From rest a fluid has no stress but what the flow until the first sample made: that of a
+    viscosity at once, that of elasticity with the strain. A record is doubted if its first stress
+    is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
+    or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
+    already like the later ones; or (3) a linear sweep does not allow so much.
+
+    Parameters
+    ----------
+    run
+        A run that loads.
+    sweep, spectrum
+        The linear sweep and its relaxation modes, if there are any.
+    """
+    size = float(np.max(np.abs(run.shear_stress)))
+    first = abs(float(run.shear_stress[0]))
+    if run.rate_before != 0.0 or len(run) < 5 or first < max(_FAR_FROM_REST * size, 1e-300):
+        return
+    if first < 5.0 * stress_noise(run):
+        return
+    if _only_falls(run):
+        why = "it falls from there whatever the rate does, as after a step of strain"
+    elif _steady_alternation(run):
+        why = "its first cycle is like the later ones, as where the oscillation had gone on before"
+    elif sweep is not None and spectrum is not None and _more_than_linear(run, sweep, spectrum):
+        why = "the linear sweep allows less than half of that so early"
+    else:
+        return
+    yield Finding(
+        "warning",
+        "start",
+        run.name,
+        f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
+        f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look like "
+        "a missing effect. Give the record from rest on, or rate_before in the study if a steady "
+        "flow came before; otherwise leave the run out.",
+    )
+
+
+def _only_falls(run: ShearRun) -> bool:
+    stress = run.shear_stress * np.sign(run.shear_stress[0])
+    tail = float(np.median(stress[-max(3, len(run) // 10) :]))
+    if np.max(stress) > 1.1 * stress[0] or tail > 0.5 * stress[0]:
+        return False
+    rate = run.shear_rate
+    power = float(rate @ rate)
+    viscosity = max(float(rate @ run.shear_stress) / power, 0.0) if power > 0.0 else 0.0
+    left = run.shear_stress - viscosity * rate
+    return bool(left @ left > 0.5 * (run.shear_stress @ run.shear_stress))
+
+
+def _steady_alternation(run: ShearRun) -> bool:
+    wave = oscillation(run)
+    if wave is None:
+        return False
+    period = 2.0 * np.pi / wave[0]
+    time = run.time - run.time[0]
+    later = time > period
+    if time[-1] < 2.0 * period or np.count_nonzero(later) < 4 * len(_HARMONICS):
+        return False
+    angles = wave[0] * run.time[:, None] * np.array(_HARMONICS)
+    waves = np.hstack([np.cos(angles), np.sin(angles), np.ones((len(run), 1))])
+    found, *_ = np.linalg.lstsq(waves[later], run.shear_stress[later], rcond=None)
+    left = run.shear_stress - waves @ found
+    scatter = float(np.sqrt(np.mean(left[later] ** 2)))
+    early = float(np.sqrt(np.mean(left[time < 0.25 * period] ** 2)))
+    rates, *_ = np.linalg.lstsq(waves, run.shear_rate, rcond=None)
+    n = len(_HARMONICS)
+    viscosity = complex(found[0], -found[n]) / complex(rates[0], -rates[n])
+    size = float(np.max(np.abs(run.shear_stress)))
+    alike = early < max(3.0 * scatter, _TRANSIENT * size) and scatter < _NOTICEABLE * size
+    return alike and abs(viscosity.imag) > _NOTICEABLE * abs(viscosity)
+
+
+def _more_than_linear(run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum) -> bool:
+    """Hold the first stress against γ̇ (Σ G_k λ_k (1 − exp(−t/λ_k)) + η), η of what is faster."""
+    time = float(run.time[0])
+    modes = spectrum.modulus * spectrum.relaxation_time
+    # what is faster than the sweep is at most its smallest dynamic viscosity
+    fast = float(np.min(sweep.loss_modulus / sweep.angular_frequency))
+    linear = fast + float(-np.expm1(-time / spectrum.relaxation_time) @ modes)
+    allowed = _LINEAR_FACTOR * abs(float(run.shear_rate[0])) * linear
+    return abs(float(run.shear_stress[0])) > allowed + 5.0 * stress_noise(run)

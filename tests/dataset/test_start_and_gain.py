@@ -1,0 +1,156 @@
+"""A run that did not start from rest, and a gain that all runs share, are said; others are not.
+
+Data: scipy's integration of a Giesekus fluid, and closed forms of a Maxwell fluid.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset import check_folder
+
+MODULUS, TIME, MOBILITY = 100.0, 2.0, 0.3
+OMEGA = 1.5
+
+
+def csv(table):
+    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
+    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
+
+
+def sweep():
+    omega = np.geomspace(1e-2, 1e2, 40)
+    x = omega * TIME
+    moduli = MODULUS * np.array([x**2, x]) / (1 + x**2)
+    return {"omega_rad_s": omega, "Gp_Pa": moduli[0], "Gpp_Pa": moduli[1]}
+
+
+def write(folder, *runs, linear=True):
+    names = [f"r{i}.csv" for i in range(len(runs))]
+    (folder / "runs.csv").write_text("\n".join(["file", *names]))
+    for name, run in zip(names, runs, strict=True):
+        (folder / name).write_text(csv(run))
+    if linear:
+        (folder / "lve.csv").write_text(csv(sweep()))
+    return folder
+
+
+def about(folder, subject):
+    return [str(finding) for finding in check_folder(folder) if finding.subject == subject]
+
+
+def giesekus(times, rate, start=(0.0, 0.0, 0.0), solvent=0.0, noise=0.01):
+    """Stresses of a Giesekus fluid in shear, by scipy."""
+
+    def slope(t, s):
+        s11, s22, s12 = s
+        g = rate(t)
+        square = (s11**2 + s12**2, s22**2 + s12**2, s12 * (s11 + s22))
+        relaxed = (-s - MOBILITY / MODULUS * np.array(square)) / TIME
+        return relaxed + np.array([2 * g * s12, 0.0, g * s22 + MODULUS * g])
+
+    made = solve_ivp(slope, (0, times[-1]), start, t_eval=times, rtol=1e-8, atol=1e-8)
+    rates = np.array([rate(t) for t in times])
+    stress = made.y[2] + solvent * rates
+    spread = noise * np.max(np.abs(stress))
+    stress = stress + spread * np.random.default_rng(7).standard_normal(len(times))
+    return {"time_s": times, "shear_rate_1_s": rates, "stress_Pa": stress}
+
+
+CYCLES = np.linspace(0.0, 16.0, 400)
+START_UP = np.concatenate([[0.0], np.geomspace(1e-2, 20.0, 120)])
+
+
+def test_relaxation_after_a_step_of_strain_is_no_run_from_rest(tmp_path):
+    rate = 1e-3 * np.random.default_rng(1).standard_normal(200)  # a strain that was held, derived
+    times = np.linspace(0.01, 8.0, 200)
+    run = {
+        "time_s": times,
+        "shear_rate_1_s": rate,
+        "stress_Pa": 0.03 * MODULUS * np.exp(-times / TIME),
+    }
+    (said,) = about(write(tmp_path, run), "start")
+    assert "its first stress is 2.99 Pa, 100 %" in said
+    assert "step of strain" in said
+
+
+def test_an_oscillation_that_had_gone_on_for_ever_is_no_run_from_rest(tmp_path):
+    late = giesekus(CYCLES + 32 * np.pi / OMEGA, lambda t: 2.0 * np.cos(OMEGA * t))
+    late["time_s"] = CYCLES
+    (said,) = about(write(tmp_path, late, linear=False), "start")
+    assert "had gone on before" in said
+
+
+def test_a_flow_at_its_steady_stress_from_the_first_sample_is_no_run_from_rest(tmp_path):
+    times = np.linspace(1e-3, 10.0, 100)
+    noise = np.random.default_rng(2).standard_normal(100)
+    run = {
+        "time_s": times,
+        "shear_rate_1_s": np.full(100, 0.1),
+        "stress_Pa": 0.1 * MODULUS * TIME * (1 + 0.005 * noise),
+    }
+    (said,) = about(write(tmp_path, run), "start")
+    assert "linear sweep allows less" in said
+
+
+@pytest.mark.parametrize("solvent", [0.0, 60.0])
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.5])
+def test_nothing_is_said_of_an_oscillation_from_rest(tmp_path, phase, solvent):
+    run = giesekus(CYCLES, lambda t: 2.0 * np.cos(OMEGA * t + phase), solvent=solvent)
+    assert about(write(tmp_path, run, linear=False), "start") == []
+
+
+def test_nothing_is_said_of_start_ups_from_rest(tmp_path):
+    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.05, 0.3, 2.0)]
+    runs.append(giesekus(START_UP, lambda t: 1.0, solvent=100.0))
+    assert about(write(tmp_path, *runs, linear=False), "start") == []
+    assert about(write(tmp_path, *runs[:3]), "start") == []
+
+
+def test_nothing_is_said_of_a_rate_that_falls_and_takes_the_stress_along(tmp_path):
+    times = np.linspace(1e-3, 10.0, 100)
+    rate = np.where(times < 1.0, 5.0, 0.1)
+    run = {"time_s": times, "shear_rate_1_s": rate, "stress_Pa": 3.0 * rate**0.9}
+    assert about(write(tmp_path, run, linear=False), "start") == []
+
+
+@pytest.mark.parametrize("gain", [0.88, 1.15])
+def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
+    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    for run in runs:
+        run["stress_Pa"] = gain * run["stress_Pa"]
+    (said,) = about(write(tmp_path, *runs), "gain")
+    found = float(said.split("small strain is ")[1].split()[0])
+    assert found == pytest.approx(gain, abs=0.02)
+    assert 'modulus_Pa = "fit"' in said
+
+
+def test_no_gain_is_said_of_runs_that_agree_with_the_sweep(tmp_path):
+    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    assert about(write(tmp_path, *runs), "gain") == []
+
+
+def test_no_gain_is_said_of_runs_that_start_slowly(tmp_path):
+    """A rate that rises within 1 s lowers the early stress, less and less."""
+    runs = []
+    for rate in (0.1, 0.2, 0.5):
+        run = giesekus(START_UP, lambda t, r=rate: r * -np.expm1(-t / 1.0))
+        runs.append({**run, "shear_rate_1_s": np.full(len(START_UP), rate)})
+    assert about(write(tmp_path, *runs), "gain") == []
+
+
+def test_no_gain_is_said_of_runs_that_disagree_each_in_its_way(tmp_path):
+    runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
+    for run, gain in zip(runs, (0.85, 1.12, 0.9, 1.2), strict=True):
+        run["stress_Pa"] = gain * run["stress_Pa"]
+    assert about(write(tmp_path, *runs), "gain") == []
+
+
+def test_the_melt_stands_ten_per_cent_below_its_sweep_and_polyisoprene_does_not(measured_data):
+    if not (measured_data / "ldpe150r").is_dir():
+        pytest.skip("needs the melt's records")
+    (said,) = about(measured_data / "ldpe150r", "gain")
+    found = float(said.split("small strain is ")[1].split()[0])
+    assert 0.86 < found < 0.92
+    assert about(measured_data / "pi95k-startup", "gain") == []
+    assert about(measured_data / "pi95k-startup", "start") == []
