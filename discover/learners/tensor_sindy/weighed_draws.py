@@ -91,7 +91,7 @@ def weighed_draws(
     deviance: Deviance,
     seed: int = 0,
 ) -> WeighedDraws:
-    """Return draws of parameters that fit the data as well as they claim, or say why there are none.
+    """Return draws of parameters that fit the data, or say why there are none.
 
     Parameters
     ----------
