@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
 from discover.comparison.explanation import Explanation, explain
 from discover.comparison.flows import Flow, comparison_flows, predict
@@ -105,6 +106,8 @@ def compare(
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen = outcomes.get("tensor_sindy")
     rivals, structure, following = [], None, NextMeasurement()
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    judged = judged or [flow for flow in flows if flow.kind == "training"]
     if chosen is not None and explanation.verdict != "no_signal":
         library = study_library(study)
         met = chosen.details.get("rivals", ())
@@ -112,11 +115,13 @@ def compare(
         structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
     if chosen is not None and explanation.in_library:
         # bands and experiments take it that the law, or a rival, is the fluid's
-        judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
-        judged = judged or [flow for flow in flows if flow.kind == "training"]
         following = next_measurement(
             chosen, rivals, model.fluid, judged, following_options, learner_seed
         )
+    bands, silent_records = following.bands, explanation.verdict == "no_signal"
+    statements = make_statements(explanation, flows, rivals, structure, bands, normal)
+    if not silent_records:
+        statements = open_where_contested(statements, contested(outcomes, judged, bands))
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -129,7 +134,7 @@ def compare(
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         rivals=rivals,
-        statements=make_statements(explanation, flows, rivals, structure, following.bands, normal),
+        statements=statements,
         structure=structure,
         sweep=points,
         distillations=distillations,
@@ -137,6 +142,7 @@ def compare(
         seed=learner_seed,
         known=known_equation(model),
         explanation=explanation,
+        warnings=() if silent_records else tuple(disagreements(outcomes, judged, bands)),
     )
 
 
