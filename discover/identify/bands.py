@@ -139,7 +139,7 @@ def bands_of_predictions(
             if lost > _MOST_LOST and finite[start, flow]:
                 reason = reason or f"{100 * lost:.0f} % of the laws that fit run away in this flow"
             if len(usable):
-                limits = np.percentile(usable, _PERCENTILES, axis=0)
+                limits = np.percentile(usable, _PERCENTILES, axis=0, method="median_unbiased")
                 low.append(limits[0])
                 high.append(limits[1])
         if not finite[0, flow]:

@@ -332,7 +332,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         assert self.draws_ is not None
         half_widths = self.uncertainty_.half_widths
         linear = self.draws_.method == "linear"
-        weighed = self.draws_.intervals() if self.draws_.method == "weighed" else None
+        weighed = self.draws_.intervals if self.draws_.method == "weighed" else None
         model = search.model_at(fit)
         solutions = {
             s.support: s.coefficients
