@@ -175,7 +175,8 @@ def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contende
     known = {frozenset(row["support"]): row for row in details.get("rivals", ())}
     terms = {term.term: term.coefficient for term in outcome.terms}
     inner = {name: value for term in outcome.terms for name, value in term.inner.items()}
-    chosen = Contender(law_name(terms), terms, inner, _covariance(details, len(terms) + len(inner)))
+    size = len(terms) + len(inner)
+    chosen = Contender(law_name(terms), terms, inner, **_uncertainty(details, size))
     others = []
     for rival in list(rivals)[:_MOST_RIVALS]:
         row = known.get(frozenset(rival.terms))
@@ -184,7 +185,8 @@ def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contende
         ):
             size = len(row["support"]) + len(row["inner"])
             fitted = dict(zip(row["support"], row["coefficients"], strict=True))
-            others.append(Contender(law_name(fitted), fitted, row["inner"], _covariance(row, size)))
+            known_row = _uncertainty(row, size)
+            others.append(Contender(law_name(fitted), fitted, row["inner"], **known_row))
         else:
             used = dict(rival.inner)
             others.append(Contender(law_name(rival.terms), dict(rival.terms), used))
@@ -195,6 +197,18 @@ def law_name(terms: Mapping[str, float]) -> str:
     """Return a law as the sum of its terms, for tables."""
     text = " ".join(f"{value:+.3g} {name}" for name, value in terms.items())
     return text.removeprefix("+") or "no term"
+
+
+def _uncertainty(row: Mapping[str, Any], size: int) -> dict[str, Any]:
+    """Return what is known of a law's parameters, as `Contender` takes it."""
+    found = row.get("draws") or {"method": "linear"}
+    drawn = np.asarray(found.get("values", ()), dtype=float)
+    weighed = found["method"] == "weighed" and drawn.ndim == 2 and drawn.shape[1] == size
+    return {
+        "covariance": _covariance(row, size),
+        "drawn": drawn if weighed else None,
+        "without_band": str(found.get("reason", "")) if found["method"] == "none" else "",
+    }
 
 
 def _covariance(row: Mapping[str, Any], size: int) -> np.ndarray | None:

@@ -5,12 +5,15 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Real
+from jaxtyping import Float, Real
 
-from discover.comparison.flows import Flow, Stresses, predict
+from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
+
+Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
+"""Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,9 @@ class LearnerOutcome(TermTables):
         By the key of the flow; None where the law runs away.
     physics
         Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
+    bands
+        By the key of the flow: lowest and highest prediction of each quantity over the laws that
+        fit as well. None for a flow in which one of them runs away; empty where there is one law.
     """
 
     learner: str
@@ -45,6 +51,22 @@ class LearnerOutcome(TermTables):
     message: str = ""
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
+    bands: Mapping[str, Limits | None] = field(default_factory=dict)
+
+    def half_widths(self, flow: Flow) -> dict[str, float]:
+        """Return the root-mean-square half-width of each band over that of the prediction.
+
+        N2's is relative to N1, as its error is. Empty where there is no band.
+        """
+        limits, predicted = self.bands.get(flow.key), self.predictions.get(flow.key)
+        if limits is None or predicted is None:
+            return {}
+        found = {}
+        for quantity, (low, high) in limits.items():
+            size = np.linalg.norm(predicted["N1" if quantity == "N2" else quantity])
+            if size > 0:
+                found[quantity] = float(0.5 * np.linalg.norm(high - low) / size)
+        return found
 
     @classmethod
     def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
@@ -57,6 +79,7 @@ class LearnerOutcome(TermTables):
             result.details,
             result.message,
             {flow.key: predict(fluid, flow) for flow in flows},
+            bands=_bands(result, fluid, flows),
         )
 
     def to_state(self) -> dict[str, Any]:
@@ -73,6 +96,12 @@ class LearnerOutcome(TermTables):
                 for name, p in self.predictions.items()
             },
             "physics": plain(self.physics),
+            "bands": {
+                name: None
+                if b is None
+                else {q: [v.tolist() for v in pair] for q, pair in b.items()}
+                for name, b in self.bands.items()
+            },
         }
 
     @classmethod
@@ -103,7 +132,36 @@ class LearnerOutcome(TermTables):
             state["message"],
             predictions,
             state.get("physics"),
+            {
+                name: None
+                if b is None
+                else {q: (np.asarray(low), np.asarray(high)) for q, (low, high) in b.items()}
+                for name, b in state.get("bands", {}).items()
+            },
         )
+
+
+_BANDS = ("training", "held_out", "test")
+
+
+def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
+    if len(result.members) < 2:
+        return {}
+    fluids = [
+        Fluid(law, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity)
+        for law in result.members
+    ]
+    bands: dict[str, Limits | None] = {}
+    for flow in flows:
+        if flow.kind not in _BANDS:
+            continue
+        predicted = [predict(member, flow) for member in fluids]
+        told = [p for p in predicted if p is not None]
+        bands[flow.key] = None
+        if len(told) == len(fluids):
+            rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
+            bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
+    return bands
 
 
 def plain(value: Any) -> Any:

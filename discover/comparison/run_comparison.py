@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
 from discover.comparison.explanation import Explanation, explain
 from discover.comparison.flows import Flow, comparison_flows, predict
@@ -106,6 +107,8 @@ def compare(
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen = outcomes.get("tensor_sindy")
     rivals, structure, following = [], None, NextMeasurement()
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    judged = judged or [flow for flow in flows if flow.kind == "training"]
     if chosen is not None and explanation.verdict != "no_signal":
         library = study_library(study)
         met = chosen.details.get("rivals", ())
@@ -113,13 +116,14 @@ def compare(
         structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
     if chosen is not None and explanation.in_library:
         # bands and experiments take it that the law, or a rival, is the fluid's
-        judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
-        judged = judged or [flow for flow in flows if flow.kind == "training"]
         following = next_measurement(
             chosen, rivals, model.fluid, judged, following_options, learner_seed
         )
     classical = []
-    if explanation.verdict != "no_signal":
+    bands, silent_records = following.bands, explanation.verdict == "no_signal"
+    statements = make_statements(explanation, flows, rivals, structure, bands, normal)
+    if not silent_records:
+        statements = open_where_contested(statements, contested(outcomes, judged, bands))
         progress("the classical laws on the same runs", done / n_parts)
         classical = fit_classical_laws(model, flows, study.model.known_relaxation)
     distillations = _distil(study, data, store, step("distillation"))
@@ -134,7 +138,7 @@ def compare(
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
         rivals=rivals,
-        statements=make_statements(explanation, flows, rivals, structure, following.bands, normal),
+        statements=statements,
         structure=structure,
         sweep=points,
         distillations=distillations,
@@ -143,6 +147,7 @@ def compare(
         known=known_equation(model),
         explanation=explanation,
         classical=classical,
+        warnings=() if silent_records else tuple(disagreements(outcomes, judged, bands)),
     )
 
 

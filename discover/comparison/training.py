@@ -75,7 +75,7 @@ def train(
     if learner == "tensor_sindy":
         from discover.identify.rivals import MOST_RIVALS, find_rivals
         from discover.learners.tensor_sindy import TensorSINDy
-        from discover.learners.tensor_sindy.report import covariance_table
+        from discover.learners.tensor_sindy.report import uncertainty_row
 
         sparse = TensorSINDy(
             library=library,
@@ -93,7 +93,7 @@ def train(
         table = found.to_json()
         for row, rival in zip(table["rivals"][:MOST_RIVALS], found.rivals, strict=False):
             assert rival.fit is not None  # the search at hand refitted it
-            row["covariance"] = covariance_table(sparse.search_, rival.fit)
+            row.update(uncertainty_row(sparse.search_, rival.fit, seed))
         table["rivals_text"] = table.pop("text")
         return replace(result, details={**result.details, **table}), sparse.fluid_
     if learner == "tbnn_ude":

@@ -15,6 +15,7 @@ from discover.protocols.shear import ShearProtocol
 QUANTITIES = ("sigma12", "N1", "N2")
 
 _PERCENTILES = (2.5, 97.5)
+_MOST_LOST = 0.05
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,9 @@ class PredictionBand:
     rivals_low, rivals_high
         The same with every rival's band around it: what the data leave open altogether.
     runaways
-        Fraction of the draws that could not be integrated and are left out.
+        Fraction of the draws that could not be integrated.
+    reason
+        Why there is no band, that is why the limits are nan; empty where there is one.
     """
 
     times: Float[np.ndarray, " n"]
@@ -42,6 +45,7 @@ class PredictionBand:
     rivals_low: Float[np.ndarray, "n 3"]
     rivals_high: Float[np.ndarray, "n 3"]
     runaways: float
+    reason: str = ""
 
     def widths(self, with_rivals: bool = True) -> dict[str, float]:
         """Return the root-mean-square width of each band over that of the chosen prediction.
@@ -64,6 +68,7 @@ class PredictionBand:
             "relative_width": self.widths(with_rivals=False),
             "relative_width_with_rivals": self.widths(),
             "runaways": self.runaways,
+            "reason": self.reason,
         }
 
 
@@ -95,15 +100,19 @@ def prediction_bands(
     drawn = [draws(law, n_draws, rng) for law in (chosen, *rivals)]
     flat = [law for group in drawn for law in group]
     predicted = predict_laws(fluid_of(flat, declared), protocols, times)
-    return bands_of_predictions(predicted, [len(group) for group in drawn], times)
+    sizes = [len(group) for group in drawn]
+    return bands_of_predictions(predicted, sizes, times, chosen.without_band)
 
 
 def bands_of_predictions(
     predicted: Float[np.ndarray, "laws flows n 3"],
     group_sizes: Sequence[int],
     times: Sequence[Float[np.ndarray, " m"]],
+    without_band: str = "",
 ) -> list[PredictionBand]:
     """Return the band of every flow from predictions in groups, the chosen law's first.
+
+    A law of whose draws more run away in a flow than a 95 % band leaves out has no band there.
 
     Serves draws of parameters and members of an ensemble alike. A group of one has no width.
 
@@ -115,23 +124,31 @@ def bands_of_predictions(
         How many predictions each law has.
     times
         Sampling times of every flow.
+    without_band
+        Why the chosen law has no band in any flow, if so.
     """
     finite = np.all(np.isfinite(predicted), axis=(2, 3))
     edges = np.cumsum([0, *group_sizes])
     bands = []
     for flow, sampling in enumerate(times):
         n = len(sampling)
-        low, high = [], []
+        low, high, reason = [], [], without_band
         for start, stop in itertools.pairwise(edges):
             usable = predicted[start:stop, flow, :n][finite[start:stop, flow]]
+            lost = 1.0 - len(usable) / (stop - start)
+            if lost > _MOST_LOST and finite[start, flow]:
+                reason = reason or f"{100 * lost:.0f} % of the laws that fit run away in this flow"
             if len(usable):
-                limits = np.percentile(usable, _PERCENTILES, axis=0)
+                limits = np.percentile(usable, _PERCENTILES, axis=0, method="median_unbiased")
                 low.append(limits[0])
                 high.append(limits[1])
         if not finite[0, flow]:
             nothing = np.full((n, 3), np.nan)
-            bands.append(PredictionBand(sampling, *([nothing] * 5), runaways=1.0))
+            reason = reason or "the law itself runs away in this flow"
+            bands.append(PredictionBand(sampling, *([nothing] * 5), runaways=1.0, reason=reason))
             continue
+        if reason:
+            low, high = [np.full((n, 3), np.nan)], [np.full((n, 3), np.nan)]
         bands.append(
             PredictionBand(
                 times=sampling,
@@ -141,6 +158,7 @@ def bands_of_predictions(
                 rivals_low=np.min(low, axis=0),
                 rivals_high=np.max(high, axis=0),
                 runaways=1.0 - float(np.mean(finite[:, flow])),
+                reason=reason,
             )
         )
     return bands

@@ -35,12 +35,19 @@ class Contender:
     covariance
         Of the coefficients in the order of `terms`, then of the inner parameters in the order of
         `inner`, shape (p, p); None where the parameters count as exact.
+    drawn
+        Equally likely parameters in the same order, shape (draws, p), where the covariance does
+        not serve; None where it does.
+    without_band
+        Why nothing is known of the parameters' uncertainty; empty where something is.
     """
 
     name: str
     terms: Mapping[str, float]
     inner: Mapping[str, float] = field(default_factory=dict)
     covariance: Float[np.ndarray, "p p"] | None = None
+    drawn: Float[np.ndarray, "draws p"] | None = None
+    without_band: str = ""
 
 
 def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
@@ -76,11 +83,16 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
 
 def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple[Contender, ...]:
     """Return laws with parameters drawn from the contender's uncertainty; itself comes first."""
-    if contender.covariance is None or n_draws == 0:
+    if n_draws == 0 or contender.without_band:
+        return (contender,)
+    if contender.drawn is None and contender.covariance is None:
         return (contender,)
     names, inner = list(contender.terms), list(contender.inner)
     centre = np.array([*contender.terms.values(), *contender.inner.values()])
-    drawn = rng.multivariate_normal(centre, contender.covariance, size=n_draws, method="eigh")
+    if contender.drawn is None:
+        drawn = rng.multivariate_normal(centre, contender.covariance, size=n_draws, method="eigh")
+    else:
+        drawn = rng.permutation(contender.drawn)[:n_draws]
     split = len(names)
     return (
         contender,

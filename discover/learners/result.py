@@ -67,6 +67,8 @@ class LearnerResult(HasEquation, TermTables):
         What else this learner can say; JSON-able.
     message
         One sentence on how the fit ended.
+    members
+        Laws that fit the data about as well, this one among them; empty where there is one only.
     """
 
     learner: str
@@ -76,6 +78,7 @@ class LearnerResult(HasEquation, TermTables):
     loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
+    members: tuple[AbstractConstitutiveLaw, ...] = ()
 
     def equation(self) -> Equation:
         """Return the law term by term, a known law below it included, dimensionless.

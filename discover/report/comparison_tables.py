@@ -72,9 +72,12 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
         widths = {} if band is None else band.widths(with_rivals=False)
         cells = []
         for who in ("before", *comparison.outcomes):
-            mine = widths if who == "tensor_sindy" else {}
+            if who == "tensor_sindy":
+                mine = {name: _half(width) for name, width in widths.items()}
+            else:
+                mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
             cells += [
-                {"value": value, "half_width": None if value is None else _half(mine.get(name))}
+                {"value": value, "half_width": None if value is None else mine.get(name)}
                 for name, value in comparison.errors(who, flow).items()
             ]
         rows.append(

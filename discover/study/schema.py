@@ -148,7 +148,7 @@ class Compare(Section):
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     recipe: Literal["default", "paper"] = "default"
     quick: bool = False
-    members: Annotated[int, Field(ge=1, le=64)] = 1
+    members: Annotated[int, Field(ge=1, le=64)] = 3
     seed: Seed = 0
     use_normal_stresses: bool = False
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)

@@ -1,183 +1,138 @@
-"""Several networks from different initial weights, trained side by side in one program.
+"""Several networks that reach the data by different ways.
 
-The first member searches for the tensors whose coefficients have to vary; the others learn
-functions on the same tensors from initial weights of their own. What they disagree on, the data and
-the prior leave open.
+Shear stress cannot tell many laws apart, and one network is one of them. Weights alone do not make
+members honest: on the same tensors they end in the same law. So the ways differ too.
+
+- Where coefficients vary, members take turns: one starts from the tensor that came next in the
+  first one's race, one has the first one's tensors with initial weights of its own.
+- Where constants suffice no initial weight takes part, and members learn from halves of the runs.
+
+What those disagree on that fit all data, the data leave open. They share the compiled programs of
+the first, and none repeats its search.
 """
+
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Key
+from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import (
-    Objective,
-    Stopping,
-    first_state,
-    law_misfit,
-    linearise,
-    next_state,
-    norm_of_cost,
-)
-from discover.learners.tbnn_ude.prior import reweighted, sample_states
+from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.recipe_default import (
-    PRIOR_SHARE,
     DefaultRecipe,
     Progress,
-    constant_scale,
-    initial_law,
+    Trained,
+    train_along,
+    train_constants,
 )
-from discover.learners.tbnn_ude.weights import Rebuild
+
+FITS = 2.0
+"""A member whose misfit is so many times the least is no explanation of the data.
+
+Generous: one that is left out narrows the band.
+"""
+
+SIMILAR = 1.05
+"""Of members whose misfits differ by less than this factor, the simplest is taken."""
 
 
-def train_members(
+def train_others(
     problem: TrainingProblem,
-    found: TensorBasisNetwork,
-    keys: Key[Array, " members"],
+    first: Trained,
+    keys: Key[Array, " others"],
     recipe: DefaultRecipe,
     progress: Progress | None = None,
-) -> list[TensorBasisNetwork]:
-    """Return networks on the tensors of a trained law, one for each key.
-
-    Each is what `train_members` returns for its key alone, to the rounding of a batched matrix
-    product.
+) -> tuple[list[Trained], str]:
+    """Return one more member for each key, and in words how they came about.
 
     Parameters
     ----------
     problem
         The training data.
-    found
-        A trained law: its tensors, invariant scale, base and known relaxation are taken over, its
-        weights are not.
+    first
+        The member that `train_default` found.
     keys
-        For the initial weights, shape (members,).
-    recipe
-        Settings.
-    progress
-        Called after every step with step, total number of steps (at most) and mean misfit.
+        For the initial weights, shape (others,).
+    recipe, progress
+        As in `train_default`.
     """
-    tensors = np.asarray(found.network_mask) > 0
-    laws = _initial(keys, found, recipe.width)
-    total = recipe.steps + recipe.polish_steps
-    steps = 0
-
-    def step(misfits: Float[np.ndarray, " members"]) -> None:
-        nonlocal steps
-        steps += 1
-        if progress is not None:
-            progress(min(steps, total), total, float(np.mean(misfits)))
-
-    for strength, most in ((PRIOR_SHARE, recipe.steps), (None, recipe.polish_steps)):
-        misfits = member_misfits(laws, problem)
-        share = strength or PRIOR_SHARE * np.minimum(1.0, misfits) ** 2
-        laws = _round(laws, problem, share, tensors, most, 0.1 * recipe.exact, step)
-    return [member_of(laws, i) for i in range(keys.shape[0])]
-
-
-def stack_members(members: list[TensorBasisNetwork]) -> TensorBasisNetwork:
-    """Return the members as one law with a leading axis on every array."""
-    arrays = [eqx.partition(member, eqx.is_array) for member in members]
-    return eqx.combine(_stack([a for a, _ in arrays]), arrays[0][1])
-
-
-def _stack(trees):
-    # on the host: no program to compile for every shape of a leaf
-    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *trees)
+    n_runs = problem.target.shape[0]
+    if not first.varies and n_runs < 2:
+        return [first] * len(keys), "a single run has no halves: members do not differ"
+    if not first.varies:
+        law = first.law
+        halves = [seen_in(problem, half) for half in halves_of_runs(n_runs, len(keys), keys[0])]
+        members = [
+            train_constants(half, key, law.linear_relaxation, recipe, law.base)
+            for half, key in zip(halves, keys, strict=True)
+        ]
+        return members, "trained on halves of the runs"
+    members = []
+    for i, key in enumerate(keys):
+        groups = [first.tensors]
+        if i % 2 == 0 and i // 2 < len(first.passed_over):
+            other = first.passed_over[i // 2]
+            beside = [t for t in first.tensors if t != other]
+            groups = [(other,), beside[: recipe.max_tensors - 1]]
+        members.append(
+            train_along(problem, key, first.law, [g for g in groups if g], recipe, progress)
+        )
+    return members, "trained from other tensors and from other initial weights"
 
 
-def member_of(laws: TensorBasisNetwork, index: int) -> TensorBasisNetwork:
-    """Return one member of a stacked law."""
-    arrays, rest = eqx.partition(laws, eqx.is_array)
-    return eqx.combine(
-        jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]), arrays), rest
-    )
+def halves_of_runs(
+    n_runs: int, n_halves: int, key: Key[Array, ""]
+) -> list[Bool[np.ndarray, " runs"]]:
+    """Return halves of the runs: every other one, the rest, then at random.
+
+    Runs come in an order, of rate or of frequency, so every other one covers the range.
+    """
+    even = np.arange(n_runs) % 2 == 0
+    halves = [even, ~even]
+    for other in jax.random.split(key, max(n_halves - 2, 0)):
+        halves.append(even[np.asarray(jax.random.permutation(other, n_runs))])
+    return halves[:n_halves]
+
+
+def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
+    """Return the problem with only some of the runs looked at; its shapes stay the same."""
+    mask = problem.grids.sample_mask & jnp.asarray(runs)[:, None]
+    return eqx.tree_at(lambda tree: tree.grids.sample_mask, problem, mask)
+
+
+def choose_member(
+    members: Sequence[Trained], misfits: Float[np.ndarray, " members"], resolved: float
+) -> tuple[int, Bool[np.ndarray, " members"]]:
+    """Return the member to be reported, and which ones fit.
+
+    The fewest varying tensors among the members of nearly the least misfit: within noise a smaller
+    misfit is no merit, and a median of laws would be no law.
+
+    Parameters
+    ----------
+    members
+        All of them; where constants suffice the first alone has seen all runs and is taken.
+    misfits
+        Relative misfit of each on all runs.
+    resolved
+        Relative misfit that a rheometer does not resolve.
+    """
+    least = float(np.min(misfits))
+    fits = misfits <= max(FITS * least, resolved)
+    if not np.isfinite(least) or not members[0].varies:
+        return 0, np.where(np.arange(len(members)) == 0, True, fits)
+    near = np.flatnonzero(misfits <= SIMILAR * least)
+    chosen = min(near, key=lambda i: (len(members[i].tensors), misfits[i]))
+    return int(chosen), fits
 
 
 def member_misfits(
-    laws: TensorBasisNetwork, problem: TrainingProblem
+    laws: Sequence[TensorBasisNetwork], problem: TrainingProblem
 ) -> Float[np.ndarray, " members"]:
-    """Return the relative misfit of every member of a stacked law; infinite where it runs away."""
-    # one by one: a batched integration would be one more program to compile, for milliseconds
-    members = [member_of(laws, i) for i in range(laws.constants.shape[0])]
-    misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in members])
+    """Return the relative misfit of every law; infinite where it runs away."""
+    misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in laws])
     return np.where(np.isfinite(misfits), misfits, np.inf)
-
-
-def _initial(
-    keys: Key[Array, " members"], found: TensorBasisNetwork, width: int
-) -> TensorBasisNetwork:
-    scale = found.invariant_scale
-    assert scale is not None  # a law with varying coefficients has one
-
-    def one(key):
-        law = initial_law(key, width, found.linear_relaxation, scale, found.base)
-        return eqx.tree_at(lambda tree: tree.network_mask, law, found.network_mask)
-
-    return eqx.filter_vmap(one)(keys)
-
-
-@eqx.filter_jit
-def _begin(laws, clouds, tensors, strengths):
-    def one(law, cloud, strength):
-        rebuild = Rebuild.with_network(law, np.array(tensors), constant_scale(cloud))
-        prior = reweighted(law, cloud, strength)
-        return (rebuild, cloud, prior), rebuild.start
-
-    return eqx.filter_vmap(one)(laws, clouds, strengths)
-
-
-@eqx.filter_jit
-def _linearised(weights, parts, problem):
-    return eqx.filter_vmap(lambda w, part: linearise(w, Objective(problem, *part)))(weights, parts)
-
-
-_first_states = eqx.filter_jit(eqx.filter_vmap(first_state))
-_next_states = eqx.filter_jit(eqx.filter_vmap(next_state))
-
-
-@eqx.filter_jit
-def _laws(parts, weights):
-    return eqx.filter_vmap(lambda part, w: part[0](w))(parts, weights)
-
-
-def _round(
-    laws: TensorBasisNetwork,
-    problem: TrainingProblem,
-    strength: Float[np.ndarray, " members"] | float,
-    tensors: np.ndarray,
-    steps: int,
-    target: float,
-    callback,
-) -> TensorBasisNetwork:
-    """Train every member for one round; one that has ended keeps its weights while others go on."""
-    n = laws.constants.shape[0]
-    strengths = jnp.asarray(np.broadcast_to(strength, (n,)).astype(float))
-    clouds = _stack([sample_states(member_of(laws, i), problem) for i in range(n)])
-    parts, weights = _begin(laws, clouds, tuple(map(bool, tensors)), strengths)
-    best = np.array(weights)
-    stopping, going = [Stopping(target) for _ in range(n)], np.ones(n, bool)
-    misfits = np.full(n, np.inf)
-    linearised = _linearised(weights, parts, problem)
-    state = _first_states(linearised)
-    for step in range(steps):
-        if step:
-            linearised = _linearised(state.y_eval, parts, problem)
-        weights, state = _next_states(weights, linearised, state)
-        costs = np.asarray(_costs(state))
-        for i in np.flatnonzero(going):
-            misfits[i] = norm_of_cost(float(costs[i]))
-            if np.isfinite(misfits[i]):
-                best[i] = np.asarray(weights[i])
-            going[i] = not stopping[i].done(float(misfits[i]))
-        callback(misfits)
-        if not np.any(going):
-            break
-    return _laws(parts, jnp.asarray(best))
-
-
-@eqx.filter_jit
-def _costs(state) -> Float[Array, " members"]:
-    return eqx.filter_vmap(lambda s: s.f_info.as_min())(state)

@@ -18,7 +18,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
-from discover.learners.tbnn_ude.ensemble import member_misfits, stack_members, train_members
+from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
@@ -53,8 +53,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     base_law
         A known dimensionless law to which the network is added; by default UCM.
     n_members
-        Networks trained from different initial weights; the one with the smallest misfit is
-        taken, and all are reported.
+        Networks that reach the data by different ways (see `ensemble`). One of the simplest that
+        fit is taken; what those that fit disagree on, the data leave open.
     projection_library
         Candidate terms in which the network is put into words; by default tensors with
         coefficients up to degree one.
@@ -76,11 +76,13 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     terms_ : tuple of RecoveredTerm
         The projection.
     members_ : list of TensorBasisNetwork
-        Every trained member, the first one's tensors shared by all.
+        Every trained member, the first one first.
     ensemble_fluids_ : list of Fluid
         Every member with moduli and relaxation times, ready to simulate.
     ensemble_ : str
-        How the members came about; where constants suffice they do not differ.
+        How the members came about.
+    fitting_ : list of TensorBasisNetwork
+        Members that fit the data about as well as the best, `law_` first.
     """
 
     def __init__(
@@ -90,7 +92,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         relaxation_time: Any = 1.0,
         known_relaxation: bool = True,
         base_law: Any = None,
-        n_members: int = 1,
+        n_members: int = 3,
         projection_library: TermLibrary | None = None,
         quick: bool = False,
         random_state: int = 0,
@@ -130,13 +132,17 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         if self.n_members < 1:
             raise InputError(f"n_members must be at least 1; got {self.n_members}.")
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
-        best, members, agreement = self._train_all(problem, keys, recipe)
-        misfits = member_misfits(stack_members(members), problem)
+        trained, agreement = self._train_all(problem, keys, recipe)
+        members = [member.law for member in trained]
+        misfits = member_misfits(members, problem)
+        chosen, fits = choose_member(trained, misfits, _resolved(recipe))
+        best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
         self.n_features_in_ = 1
         self.members_ = members
         self.ensemble_ = agreement
         self.law_ = best.law
+        self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
         modulus = jnp.atleast_1d(jnp.asarray(self.modulus, dtype=float))
         self.fluid_ = Fluid(best.law, modulus, problem.relaxation_time)
         self.ensemble_fluids_ = [Fluid(law, modulus, problem.relaxation_time) for law in members]
@@ -162,12 +168,14 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                 "members": [
                     {
                         "misfit": float(misfit),
+                        "fits": bool(fitting),
                         "coefficients": _coefficient_table(law, sample_states(law, problem)),
                     }
-                    for law, misfit in zip(members, misfits, strict=True)
+                    for law, misfit, fitting in zip(members, misfits, fits, strict=True)
                 ],
             },
             message=best.message,
+            members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
         return self
 
@@ -215,27 +223,16 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
-    def _train_all(
-        self, problem: TrainingProblem, keys, recipe
-    ) -> tuple[Trained, list[TensorBasisNetwork], str]:
-        """Return the member with the smallest misfit, all members, and how they came about."""
-        if isinstance(recipe, PaperRecipe):
-            trained = [self._train(problem, key, recipe) for key in keys]
-            best = min(trained, key=lambda member: _or_infinite(member.misfit))
-            return best, [member.law for member in trained], "trained one after the other"
+    def _train_all(self, problem: TrainingProblem, keys, recipe) -> tuple[list[Trained], str]:
+        """Return all members, and how they came about."""
         first = self._train(problem, keys[0], recipe)
         if len(keys) == 1:
-            return first, [first.law], "a single member"
-        if not first.varies:
-            # no initial weight takes part: every member would be this one
-            return first, [first.law] * len(keys), "constants suffice: members do not differ"
-        others = train_members(problem, first.law, keys[1:], recipe, self.progress)
-        members = [first.law, *others]
-        misfits = member_misfits(stack_members(others), problem)
-        if np.min(misfits) < first.misfit:
-            law = others[int(np.argmin(misfits))]
-            first = replace(first, law=law, misfit=float(np.min(misfits)))
-        return first, members, "trained side by side on the tensors that the first one found"
+            return [first], "a single member"
+        if isinstance(recipe, PaperRecipe):
+            others = [self._train(problem, key, recipe) for key in keys[1:]]
+            return [first, *others], "trained one after the other from initial weights of their own"
+        others, agreement = train_others(problem, first, keys[1:], recipe, self.progress)
+        return [first, *others], agreement
 
     def _train(self, problem: TrainingProblem, key, recipe) -> Trained:
         relaxes = (
@@ -251,8 +248,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         return Trained(law, law, losses, misfit, True, message)
 
 
-def _or_infinite(value: float) -> float:
-    return value if np.isfinite(value) else np.inf
+def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
+    return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
 def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:

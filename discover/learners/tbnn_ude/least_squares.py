@@ -63,7 +63,8 @@ class Objective(eqx.Module):
 def data_scale(problem: TrainingProblem) -> Float[Array, "runs 1"]:
     """Return the factor that turns residuals into parts of the mean relative misfit."""
     mask = problem.grids.sample_mask
-    count = jnp.sum(mask, axis=1)
+    # a run of which nothing is seen has no sample to count
+    count = jnp.maximum(jnp.sum(mask, axis=1), 1)
     mean_square = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1) / count
     # A run at rest has no scale of its own; unit modulus serves
     mean_square = jnp.where(mean_square > 0.0, mean_square, 1.0)

@@ -17,7 +17,7 @@ the smallest law that explains it, in this order:
 The last training of each stage is without penalty, or nearly: what is reported is not shrunk.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
@@ -90,6 +90,10 @@ class Trained:
         Whether the network part was needed.
     message
         How the training ended.
+    tensors
+        Tensors whose coefficients vary, in the order in which they were taken.
+    passed_over
+        The other tensors, from which a law could have started, the least misfit first.
     """
 
     law: TensorBasisNetwork
@@ -98,6 +102,8 @@ class Trained:
     misfit: float
     varies: bool
     message: str
+    tensors: tuple[int, ...] = ()
+    passed_over: tuple[int, ...] = ()
 
 
 @eqx.filter_jit
@@ -151,6 +157,8 @@ class _Session:
     def __init__(self, problem: TrainingProblem, recipe: DefaultRecipe, progress: Progress | None):
         self.problem, self.recipe, self.progress = problem, recipe, progress
         self.misfits: list[float] = []
+        self.taken: list[int] = []
+        self.passed_over: list[int] = []
         self._latest: tuple[TensorBasisNetwork, Float[Array, "runs n k 4"]] | None = None
         first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
         trials = N_COEFFICIENTS * (_START_STEPS + recipe.steps)
@@ -263,11 +271,38 @@ class _Session:
             found = min(trials, key=lambda trial: trial[:2])
             if not found[0] < misfit:
                 break
+            if not self.taken:
+                self.passed_over = [t for _, t, _ in sorted(trials, key=lambda trial: trial[:2])][
+                    1:
+                ]
+            self.taken.append(found[1])
             chosen[found[1]] = True
             law = penalised = found[2]
             if not self.settled(law):
                 law = self.polish(law, found[0], chosen)
             misfit = self.misfit(law)
+            if misfit < self.recipe.resolved or self.settled(law):
+                break
+        return penalised, law
+
+    def along(
+        self, start: TensorBasisNetwork, groups: Sequence[Sequence[int]]
+    ) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+        """Return a law that takes tensors group by group, without a race, as far as that pays."""
+        chosen = np.zeros(N_COEFFICIENTS, bool)
+        law, misfit = start, np.inf
+        penalised = law
+        for group in groups:
+            tensors = chosen.copy()
+            tensors[list(group)] = True
+            trial = self.round(_with_tensors(law, tensors), 0.0, tensors, False, _START_STEPS)
+            trial = self.round(trial, PRIOR_SHARE, tensors, True, self.recipe.steps)
+            polished, reached = trial, self.misfit(trial)
+            if not self.settled(trial):
+                polished = self.polish(trial, reached, tensors)
+            if self.misfit(polished) < misfit:
+                chosen, law, penalised, misfit = tensors, polished, trial, self.misfit(polished)
+                self.taken = [int(t) for t in np.flatnonzero(chosen)]
             if misfit < self.recipe.resolved or self.settled(law):
                 break
         return penalised, law
@@ -328,6 +363,52 @@ def train_default(
     return _finish(session, functions, penalised_functions, True, what)
 
 
+def train_constants(
+    problem: TrainingProblem,
+    key: PRNGKeyArray,
+    linear_relaxation: bool,
+    recipe: DefaultRecipe,
+    base_law: AbstractConstitutiveLaw | None = None,
+) -> Trained:
+    """Return the law of few constants that explains some runs: the recipe's first stage alone."""
+    session = _Session(problem, recipe, None)
+    start = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
+    penalised, law = session.constants(start)
+    return _finish(session, law, penalised, False, "constant coefficients")
+
+
+def train_along(
+    problem: TrainingProblem,
+    key: PRNGKeyArray,
+    found: TensorBasisNetwork,
+    groups: Sequence[Sequence[int]],
+    recipe: DefaultRecipe,
+    progress: Progress | None = None,
+) -> Trained:
+    """Return a law whose tensors are given, from initial weights of its own.
+
+    Parameters
+    ----------
+    problem
+        The training data.
+    key
+        For the initial weights.
+    found
+        A trained law: its invariant scale, base and known relaxation are taken over.
+    groups
+        Tensors, taken group by group while the law has not settled.
+    recipe, progress
+        As in `train_default`.
+    """
+    session = _Session(problem, recipe, progress)
+    assert found.invariant_scale is not None  # a law with varying coefficients has one
+    start = initial_law(
+        key, recipe.width, found.linear_relaxation, found.invariant_scale, found.base
+    )
+    penalised, law = session.along(start, groups)
+    return _finish(session, law, penalised, True, "coefficients that vary with the invariants")
+
+
 def _without_empty_terms(
     law: TensorBasisNetwork, cloud: Cloud, removed_below: float
 ) -> TensorBasisNetwork:
@@ -365,4 +446,6 @@ def _finish(
         misfit,
         varies,
         f"{what}; relative misfit {misfit:.2g}; {end}",
+        tuple(session.taken) if varies else (),
+        tuple(session.passed_over),
     )

@@ -16,6 +16,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
     check_optimiser,
@@ -24,7 +25,7 @@ from discover.learners.tensor_sindy.optimisers import (
 )
 from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.report import covariance_table, path_table, rival_table
+from discover.learners.tensor_sindy.report import path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
 from discover.learners.tensor_sindy.selectors import compare_selectors
@@ -97,6 +98,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         Inner parameters of the library's closed forms.
     uncertainty_ : ParameterUncertainty or None
         Covariance of coefficients and inner parameters; None for an empty law.
+    draws_ : WeighedDraws or None
+        Whether that covariance holds against the data, and what holds instead.
     stability_ : Stability or None
         How often each term is chosen from halves of the data.
     path_ : list of Fit
@@ -230,9 +233,12 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             default_support(self.optimizer, rows * model.design, rows * model.target),
             self.misfit_floor,
         )
-        self.uncertainty_ = None
+        self.uncertainty_, self.draws_ = None, None
         if fit.support:
             self.uncertainty_ = parameter_uncertainty(problem, fit, self.misfit_floor)
+            self.draws_ = draws_of_fit(
+                problem, fit, self.uncertainty_, search.slots, self.random_state or 0
+            )
         self.terms_ = self._terms(search, fit)
         misfits = [misfit for _, misfit in search.history]
         self.result_ = LearnerResult(
@@ -251,7 +257,10 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 "selectors": selectors,
                 "selection_frequency": self._frequencies(library),
                 "rivals": rival_table(search, fit),
-                "covariance": covariance_table(search, fit),
+                "covariance": None
+                if self.uncertainty_ is None
+                else self.uncertainty_.total_covariance.tolist(),
+                "draws": None if self.draws_ is None else self.draws_.to_json(),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
@@ -320,7 +329,10 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         if not fit.support:
             return ()
         assert self.uncertainty_ is not None  # some term was chosen
+        assert self.draws_ is not None
         half_widths = self.uncertainty_.half_widths
+        linear = self.draws_.method == "linear"
+        weighed = self.draws_.intervals if self.draws_.method == "weighed" else None
         model = search.model_at(fit)
         solutions = {
             s.support: s.coefficients
@@ -341,6 +353,11 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         def around(middle: float, half: float) -> tuple[float, float]:
             return middle - float(half), middle + float(half)
 
+        def interval(place: int, middle: float) -> tuple[float, float] | None:
+            if weighed is not None:
+                return float(weighed[place, 0]), float(weighed[place, 1])
+            return around(middle, half_widths[place]) if linear else None
+
         terms = []
         for position, (index, value) in enumerate(zip(fit.support, fit.coefficients, strict=True)):
             term = library.terms[index]
@@ -350,8 +367,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 if (form := library.forms[i]).name == term.closed_form:
                     known = float(fit.inner[i])
                     inner[form.inner_name] = known
-                    inner_ci95[form.inner_name] = around(known, half_widths[place])
-                    if abs(value - 1.0) <= half:
+                    if (limits := interval(place, known)) is not None:
+                        inner_ci95[form.inner_name] = limits
+                    if self.draws_.method != "none" and abs(value - 1.0) <= half:
                         given, halves = self.uncertainty_.given(fitted, position, 1.0)
                         ends = around(float(given[place]), halves[place])
                         at_one[form.inner_name] = (float(given[place]), *ends)
@@ -360,7 +378,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                     term=term.name,
                     coefficient=float(value),
                     coefficient_penalised=float(penalised[index]),
-                    ci95=around(float(value), half),
+                    ci95=interval(position, float(value)),
                     inner=inner,
                     inner_ci95=inner_ci95,
                     inner_at_one=at_one,

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.search import SupportSearch
@@ -82,7 +83,23 @@ def covariance_table(search: SupportSearch, fit: Fit) -> list[list[float]] | Non
     """Return the covariance of a law's coefficients, then its inner parameters; None if empty."""
     if not fit.support:
         return None
+    return parameter_uncertainty(search.problem, fit, search.floor).total_covariance.tolist()
+
+
+def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str, Any]:
+    """Return the covariance of a law's parameters and, where it does not serve, their draws.
+
+    Parameters
+    ----------
+    search
+        The search that made the fit.
+    fit
+        The law.
+    seed
+        Of the draws.
+    """
+    if not fit.support:
+        return {"covariance": None, "draws": None}
     uncertainty = parameter_uncertainty(search.problem, fit, search.floor)
-    # what integration cannot promise counts as one more, independent, error
-    total = uncertainty.covariance + np.diag((uncertainty.numerical / 1.96) ** 2)
-    return total.tolist()
+    draws = draws_of_fit(search.problem, fit, uncertainty, search.slots, seed)
+    return {"covariance": uncertainty.total_covariance.tolist(), "draws": draws.to_json()}

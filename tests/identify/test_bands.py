@@ -1,0 +1,58 @@
+"""Bands from predictions: neither a narrow one of what is left, nor a wide one of nonsense."""
+
+import numpy as np
+from scipy.stats import norm
+
+from discover.identify.bands import bands_of_predictions
+from discover.identify.many_laws import Contender, draws
+
+TIMES = np.linspace(0.0, 1.0, 5)
+N_DRAWS = 40
+
+
+def predictions(lost=0):
+    """The law itself, and draws evenly spaced in probability of a normal with 10 %."""
+    spread = norm(1.0, 0.1).ppf((np.arange(N_DRAWS) + 0.5) / N_DRAWS)
+    rows = np.append(1.0, spread)[:, None, None, None] * np.ones((1, 1, TIMES.size, 3))
+    rows[1 : 1 + lost, 0, 2:] = np.nan
+    return rows
+
+
+def test_the_band_of_draws_is_that_of_their_distribution():
+    (band,) = bands_of_predictions(predictions(), [1 + N_DRAWS], [TIMES])
+    np.testing.assert_allclose(band.high - band.low, 3.92 * 0.1, rtol=0.05)
+    assert band.reason == ""
+
+
+def test_where_one_law_in_seven_runs_away_there_is_no_band():
+    (band,) = bands_of_predictions(predictions(lost=6), [1 + N_DRAWS], [TIMES])
+    assert np.all(np.isnan(band.low))
+    assert np.all(np.isnan(band.rivals_high))
+    assert "run away" in band.reason
+    np.testing.assert_array_equal(band.chosen, 1.0)
+    assert not np.any(np.isfinite(list(band.widths().values())))
+
+
+def test_one_law_in_forty_may_run_away():
+    (band,) = bands_of_predictions(predictions(lost=1), [1 + N_DRAWS], [TIMES])
+    assert np.all(np.isfinite(band.low))
+    assert 0.0 < band.runaways < 0.05
+
+
+def test_a_law_whose_constants_exchange_each_other_has_no_band_rather_than_none_in_width():
+    alone = predictions()[:1]
+    (band,) = bands_of_predictions(alone, [1], [TIMES], "the constants exchange each other")
+    assert np.all(np.isnan(band.high))
+    (exact,) = bands_of_predictions(alone, [1], [TIMES])  # constants that count as exact
+    np.testing.assert_array_equal(exact.high - exact.low, 0.0)
+
+
+def test_weighed_draws_are_taken_for_those_of_the_covariance():
+    kept = np.column_stack([np.linspace(1.0, 2.0, 60), np.linspace(0.1, 0.2, 60)])
+    law = Contender("law", {"sigma": 1.5}, {"epsilon": 0.15}, 1e6 * np.eye(2), kept)
+    chosen, *others = draws(law, 40, np.random.default_rng(0))
+    assert chosen is law
+    assert len(others) == 40
+    assert all(1.0 <= other.terms["sigma"] <= 2.0 for other in others)
+    unknown = Contender("law", {"sigma": 1.5}, {}, 1e6 * np.eye(1), without_band="no band")
+    assert draws(unknown, 40, np.random.default_rng(0)) == (unknown,)
