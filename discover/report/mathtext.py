@@ -10,6 +10,7 @@ from discover.report.plots.style import INK, Picture
 
 _REPLACEMENTS = (
     (r"\mathrel{+}=", r"\,+\!=\,"),
+    (r"\mathrel{-}=", r"\,-\!=\,"),
     (r"\operatorname{tr}", r"\mathrm{tr}\,"),
     (r"\operatorname", r"\mathrm"),
     (r"\tfrac", r"\frac"),
