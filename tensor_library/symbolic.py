@@ -1,12 +1,10 @@
-"""Terms as SymPy expressions and as LaTeX."""
+"""Terms as SymPy expressions over non-commuting tensors."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import sympy
-from sympy.printing.latex import LatexPrinter
 
-if TYPE_CHECKING:
-    from tensor_library.terms import CandidateTerm
+from tensor_library.spelling import Notation
 
 STRESS = sympy.Symbol("sigma", commutative=False)
 RATE = sympy.Symbol("gammadot", commutative=False)
@@ -28,82 +26,45 @@ class Trace(sympy.Function):
         return printer._print_Function(self, func_name="tr")
 
 
-_TENSORS = (
-    UNIT,
-    STRESS,
-    RATE,
-    STRESS**2,
-    RATE**2,
-    STRESS * RATE + RATE * STRESS,
-    STRESS**2 * RATE + RATE * STRESS**2,
-    STRESS * RATE**2 + RATE**2 * STRESS,
-)
-_INVARIANTS: tuple[sympy.Expr, ...] = (  # pyright: ignore[reportAssignmentType]
-    Trace(STRESS),
-    Trace(STRESS**2),
-    Trace(RATE**2),
-    Trace(STRESS**3),
-    Trace(RATE**3),
-    Trace(STRESS**2 * RATE),
-    Trace(STRESS * RATE**2),
-    Trace(STRESS * RATE),
-)
+class SympyNotation(Notation[sympy.Expr]):
+    """Expressions; brackets are the expression tree's own."""
 
+    def tensor(self, name: str) -> sympy.Expr:
+        """Return a non-commuting symbol."""
+        return {"I": UNIT, "sigma": STRESS, "gammadot": RATE}[name]
 
-def _closed_form(name: str) -> sympy.Expr:
-    trace = Trace(STRESS)
-    if name == "exp":
-        return sympy.exp(sympy.Symbol("epsilon") * trace) - 1
-    if name == "saturating":
-        return trace / (1 + sympy.Symbol("kappa") * sympy.Abs(trace))
-    raise ValueError(f"The closed form {name!r} has no symbolic form.")
+    def contraction(self, tensors: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the product in this order."""
+        return sympy.Mul(*tensors)
 
+    def sum(self, summands: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the sum."""
+        return sympy.Add(*summands)
 
-def term_expression(term: "CandidateTerm") -> sympy.Expr:
-    """Return a candidate term as a SymPy expression."""
-    scalar = sympy.Integer(1)
-    if term.closed_form is not None:
-        scalar *= _closed_form(term.closed_form)
-    for invariant, power in zip(_INVARIANTS, term.powers, strict=True):
-        scalar *= sympy.Pow(invariant, power)
-    return scalar * _TENSORS[term.tensor]
+    def trace(self, tensor: sympy.Expr) -> sympy.Expr:
+        """Return the trace, which commutes."""
+        return Trace(tensor)  # pyright: ignore[reportReturnType]
 
+    def power(self, scalar: sympy.Expr, exponent: int) -> sympy.Expr:
+        """Return the power."""
+        return sympy.Pow(scalar, exponent)
 
-class RheologyLatexPrinter(LatexPrinter):
-    """LaTeX with bold tensors and single contractions as centred dots."""
+    def number(self, value: float) -> sympy.Expr:
+        """Return a float."""
+        return sympy.Float(value)
 
-    def _print_Symbol(self, expr, style="plain"):
-        del style
-        special = {
-            STRESS: r"\boldsymbol{\sigma}",
-            RATE: r"\dot{\boldsymbol{\gamma}}",
-            UNIT: r"\boldsymbol{I}",
-        }
-        return special.get(expr) or super()._print_Symbol(expr)
+    def letter(self, name: str) -> sympy.Expr:
+        """Return a symbol."""
+        return sympy.Symbol(name)
 
-    def _print_Pow(self, expr):
-        if expr.base in (STRESS, RATE) and expr.exp.is_Integer:
-            return r" \cdot ".join([self._print(expr.base)] * int(expr.exp))
-        return super()._print_Pow(expr)
+    def exponential(self, rate: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
+        """Return exp(rate · trace) − 1."""
+        return sympy.exp(rate * trace) - 1  # pyright: ignore[reportReturnType]
 
-    def _print_Mul(self, expr):
-        scalars, tensors = expr.args_cnc()
-        if not tensors:
-            return super()._print_Mul(expr)
-        text = r" \cdot ".join(
-            rf"\left({self._print(t)}\right)" if t.is_Add else self._print(t) for t in tensors
-        )
-        scalar = sympy.Mul(*scalars)
-        if scalar == 1:
-            return text
-        if scalar == -1:
-            return "- " + text
-        printed = self._print(scalar)
-        if scalar.is_Add:
-            printed = rf"\left({printed}\right)"
-        return rf"{printed} \, {text}"
+    def saturating(self, level: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
+        """Return trace/(1 + level |trace|)."""
+        return trace / (1 + level * sympy.Abs(trace))
 
-
-def to_latex(expression: sympy.Expr) -> str:
-    """Return an expression over tensors as LaTeX."""
-    return RheologyLatexPrinter().doprint(expression)
+    def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the product."""
+        return sympy.Mul(*factors)

@@ -12,6 +12,8 @@ from tensor_library.algebra import Symmetric
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
 from tensor_library.integrity_basis import TENSOR_NAMES, TENSOR_ORDERS, integrity_basis
 from tensor_library.invariants import INVARIANT_NAMES, INVARIANT_ORDERS, scalar_invariants
+from tensor_library.latex import LatexNotation
+from tensor_library.spelling import spell
 
 if TYPE_CHECKING:
     import sympy
@@ -112,15 +114,13 @@ class CandidateTerm:
 
     def sympy(self) -> "sympy.Expr":
         """Return the term as a SymPy expression with non-commuting tensors."""
-        from tensor_library.symbolic import term_expression
+        from tensor_library.symbolic import SympyNotation
 
-        return term_expression(self)
+        return spell(self, SympyNotation())
 
     def latex(self) -> str:
-        """Return the term as LaTeX."""
-        from tensor_library.symbolic import to_latex
-
-        return to_latex(self.sympy())
+        """Return the term as LaTeX, ready for a coefficient in front: a sum has its brackets."""
+        return spell(self, LatexNotation())
 
 
 def parse_term(name: str) -> CandidateTerm:

@@ -3,6 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from discover.equations import law_terms
+from discover.errors import InputError
+from discover.laws import make_law
+
 
 @dataclass(frozen=True)
 class TrueTerm:
@@ -22,7 +26,7 @@ class TrueTerm:
 def true_terms(
     law: str, parameters: Mapping[str, float], known_relaxation: bool
 ) -> tuple[TrueTerm, ...] | None:
-    """Return what is missing from UCM in a named law; None if the library does not hold it.
+    """Return what is missing from UCM in a named law; None if it is no sum of library terms.
 
     Parameters
     ----------
@@ -30,19 +34,15 @@ def true_terms(
         As in `discover.laws.make_law`.
     known_relaxation
         Whether −σ is known. If not, it is missing too.
+
+    Raises
+    ------
+    InputError
+        If there is no such law, or a parameter is missing or outside its range.
     """
-    found: tuple[TrueTerm, ...]
-    if law == "ucm":
-        found = ()
-    elif law == "johnson_segalman":
-        found = (TrueTerm("sigma.gammadot+gammadot.sigma", parameters["xi"] / 2.0),)
-    elif law == "giesekus":
-        found = (TrueTerm("sigma.sigma", parameters["alpha"]),)
-    elif law == "ptt_linear":
-        found = (TrueTerm("tr(sigma)*sigma", parameters["epsilon"]),)
-    elif law == "ptt_exponential":
-        inner = {"epsilon": parameters["epsilon"]}
-        found = (TrueTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
-    else:
+    known = make_law(law, parameters)
+    try:
+        found = tuple(TrueTerm(t.term, t.coefficient, t.inner) for t in law_terms(known))
+    except InputError:
         return None
     return found if known_relaxation else (TrueTerm("sigma", 1.0), *found)

@@ -6,43 +6,55 @@ serves both.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from discover.equations.equation import Equation, EquationTerm
 from discover.equations.latex import header_lines
+from tensor_library.spelling import Notation, spell
 from tensor_library.terms import parse_term
 
-_TENSORS = (
-    "unit",
-    "s",
-    "d",
-    "s @ s",
-    "d @ d",
-    "s @ d + d @ s",
-    "s @ s @ d + d @ s @ s",
-    "s @ d @ d + d @ d @ s",
-)
-_INVARIANTS = (
-    "s.trace()",
-    "(s @ s).trace()",
-    "(d @ d).trace()",
-    "(s @ s @ s).trace()",
-    "(d @ d @ d).trace()",
-    "(s @ s @ d).trace()",
-    "(s @ d @ d).trace()",
-    "(s @ d).trace()",
-)
+
+class _CodeNotation(Notation[str]):
+    """What the numpy text and the SymPy text share."""
+
+    def tensor(self, name: str) -> str:
+        return {"I": "unit", "sigma": "s", "gammadot": "d"}[name]
+
+    def contraction(self, tensors: Sequence[str]) -> str:
+        return " @ ".join(tensors)
+
+    def sum(self, summands: Sequence[str]) -> str:
+        return f"({' + '.join(summands)})"
+
+    def trace(self, tensor: str) -> str:
+        return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
+
+    def power(self, scalar: str, exponent: int) -> str:
+        return f"{scalar} ** {exponent}"
+
+    def number(self, value: float) -> str:
+        return f"({float(value)!r})" if value < 0 else repr(float(value))
+
+    def letter(self, name: str) -> str:
+        raise ValueError(f"Code needs a number for {name}.")  # every EquationTerm has one
+
+    def exponential(self, rate: str, trace: str) -> str:
+        # the cap is that of tensor_library.closed_forms: beyond it a law is absurd, not infinite
+        return f"np.expm1(min({rate} * {trace}, 60.0))"
+
+    def saturating(self, level: str, trace: str) -> str:
+        return f"({trace} / (1 + {level} * abs({trace})))"
+
+    def product(self, factors: Sequence[str]) -> str:
+        return " * ".join(factors)
 
 
-@dataclass(frozen=True)
-class _Dialect:
-    exponential: str
-    absolute: str
+class _SympyCodeNotation(_CodeNotation):
+    def exponential(self, rate: str, trace: str) -> str:
+        return f"(sympy.exp({rate} * {trace}) - 1)"
 
+    def saturating(self, level: str, trace: str) -> str:
+        return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
 
-# the cap is that of tensor_library.closed_forms: beyond it a law is absurd, not infinite
-_NUMPY = _Dialect("np.expm1(min({}, 60.0))", "abs({})")
-_SYMPY = _Dialect("(sympy.exp({}) - 1)", "sympy.Abs({})")
 
 _NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.
 
@@ -162,7 +174,7 @@ def numpy_code(equation: Equation) -> str:
         time=_numbers(equation.relaxation_time),
         solvent=repr(float(equation.solvent_viscosity)),
         tested=_tested(equation),
-        extra=_sum(equation.terms, _NUMPY, "np.zeros((3, 3))"),
+        extra=_sum(equation.terms, _CodeNotation(), "np.zeros((3, 3))"),
     )
 
 
@@ -175,34 +187,15 @@ def sympy_code(equation: Equation) -> str:
         modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
         solvent=repr(float(equation.solvent_viscosity)),
         tested=_tested(equation),
-        extra=_sum(equation.terms, _SYMPY, "sympy.zeros(3, 3)"),
+        extra=_sum(equation.terms, _SympyCodeNotation(), "sympy.zeros(3, 3)"),
     )
 
 
-def _sum(terms: Sequence[EquationTerm], dialect: _Dialect, nothing: str) -> str:
+def _sum(terms: Sequence[EquationTerm], notation: _CodeNotation, nothing: str) -> str:
     if not terms:
         return nothing
-    lines = [f"{float(t.coefficient)!r} * {_product(t, dialect)}" for t in terms]
+    lines = [spell(parse_term(t.term), notation, t.coefficient, t.inner) for t in terms]
     return "(\n        " + "\n        + ".join(lines) + "\n    )"
-
-
-def _product(term: EquationTerm, dialect: _Dialect) -> str:
-    parsed = parse_term(term.term)
-    factors = []
-    if parsed.form is not None:
-        inner = term.inner.get(parsed.form.inner_name, parsed.form.inner_default)
-        trace = _INVARIANTS[0]
-        if parsed.closed_form == "exp":
-            factors.append(dialect.exponential.format(f"{float(inner)!r} * {trace}"))
-        elif parsed.closed_form == "saturating":
-            size = dialect.absolute.format(trace)
-            factors.append(f"({trace} / (1 + {float(inner)!r} * {size}))")
-        else:
-            raise ValueError(f"The closed form {parsed.closed_form!r} cannot be written as code.")
-    for invariant, power in zip(_INVARIANTS, parsed.powers, strict=True):
-        if power:
-            factors.append(invariant if power == 1 else f"{invariant} ** {power}")
-    return " * ".join([*factors, f"({_TENSORS[parsed.tensor]})"])
 
 
 def _numbers(values: Sequence[float]) -> str:

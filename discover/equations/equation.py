@@ -50,9 +50,15 @@ class EquationTerm:
     coefficient
         c, dimensionless.
     inner
-        Inner parameters by name.
+        Inner parameters by name; the form's default is put in where one is missing, so that every
+        format writes the same number.
     ci95
         95 % interval of c, or None where c was declared or the interval not computed.
+
+    Raises
+    ------
+    ValueError
+        If the spelling is not canonical, or the term has no such inner parameter.
     """
 
     term: str
@@ -61,7 +67,16 @@ class EquationTerm:
     ci95: Interval | None = None
 
     def __post_init__(self):
-        parse_term(self.term)  # a spelling that nobody could write out again is refused here
+        # what nobody could write out again is refused here
+        form = parse_term(self.term).form
+        values = {} if form is None else {form.inner_name: form.inner_default}
+        unknown = [name for name in self.inner if name not in values]
+        if unknown:
+            raise ValueError(
+                f"The term {self.term!r} has no inner parameter {unknown[0]!r}; it has "
+                f"{', '.join(values) or 'none'}."
+            )
+        object.__setattr__(self, "inner", values | dict(self.inner))
 
 
 @dataclass(frozen=True)

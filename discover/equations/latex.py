@@ -3,18 +3,14 @@
 from collections.abc import Sequence
 
 from discover.equations.equation import Equation, TermLike
+from tensor_library.latex import LatexNotation, latex_number
+from tensor_library.spelling import spell
 from tensor_library.terms import parse_term
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
 % The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
 """
 """First lines of a file with laws."""
-
-
-def latex_number(value: float, digits: int = 5) -> str:
-    """Return the size of a number as LaTeX, powers of ten typeset."""
-    mantissa, _, exponent = f"{abs(value):.{digits}g}".partition("e")
-    return mantissa + (rf" \times 10^{{{int(exponent)}}}" if exponent else "")
 
 
 def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 5) -> str:
@@ -32,17 +28,16 @@ def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 
     text = r"\overset{\nabla}{\boldsymbol{\sigma}} = \dot{\boldsymbol{\gamma}}"
     if linear_relaxation:
         text += r" - \boldsymbol{\sigma}"
-    seen: dict[str, float] = {}
+    notation = LatexNotation(digits)
+    letters: dict[str, float] = {}
     for term in terms:
+        # a letter has one value in an equation; where it has another, that number stands itself
+        other = {
+            n: value for n, value in term.inner.items() if letters.setdefault(n, value) != value
+        }
         sign = "-" if term.coefficient >= 0 else "+"
-        text += rf" {sign} {latex_number(term.coefficient, digits)} \, "
-        latex = parse_term(term.term).latex()
-        for name, value in term.inner.items():
-            # a second value of the same parameter stands where the letter would mislead
-            if seen.setdefault(name, value) != value:
-                latex = latex.replace(rf"\{name}", latex_number(value, digits))
-        text += latex
-    for name, value in seen.items():
+        text += f" {sign} {spell(parse_term(term.term), notation, abs(term.coefficient), other)}"
+    for name, value in letters.items():
         text += rf", \qquad \{name} = {latex_number(value, digits)}"
     return text
 

@@ -1,104 +1,115 @@
 """Terms of a law as MathML, which browsers typeset without any script."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from discover.equations.equation import TermLike
-from tensor_library.terms import CandidateTerm, parse_term
+from tensor_library.spelling import Notation, spell
+from tensor_library.terms import parse_term
 
-_SIGMA = '<mi mathvariant="normal" style="font-weight:bold">σ</mi>'
+_BOLD = '<mi mathvariant="normal" style="font-weight:bold">{}</mi>'
 # the combining dot sits well in every font, an accent over a letter only in mathematical ones
-_RATE = '<mi mathvariant="normal" style="font-weight:bold">γ̇</mi>'
-_UNIT = '<mi mathvariant="normal" style="font-weight:bold">I</mi>'
-_DOT = "<mo>·</mo>"
-_TRACE = '<mi mathvariant="normal">tr</mi><mo>&#x2061;</mo>'
+_TENSORS = {"I": _BOLD.format("I"), "sigma": _BOLD.format("σ"), "gammadot": _BOLD.format("γ̇")}
+_LETTERS = {"epsilon": "ε", "kappa": "κ"}
+_APPLIED = "<mo>&#x2061;</mo>"
+_SPACE = "<mspace width='0.15em'/>"
 
 
-def _product(*factors: str) -> str:
-    return _DOT.join(factors)
+def number(value: float) -> str:
+    """Return a number as MathML, four digits, powers of ten where it is very small or large."""
+    text = f"{value:.4g}"
+    minus = "<mo>−</mo>" if text.startswith("-") else ""
+    mantissa, _, exponent = text.lstrip("-").partition("e")
+    body = f"{minus}<mn>{mantissa}</mn>"
+    if exponent:
+        ten, sign = int(exponent), "<mo>−</mo>" if int(exponent) < 0 else ""
+        body += f"<mo>×</mo><msup><mn>10</mn><mrow>{sign}<mn>{abs(ten)}</mn></mrow></msup>"
+    return body
+
+
+class MathmlNotation(Notation[str]):
+    """Presentation MathML, without `math` element."""
+
+    def tensor(self, name: str) -> str:
+        """Return a bold letter."""
+        return _TENSORS[name]
+
+    def contraction(self, tensors: Sequence[str]) -> str:
+        """Return the tensors with dots between them."""
+        return "<mo>·</mo>".join(tensors)
+
+    def sum(self, summands: Sequence[str]) -> str:
+        """Return the bracketed sum."""
+        return _bracketed("<mo>+</mo>".join(summands))
+
+    def trace(self, tensor: str) -> str:
+        """Return tr of the bracketed contraction."""
+        return f'<mi mathvariant="normal">tr</mi>{_APPLIED}{_bracketed(tensor)}'
+
+    def power(self, scalar: str, exponent: int) -> str:
+        """Return the bracketed trace and its exponent: tr(σ)² could be taken for tr(σ²)."""
+        return f"<msup>{_bracketed(scalar)}<mn>{exponent}</mn></msup>"
+
+    def number(self, value: float) -> str:
+        """Return a number, bracketed if negative."""
+        return _bracketed(number(value)) if value < 0 else number(value)
+
+    def letter(self, name: str) -> str:
+        """Return a Greek letter."""
+        return f"<mi>{_LETTERS[name]}</mi>"
+
+    def exponential(self, rate: str, trace: str) -> str:
+        """Return the bracketed exponential minus one."""
+        exponential = _bracketed(f"{rate}{_SPACE}{trace}")
+        return _bracketed(
+            f'<mi mathvariant="normal">exp</mi>{_APPLIED}{exponential}<mo>−</mo><mn>1</mn>'
+        )
+
+    def saturating(self, level: str, trace: str) -> str:
+        """Return a fraction."""
+        size = f"<mrow><mo>|</mo>{trace}<mo>|</mo></mrow>"
+        below = f"<mn>1</mn><mo>+</mo>{level}{_SPACE}{size}"
+        return f"<mfrac><mrow>{trace}</mrow><mrow>{below}</mrow></mfrac>"
+
+    def product(self, factors: Sequence[str]) -> str:
+        """Return the factors with thin spaces between them."""
+        return f"<mrow>{_SPACE.join(factors)}</mrow>"
 
 
 def _bracketed(content: str) -> str:
     return f"<mrow><mo>(</mo>{content}<mo>)</mo></mrow>"
 
 
-_TENSORS = (
-    _UNIT,
-    _SIGMA,
-    _RATE,
-    _product(_SIGMA, _SIGMA),
-    _product(_RATE, _RATE),
-    _bracketed(f"{_product(_SIGMA, _RATE)}<mo>+</mo>{_product(_RATE, _SIGMA)}"),
-    _bracketed(f"{_product(_SIGMA, _SIGMA, _RATE)}<mo>+</mo>{_product(_RATE, _SIGMA, _SIGMA)}"),
-    _bracketed(f"{_product(_SIGMA, _RATE, _RATE)}<mo>+</mo>{_product(_RATE, _RATE, _SIGMA)}"),
-)
-_INVARIANTS = tuple(
-    _TRACE + _bracketed(_product(*factors))
-    for factors in (
-        (_SIGMA,),
-        (_SIGMA, _SIGMA),
-        (_RATE, _RATE),
-        (_SIGMA, _SIGMA, _SIGMA),
-        (_RATE, _RATE, _RATE),
-        (_SIGMA, _SIGMA, _RATE),
-        (_SIGMA, _RATE, _RATE),
-        (_SIGMA, _RATE),
-    )
-)
+def term_mathml(
+    name: str, inner: Mapping[str, float] | None = None, coefficient: float | None = None
+) -> str:
+    """Return a term by its canonical spelling, without `math` element.
+
+    Parameters
+    ----------
+    name
+        Canonical spelling.
+    inner
+        Inner parameters by name; one that is missing stays a letter.
+    coefficient
+        Number in front.
+    """
+    return spell(parse_term(name), MathmlNotation(), coefficient, inner)
 
 
-def number(value: float) -> str:
-    """Return a number as MathML, four digits, powers of ten where it is very small or large."""
-    text = f"{abs(value):.4g}"
-    mantissa, _, exponent = text.partition("e")
-    body = f"<mn>{mantissa}</mn>"
-    if exponent:
-        body += f"<mo>×</mo><msup><mn>10</mn><mn>{int(exponent)}</mn></msup>"
-    return body
-
-
-def term_mathml(name: str, inner: dict[str, float] | None = None) -> str:
-    """Return a term by its canonical spelling, without `math` element."""
-    term: CandidateTerm = parse_term(name)
-    inner = inner or {}
-    parts = []
-    if term.closed_form == "exp":
-        value = inner.get("epsilon")
-        rate = "<mi>ε</mi>" if value is None else number(value)
-        parts.append(
-            _bracketed(
-                f'<mi mathvariant="normal">exp</mi>{_bracketed(rate + _INVARIANTS[0])}'
-                "<mo>−</mo><mn>1</mn>"
-            )
-        )
-    elif term.closed_form == "saturating":
-        value = inner.get("kappa")
-        level = "<mi>κ</mi>" if value is None else number(value)
-        parts.append(
-            f"<mfrac><mrow>{_INVARIANTS[0]}</mrow><mrow><mn>1</mn><mo>+</mo>{level}<mo>|</mo>"
-            f"{_INVARIANTS[0]}<mo>|</mo></mrow></mfrac>"
-        )
-    for invariant, power in zip(_INVARIANTS, term.powers, strict=True):
-        if power == 1:
-            parts.append(invariant)
-        elif power:
-            parts.append(f"<msup><mrow>{invariant}</mrow><mn>{power}</mn></msup>")
-    parts.append(_TENSORS[term.tensor])
-    return "<mrow>" + "<mspace width='0.15em'/>".join(parts) + "</mrow>"
-
-
-def term_element(name: str, inner: dict[str, float] | None = None) -> str:
+def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
     """Return a term as a `math` element."""
     return f"<math>{term_mathml(name, inner)}</math>"
 
 
 def law_element(terms: Sequence[TermLike], linear_relaxation: bool) -> str:
     """Return the whole dimensionless law as a displayed `math` element."""
-    convected = f"<mover><mrow>{_SIGMA}</mrow><mo style='font-size:70%'>▽</mo></mover>"
-    right = f"<mo>=</mo>{_RATE}"
-    if linear_relaxation:
-        right += f"<mo>−</mo>{_SIGMA}"
-    for term in terms:
-        sign = "−" if term.coefficient >= 0 else "+"
-        size = number(term.coefficient) + "<mspace width='0.15em'/>"
-        right += f"<mo>{sign}</mo>{size}{term_mathml(term.term, dict(term.inner))}"
+    stress, rate = _TENSORS["sigma"], _TENSORS["gammadot"]
+    convected = f"<mover><mrow>{stress}</mrow><mo style='font-size:70%'>▽</mo></mover>"
+    relaxation = f"<mo>−</mo>{stress}" if linear_relaxation else ""
+    extra = "".join(
+        f"<mo>{'−' if t.coefficient >= 0 else '+'}</mo>"
+        + term_mathml(t.term, t.inner, abs(t.coefficient))
+        for t in terms
+    )
+    right = f"<mo>=</mo>{rate}{relaxation}{extra}"
     return f'<math display="block"><mrow>{convected}{right}</mrow></math>'

@@ -196,7 +196,8 @@ def extension_factor(limit: float | None) -> float:
 
 def _ptt(function: str, epsilon: float, found: dict[str, float], drive: float, relax: float):
     zeta = _within(2.0 * found.get(_SLIP, 0.0), 0.0, 2.0, _SLIP, "the slip parameter zeta")
-    epsilon = _within(epsilon, 0.0, float("inf"), "sigma times tr(sigma)", "epsilon")
+    term = _LINEAR if function == "linear" else EXPONENTIAL
+    epsilon = _within(epsilon, 0.0, float("inf"), term, "epsilon")
     options = {"destructionFunctionType": function}
     return RheoToolModel("PTT", options, {"epsilon": epsilon, "zeta": zeta}, drive, relax)
 

@@ -87,7 +87,7 @@ def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
     parts = []
     for i, (term, value, inner) in enumerate(terms):
         sign = "<mo>−</mo>" if value < 0 else "<mo>+</mo>" if i else ""
-        parts.append(f"{sign}{number(value)}<mspace width='0.15em'/>{_term(term, inner)}")
+        parts.append(f"{sign}{_term(term, inner, abs(value))}")
     return f"<math><mrow>{''.join(parts)}</mrow></math>" if parts else "no term"
 
 
@@ -97,8 +97,11 @@ def _support(terms: Sequence[str] | None) -> str:
     return "<br>".join(f"<math>{_term(term)}</math>" for term in terms) or "no term"
 
 
-def _term(name: str, inner: Mapping[str, float] | None = None) -> str:
+def _term(
+    name: str, inner: Mapping[str, float] | None = None, coefficient: float | None = None
+) -> str:
     try:
-        return term_mathml(name, dict(inner or {}))
+        return term_mathml(name, inner, coefficient)
     except ValueError:  # a file that somebody edited
-        return f"<mtext>{html.escape(name[:200])}</mtext>"
+        factor = "" if coefficient is None else number(coefficient)
+        return f"{factor}<mtext>{html.escape(name[:200])}</mtext>"

@@ -315,8 +315,7 @@ def physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
 def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
     sum_of_terms = "".join(
-        f"<mo>{'−' if value < 0 else '+'}</mo><mn>{abs(value):.3g}</mn>"
-        f"<mspace width='0.15em'/>{term_mathml(name, dict(rival.inner))}"
+        f"<mo>{'−' if value < 0 else '+'}</mo>{term_mathml(name, rival.inner, abs(value))}"
         for name, value in rival.terms.items()
     ).removeprefix("<mo>+</mo>")
     place = rival.separated_by

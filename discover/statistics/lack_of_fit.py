@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from discover.statistics.dead_records import holds_signal
 from discover.statistics.outliers import stray
 from discover.statistics.residual import (
     STRUCTURE,
@@ -14,7 +15,6 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
-from discover.statistics.dead_records import holds_signal
 from discover.statistics.whiteness import noise_probability
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]

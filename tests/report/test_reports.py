@@ -16,6 +16,7 @@ from discover.comparison import compare
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.effects import library_effects, named_effects
+from discover.effects.library_term import library_term
 from discover.equations.mathml import law_element, term_element
 from discover.identify.bands import PredictionBand
 from discover.laws import Fluid, make_law
@@ -43,6 +44,7 @@ from discover.report.wording import (
 )
 from discover.study import RunFolder, parse_study
 from tensor_library.library import build_library
+from tensor_library.terms import parse_term
 
 
 def trained(learner, study, model, runs, seed=0, progress=None):
@@ -329,6 +331,14 @@ def test_every_term_typesets_as_well_formed_mathml():
 def test_file_names_stay_in_the_folder():
     assert "/" not in safe_name("../../etc/passwd")
     assert safe_name("flow_laos_3_1.5") == "flow_laos_3_1.5"
+
+
+def test_every_formula_of_the_effects_is_set_and_never_shown_as_source():
+    named = named_effects().values()
+    effects = [*named, library_term(parse_term("tr(sigma)^2*(sigma.gammadot+gammadot.sigma)"))]
+    for effect in effects:
+        for latex in (effect.equation, *(p.symbol for p in effect.parameters)):
+            assert formula(latex, "f").startswith("<svg"), f"{effect.name}: {latex}"
 
 
 def test_a_formula_that_cannot_be_set_is_shown_as_text():

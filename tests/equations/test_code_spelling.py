@@ -1,0 +1,175 @@
+"""What Python text, SymPy, JSON and rheoTool say, each evaluated by what would run it."""
+
+import ast
+import json
+
+import numpy as np
+import pytest
+import sympy
+from spelled_laws import BOTH_SIGNS, LIBRARY, STATES, agree, sum_of
+
+from discover.equations import Equation, EquationTerm, equation_from_json, write_equation
+from discover.errors import InputError
+from tensor_library.symbolic import RATE, STRESS, UNIT, Trace
+
+every_law = pytest.mark.parametrize("name", BOTH_SIGNS)
+
+
+@every_law
+def test_the_python_text_of_every_term_law_and_effect_says_it(name):
+    spelled = BOTH_SIGNS[name]
+    module = {}
+    exec(write_equation(spelled.equation, "python"), module)
+    assert agree([module["extra_term"](*state) for state in STATES], spelled.extra)
+
+
+@every_law
+def test_the_sympy_text_of_every_term_law_and_effect_says_it(name):
+    spelled = BOTH_SIGNS[name]
+    body = ast.parse(write_equation(spelled.equation, "sympy")).body
+    wanted = "extra_term"
+    assigned = [n for n in body if isinstance(n, ast.Assign) and n.targets[0].id == wanted]
+    code = compile(ast.Expression(assigned[0].value), "law", "eval")
+    found = []
+    for stress, rate in STATES:
+        s, d = sympy.Matrix(stress), sympy.Matrix(rate)
+        names = {"sympy": sympy, "unit": sympy.eye(3), "s": s, "d": d}
+        found.append(eval(code, names).evalf())
+    assert agree(found, spelled.extra)
+
+
+@every_law
+def test_the_sympy_expression_of_every_term_law_and_effect_says_it(name):
+    spelled = BOTH_SIGNS[name]
+    expression = spelled.equation.sympy()
+    found = []
+    for stress, rate in STATES:
+        letters = {STRESS: stress, RATE: rate, UNIT: np.eye(3)}
+        found.append(_value(expression, letters) + np.zeros((3, 3)))
+    assert agree(found, spelled.extra)
+
+
+def _value(expression, letters):
+    if expression in letters:
+        return letters[expression]
+    if expression.is_number:
+        return float(expression)
+    parts = [_value(part, letters) for part in expression.args]
+    if expression.is_Add:
+        return sum(parts)
+    if expression.is_Mul:
+        product = parts[0]
+        for part in parts[1:]:
+            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
+        return product
+    if expression.is_Pow:
+        base, exponent = parts
+        return np.linalg.matrix_power(base, int(exponent)) if np.ndim(base) else base**exponent
+    return {Trace: np.trace, sympy.exp: np.exp, sympy.Abs: abs}[expression.func](*parts)
+
+
+@every_law
+def test_the_json_of_every_term_law_and_effect_says_it(name):
+    """By the canonical spelling itself, read with the precedence of Python."""
+    spelled = BOTH_SIGNS[name]
+    content = json.loads(write_equation(spelled.equation, "json"))
+    found = []
+    for stress, rate in STATES:
+        names = {"sigma": stress, "gammadot": rate, "I": np.eye(3)}
+        functions = {"tr": np.trace, "exp": np.exp, "abs": abs}
+        total = np.zeros((3, 3))
+        for term in content["terms"]:
+            text = term["term"].replace(".", " @ ").replace("^", "**")
+            total = total + term["coefficient"] * eval(text, functions | names | term["inner"])
+        found.append(total)
+    assert agree(found, spelled.extra)
+    assert equation_from_json(content) == spelled.equation
+
+
+def _physical_rate(equation, stress, gradient):
+    """dτ/dt beside the convected terms, in Pa/s, of a one-mode equation without solvent."""
+    (modulus,), (time,) = equation.modulus, equation.relaxation_time
+    s, d = stress / modulus, time * (gradient + gradient.T)
+    extra = np.zeros((3, 3))
+    for term in equation.terms:
+        text = term.term.replace(".", " @ ").replace("^", "**")
+        names = {"sigma": s, "gammadot": d, "I": np.eye(3), "tr": np.trace, "exp": np.exp}
+        extra = extra + term.coefficient * eval(text, names | term.inner)
+    return modulus / time * (d - s - extra)
+
+
+def _rheotool_rate(text, stress, gradient):
+    """The same by Oldroyd_B.C, Giesekus.C and PTT.C of rheoTool, from the numbers in the file."""
+    lines = (line.split() for line in text.splitlines() if line.strip().endswith(";"))
+    entries = {line[0]: line[-1].rstrip(";") for line in lines}
+    kind = entries["type"]
+    eta, time = float(entries["etaP"]), float(entries["lambda"])
+    twice = gradient + gradient.T
+    change = eta / time * twice
+    if kind == "PTT":
+        zeta, epsilon = float(entries["zeta"]), float(entries["epsilon"])
+        z = epsilon * time / eta * np.trace(stress)
+        linear = entries["destructionFunctionType"] == "linear"
+        change = change - 0.5 * zeta * (stress @ twice + twice @ stress)
+        return change - (1.0 + z if linear else np.exp(z)) * stress / time
+    if kind == "Giesekus":
+        change = change - float(entries["alpha"]) / eta * stress @ stress
+    else:
+        assert kind == "Oldroyd-B"
+    return change - stress / time
+
+
+TAKEN = {
+    "sigma": (0.2, -0.2),
+    "gammadot": (0.2, -0.2),
+    "sigma.sigma": (0.2,),
+    "sigma.gammadot+gammadot.sigma": (0.2,),
+    "tr(sigma)*sigma": (0.2,),
+    "(exp(epsilon*tr(sigma))-1)*sigma": (1.0,),
+}
+
+
+def test_rheotool_takes_a_term_as_it_is_or_refuses_it_by_name():
+    """Every term of the library alone, with either sign."""
+    for index, name in enumerate(LIBRARY.names):
+        size = 1.0 if name.startswith("(exp") else 0.2
+        for coefficient in (size, -size):
+            terms = sum_of([index], [coefficient]).equation.terms
+            equation = Equation(terms, (7.0,), (0.4,))
+            if coefficient not in TAKEN.get(name, ()):
+                with pytest.raises(InputError) as refusal:
+                    write_equation(equation, "rheotool")
+                assert name in str(refusal.value)
+                continue
+            text = write_equation(equation, "rheotool")
+            for stress, rate in STATES:
+                state = (7.0 * stress, 0.5 * rate / 0.4)
+                wanted = _physical_rate(equation, *state)
+                assert agree(_rheotool_rate(text, *state), wanted), name
+
+
+_SLIP = EquationTerm("sigma.gammadot+gammadot.sigma", 0.1)
+_EXPONENTIAL = EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3})
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (_SLIP, EquationTerm("tr(sigma)*sigma", 0.3)),
+        (_SLIP, _EXPONENTIAL),
+        (_SLIP, _EXPONENTIAL, EquationTerm("gammadot", 0.3)),
+        (
+            EquationTerm("sigma", 0.5),
+            EquationTerm("sigma.sigma", 0.3),
+            EquationTerm("gammadot", 0.3),
+        ),
+        (EquationTerm("sigma", 0.5), EquationTerm("tr(sigma)*sigma", 0.3), _SLIP),
+    ],
+    ids=lambda terms: " and ".join(t.term for t in terms),
+)
+def test_rheotool_takes_these_terms_together(terms):
+    equation = Equation(terms, (7.0,), (0.4,))
+    text = write_equation(equation, "rheotool")
+    for stress, rate in STATES:
+        wanted = _physical_rate(equation, 7.0 * stress, rate)
+        assert agree(_rheotool_rate(text, 7.0 * stress, rate), wanted)

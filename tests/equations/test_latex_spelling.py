@@ -1,0 +1,173 @@
+"""What LaTeX says, by SymPy's reader of LaTeX: its brackets, its precedence."""
+
+import functools
+from types import SimpleNamespace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import sympy
+from spelled_laws import EFFECTS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
+from sympy.parsing.latex import parse_latex
+
+from discover.comparison.comparison import Comparison
+from discover.equations import Equation, EquationTerm, write_equation
+from discover.report.equations import equations_tex
+from tensor_library.terms import CandidateTerm, parse_term
+
+# The reader knows letters and functions of one letter; \left and \right only size a bracket.
+_WORDS = (
+    (r"\dot{\boldsymbol{\gamma}}", r"\gamma"),
+    (r"\boldsymbol{\sigma}", r"\sigma"),
+    (r"\boldsymbol{I}", "I"),
+    (r"\operatorname{tr}", "T"),
+    (r"\left", ""),
+    (r"\right", ""),
+)
+
+
+@functools.cache
+def read(latex):
+    """Return the tree that SymPy reads; the arguments of its products stand as written."""
+    for old, new in _WORDS:
+        latex = latex.replace(old, new)
+    return parse_latex(latex, strict=True)
+
+
+def value(tree, letters):
+    """Evaluate a tree, with matrices for the tensors."""
+    if tree.is_Symbol:
+        return letters[tree.name]
+    if tree.is_number:
+        return float(tree)
+    parts = [value(part, letters) for part in tree.args]
+    if tree.is_Add:
+        assert len({np.shape(part) for part in parts}) == 1, f"scalar plus tensor in {tree}"
+        return sum(parts)
+    if tree.is_Mul:
+        product = parts[0]
+        for part in parts[1:]:
+            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
+        return product
+    if tree.is_Pow:
+        assert np.ndim(parts[0]) == np.ndim(parts[1]) == 0, f"power of a tensor in {tree}"
+        return parts[0] ** parts[1]
+    if isinstance(tree, sympy.Abs):
+        return abs(parts[0])
+    assert tree.func.__name__ == "T", f"unknown function {tree}"
+    return np.trace(parts[0])
+
+
+def extra_by_latex(law, letters=()):
+    """Return h at every state from the right-hand side γ̇ − σ − h."""
+    left, _, right = law.partition(" = ")
+    assert left == r"\overset{\nabla}{\boldsymbol{\sigma}}"
+    right, *assigned = right.split(r", \qquad ")
+    inner = {e.lhs.name: float(e.rhs) for e in map(read, assigned)} | dict(letters)
+    found = []
+    for stress, rate in STATES:
+        letters = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **inner}
+        found.append(rate - stress - value(read(right), letters))
+    return np.array(found)
+
+
+def law_line(equation):
+    text = write_equation(equation, "latex")
+    return text.split("\\begin{equation}\n  ")[1].split("\n\\end{equation}")[0]
+
+
+# Every tensor with every multiplier of degree 0 and 1 and with every closed form. Of degree 2,
+# where reading all would take a minute, every multiplier with one tensor in turn; that the others
+# are the same pieces is the test below.
+READ = {name: s for name, s in LIBRARY_LAWS.items() if parse_term(name).degree < 2}
+DEGREE_TWO = [i for i, term in enumerate(LIBRARY.terms) if term.degree == 2]
+IN_TURN = [i for k, i in enumerate(DEGREE_TWO) if i % 8 == (k // 8) % 8]
+
+
+@pytest.mark.parametrize("name", READ)
+def test_the_latex_of_every_library_term_says_the_term(name):
+    spelled = READ[name]
+    text = law_line(spelled.equation)
+    assert agree(extra_by_latex(text), spelled.extra)
+    assert spelled.equation.latex() == text  # three digits: .latex() rounds nothing either
+    if parse_term(name).degree == 0:
+        assert agree(extra_by_latex(law_line(spelled.flipped.equation)), -spelled.extra)
+
+
+@pytest.mark.parametrize("half", [0, 1])
+def test_the_latex_of_degree_two_says_the_terms(half):
+    chosen = IN_TURN[half::2]
+    assert len({LIBRARY.terms[i].powers for i in IN_TURN}) == len(IN_TURN) == len(DEGREE_TWO) / 8
+    spelled = sum_of(chosen, [0.2 * (-1) ** k for k in range(len(chosen))])
+    assert agree(extra_by_latex(law_line(spelled.equation)), spelled.extra)
+
+
+def test_every_term_of_degree_two_is_made_of_pieces_that_were_read():
+    tensors = {i: CandidateTerm(i).latex() for i in range(8)}
+    for term in LIBRARY.terms:
+        if term.degree == 2:
+            multiplier = CandidateTerm(0, term.powers).latex().removesuffix(tensors[0])
+            assert term.latex() == multiplier + tensors[term.tensor]
+
+
+@pytest.mark.parametrize("name", NAMED_LAWS)
+def test_the_latex_of_laws_and_effects_says_the_law(name):
+    spelled = NAMED_LAWS[name]
+    assert agree(extra_by_latex(law_line(spelled.equation)), spelled.extra, 1e-8)  # nine digits
+    if any("+" in t.term for t in spelled.equation.terms):
+        assert agree(extra_by_latex(law_line(spelled.flipped.equation)), -spelled.extra, 1e-8)
+
+
+def test_a_sum_without_its_brackets_is_another_law():
+    """Negative control: what was written before."""
+    spelled = sum_of([5], [0.2])
+    right = law_line(spelled.equation)
+    wrong = right.replace(r"\left(", "").replace(r"\right)", "")
+    assert agree(extra_by_latex(right), spelled.extra)
+    assert not agree(extra_by_latex(wrong), spelled.extra, 0.1)
+
+
+def test_a_second_value_and_a_negative_value_of_an_inner_parameter_are_read_back():
+    name = "(exp(epsilon*tr(sigma))-1)*sigma"
+    for first, second in ((0.3, -0.2), (-0.2, 0.3), (2e-5, -3e-5)):
+        terms = [EquationTerm(name, 1.0, {"epsilon": e}) for e in (first, second)]
+        wanted = [
+            (np.expm1(first * np.trace(s)) + np.expm1(second * np.trace(s))) * s for s, _ in STATES
+        ]
+        assert agree(extra_by_latex(law_line(Equation(tuple(terms)))), np.array(wanted))
+
+
+def test_an_inner_parameter_that_nobody_gave_is_written_as_the_number_in_use():
+    term = EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0)
+    wanted = np.array([np.expm1(0.25 * np.trace(s)) * s for s, _ in STATES])
+    assert agree(extra_by_latex(law_line(Equation((term,)))), wanted)
+    with pytest.raises(ValueError, match="no inner parameter 'kappa'"):
+        EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"kappa": 0.1})
+
+
+def test_equations_tex_writes_what_latex_writes():
+    spelled = sum_of([5, 6], [0.2, -0.3])
+    outcome = SimpleNamespace(terms=spelled.equation.terms)
+    comparison = object.__new__(Comparison)  # of a comparison only this is written
+    object.__setattr__(comparison, "outcomes", {"tensor_sindy": outcome})
+    text = equations_tex(comparison, True)
+    assert spelled.equation.latex() in text
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_the_equation_of_an_effect_in_the_reference_says_what_it_adds(effect):
+    values = [0.17, 0.4][: len(effect.parameters)]
+    if effect.as_terms(values) is None:
+        pytest.skip("no sum of library terms")
+    right = effect.equation.partition(r"\mathrel{+}=")[2].partition(r",\quad")[0]
+    letters = {p.symbol.lstrip("\\"): v for p, v in zip(effect.parameters, values, strict=True)}
+    for old, new in (
+        (r"\mathrm{tr}\,\sigma", r"\operatorname{tr}(\sigma)"),
+        (r"\mathrm{tr}", r"\operatorname{tr}"),
+        (r"\dot\gamma", r"\gamma"),
+    ):
+        right = right.replace(old, new)
+    for stress, rate in STATES:
+        known = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **letters}
+        wanted = effect.extra_term(jnp.array(values), jnp.asarray(stress), jnp.asarray(rate))
+        assert agree(value(read(right), known), np.asarray(wanted))
