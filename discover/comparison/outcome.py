@@ -35,6 +35,8 @@ class LearnerOutcome(TermTables):
         By the key of the flow; None where the law runs away.
     physics
         Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
+    resolution
+        Relative misfit of the training runs that arithmetic may leave.
     """
 
     learner: str
@@ -45,6 +47,7 @@ class LearnerOutcome(TermTables):
     message: str = ""
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
+    resolution: float = 0.0
 
     @classmethod
     def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
@@ -73,6 +76,7 @@ class LearnerOutcome(TermTables):
                 for name, p in self.predictions.items()
             },
             "physics": plain(self.physics),
+            "resolution": self.resolution,
         }
 
     @classmethod
@@ -103,6 +107,7 @@ class LearnerOutcome(TermTables):
             state["message"],
             predictions,
             state.get("physics"),
+            float(state.get("resolution", 0.0)),
         )
 
 

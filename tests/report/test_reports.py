@@ -21,6 +21,7 @@ from discover.laws import Fluid, make_law
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import safe_name, write_comparison
 from discover.report.comparison_tables import error_rows
+from discover.report.comparison_verdict import comparison_verdict
 from discover.report.mathtext import formula
 from discover.report.palette import style_sheet
 from discover.report.plots.flows import curves, flow_picture, training_picture
@@ -33,7 +34,7 @@ from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.selection import selection_picture
 from discover.report.plots.studies import third_harmonic
 from discover.report.plots.style import SPARSE
-from discover.report.verdicts import QUESTIONS, comparison_verdict
+from discover.report.verdicts import QUESTIONS
 from discover.report.wording import (
     percent,
     selection_sentence,
