@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator
 
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit
@@ -13,11 +12,9 @@ from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
 from discover.effects import SeriesElement
 from discover.errors import InputError
-from discover.protocols import measured_rate
+from discover.protocols import smooth_between_samples
 
 _STRAIN_STEP = 0.05
-_BETWEEN = 4  # points of a smooth rate for each sample of it
-_FEWEST_KNOTS = 4
 
 
 def on_finer_steps(
@@ -97,12 +94,5 @@ def change_on_finer_steps(
 
 def _with_smooth_rate(run: ShearRun) -> ShearRun:
     """Return a run whose rate, where it was read in samples, is a smooth curve through them."""
-    knots = np.asarray(run.protocol.table_times)
-    if len(knots) < _FEWEST_KNOTS or np.any(np.diff(knots) <= 0.0):
-        return run  # commanded: constant, a wave, or steps
-    rates = np.asarray(run.protocol.table_rates)
-    dense = np.interp(
-        np.arange(_BETWEEN * (len(knots) - 1) + 1) / _BETWEEN, np.arange(len(knots)), knots
-    )
-    smooth = np.asarray(PchipInterpolator(knots, rates)(dense))
-    return replace(run, protocol=measured_rate(dense, smooth))
+    smooth = smooth_between_samples(run.protocol)
+    return run if smooth is None else replace(run, protocol=smooth)

@@ -9,7 +9,7 @@ import numpy as np
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
-from discover.statistics.residual import Expectation
+from discover.statistics.residual import STRUCTURE, Expectation
 
 ARITHMETIC = 1e-5
 """Relative misfit that both integrations together may leave: the floor of the sparse search."""
@@ -112,7 +112,8 @@ def _left(
             residuals.append(np.asarray(prediction[quantity] - record, dtype=float))
             records.append(np.asarray(record, dtype=float))
     found = lack_of_fit(residuals, records, expectation)
-    if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
+    limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
+    if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"
         return replace(found, verdict="explained", reason=reason)
     return found

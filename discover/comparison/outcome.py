@@ -41,6 +41,8 @@ class LearnerOutcome(TermTables):
     bands
         By the key of the flow: lowest and highest prediction of each quantity over the laws that
         fit as well. None for a flow in which one of them runs away; empty where there is one law.
+    resolution
+        Relative misfit of the training runs that arithmetic may leave.
     """
 
     learner: str
@@ -52,6 +54,7 @@ class LearnerOutcome(TermTables):
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, Limits | None] = field(default_factory=dict)
+    resolution: float = 0.0
 
     def half_widths(self, flow: Flow) -> dict[str, float]:
         """Return the root-mean-square half-width of each band over that of the prediction.
@@ -102,6 +105,7 @@ class LearnerOutcome(TermTables):
                 else {q: [v.tolist() for v in pair] for q, pair in b.items()}
                 for name, b in self.bands.items()
             },
+            "resolution": self.resolution,
         }
 
     @classmethod
@@ -138,6 +142,7 @@ class LearnerOutcome(TermTables):
                 else {q: (np.asarray(low), np.asarray(high)) for q, (low, high) in b.items()}
                 for name, b in state.get("bands", {}).items()
             },
+            float(state.get("resolution", 0.0)),
         )
 
 

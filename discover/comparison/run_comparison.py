@@ -17,6 +17,7 @@ from discover.comparison.identifiability import (
 )
 from discover.comparison.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.sampled_rates import left_by_sampled_rates
 from discover.comparison.statements import make_statements
 from discover.comparison.training import (
     Progress,
@@ -192,7 +193,11 @@ def _outcome(
     outcome = LearnerOutcome.of(result, fluid, flows)
     if part == learner:
         # a sweep's outcomes are looked at in one flow only
-        outcome = replace(outcome, physics=physics_of(fluid, flows))
+        outcome = replace(
+            outcome,
+            physics=physics_of(fluid, flows),
+            resolution=left_by_sampled_rates(fluid, flows, outcome.predictions),
+        )
     if store is not None:
         store.save(part, outcome.to_state())
         # the same route as after an interruption, so that both give the same files

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.interpolate import PchipInterpolator
 
 from discover.errors import InputError
 
@@ -158,6 +159,32 @@ def measured_rate(
             f"{t.size} times and {r.size} rates."
         )
     return _protocol(t, r)
+
+
+_FEWEST_KNOTS = 4
+_BETWEEN = 4  # points of a smooth rate for each sample of it
+
+
+def smooth_between_samples(protocol: ShearProtocol) -> ShearProtocol | None:
+    """Return a protocol whose rate, where it was read in samples, is a smooth curve through them.
+
+    Monotonic between samples, and not straight lines   [Fritsch & Carlson 1980, SIAM J. Numer.
+    Anal. 17, 238]: what that changes is what nobody knows of the rate. None where it was
+    commanded: constant, a wave, or steps.
+
+    Parameters
+    ----------
+    protocol
+        Any.
+    """
+    knots = np.asarray(protocol.table_times)
+    if len(knots) < _FEWEST_KNOTS or np.any(np.diff(knots) <= 0.0):
+        return None
+    rates = np.asarray(protocol.table_rates)
+    dense = np.interp(
+        np.arange(_BETWEEN * (len(knots) - 1) + 1) / _BETWEEN, np.arange(len(knots)), knots
+    )
+    return measured_rate(dense, np.asarray(PchipInterpolator(knots, rates)(dense)))
 
 
 def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:

@@ -37,6 +37,7 @@ GOOD = {
     },
     "rivals": [{}, {}],
     "undetermined": ["N2"],
+    "verdict": "no_signal",
 }
 LOOP = {
     "verdict": "effects_added",
@@ -71,6 +72,7 @@ def test_rows_hold_the_worst_error_and_what_each_rule_chose(rows):
     assert good.chosen == {"bic": ("sigma.sigma",), "pysindy": ("sigma",)}
     assert not good.agree
     assert (good.rivals, good.undetermined) == (2, ("N2",))
+    assert good.verdict == "no_signal"
     assert (loop.effects, loop.error_before, loop.error_after) == (("rate_gain",), 0.5, 0.01)
 
 
@@ -87,7 +89,10 @@ def test_the_page_says_what_failed_and_puts_selectors_side_by_side(rows):
     assert "rate gain" in loops
     assert "effects added" in loops
     assert "_" not in re.sub("<[^>]*>", "", loops)  # what readers see is words
-    assert "0.375" in page.split('id="found"')[1].split("</table>")[0]
+    found = page.split('id="found"')[1].split("</table>")[0]
+    assert "0.375" in found
+    assert '<td class="text">no signal</td>' in found
+    assert "no signal" not in loops  # a comparison is no loop
     selection = page.split('id="selection"')[1].split("</table>")[0]
     assert selection.count("<math>") == 2
     assert ">no</td>" in selection
@@ -115,6 +120,7 @@ def test_the_table_does_not_depend_on_times_and_holds_the_reason_of_a_failure(ro
     assert table.loc[0, "tensor_sindy_terms"] == "0.2 sigma.sigma"
     assert table.loc[0, "tensor_sindy_sigma12"] == 0.03
     assert table.loc[1, "effects"] == "rate_gain"
+    assert table["verdict"].tolist()[:2] == ["no_signal", "effects_added"]
     assert not {"seconds", "status"} & set(table.columns)
 
 

@@ -8,8 +8,10 @@ import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
+from discover.comparison.explanation import Explanation
 from discover.comparison.flows import comparison_flows
-from discover.comparison.identifiability import find_rivals, undetermined_quantities
+from discover.comparison.identifiability import find_rivals
+from discover.comparison.statements import make_statements
 from discover.comparison.truth import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
@@ -72,6 +74,11 @@ def test_json_is_the_contract(comparison):
     assert term["ci95"] == [0.19, 0.21]
     assert term["coefficient_penalised"] == 0.19
     assert "N2" in content["undetermined"]
+    assert content["verdict"] == "explained"
+    assert set(content["lack_of_fit"]) == set(content["learners"])
+    said = {s["quantity"]: s["determined"] for s in content["statements"]}
+    assert set(said.values()) <= {"no", "if_the_law_is_in_the_library"}
+    assert content["undetermined"] == [q for q, value in said.items() if value == "no"]
     for rival in content["rivals"]:
         assert {"terms", "errors_to_chosen", "separated_by"} <= set(rival)
 
@@ -142,8 +149,10 @@ def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     assert twin.errors_to_chosen["sigma12"] < 1e-6
     assert twin.errors_to_chosen["N1"] < 1e-6
     assert twin.separated_by["quantity"] == "N2"
-    statements = undetermined_quantities(flows, False, rivals)
-    assert [s.quantity for s in statements if s.undetermined] == ["N2"]
+    statements = make_statements(Explanation(), flows, rivals)
+    # N1 is the same in both laws, but nothing says that the fluid is either
+    assert [s.quantity for s in statements if s.undetermined] == ["N2", "N1"]
+    assert "Checked by simulation" in statements[0].text
 
 
 def test_a_pair_on_33_is_no_rival_where_the_trace_feels_it(slip_case):

@@ -8,14 +8,16 @@ from independent import Giesekus, PomPom, oscillation
 from independent.noise import correlated, white
 
 from discover.comparison.explanation import Explanation, explain
-from discover.comparison.flows import Flow
+from discover.comparison.flows import Flow, predict
 from discover.comparison.identifiability import FOUND
 from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.sampled_rates import left_by_sampled_rates
 from discover.comparison.statements import IN_LIBRARY, check_band, make_statements
 from discover.identify import HiddenStresses, LawTerms
 from discover.identify.bands import PredictionBand
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure
-from discover.protocols.shear import oscillatory_shear
+from discover.laws import Fluid, make_law
+from discover.protocols.shear import measured_rate, oscillatory_shear
 from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.0, 20.0, 201)
@@ -107,6 +109,24 @@ def test_arithmetic_is_no_pattern(responses):
     assert explained(rows, nearly).verdict == "explained"
     rather = [row * (1.0 + 3e-4 * np.sin(TIMES)) for row in rows]
     assert explained(rows, rather).verdict == "unexplained"
+
+
+def test_a_rate_that_is_known_at_the_samples_only_is_allowed_for(responses):
+    exact = flows_of(responses["giesekus"])
+    read = [replace(f, protocol=measured_rate(TIMES, np.asarray(f.shear_rate))) for f in exact]
+    fluid = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
+    rows = [predict(fluid, flow)["sigma12"] for flow in read]
+    one = outcome("tensor_sindy", read, rows)
+    strict = explain({"tensor_sindy": one}, read, Expectation())
+    # data without noise, read ten times a second: straight lines between the samples show
+    assert strict.verdict == "unexplained"
+    assert 1e-4 < strict.lack_of_fit["tensor_sindy"].misfit < 5e-3
+    allowed = left_by_sampled_rates(fluid, read, one.predictions)
+    assert explain({"tensor_sindy": replace(one, resolution=allowed)}, read, Expectation()).by
+    # a rate that was commanded leaves nothing open, and a larger misfit is no matter of samples
+    assert left_by_sampled_rates(fluid, exact, one.predictions) == 0.0
+    other = {f.key: {"sigma12": row} for f, row in zip(read, responses["near"], strict=True)}
+    assert left_by_sampled_rates(fluid, read, other) == 0.0
 
 
 def test_a_law_that_runs_away_in_a_training_run_explains_nothing(responses):
