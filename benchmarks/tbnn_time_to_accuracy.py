@@ -174,7 +174,9 @@ def main() -> None:
             print(f"  {label}: {seconds[label]:.1f} s, {_said(errors[label])}", flush=True)
 
         def fitted(recipe, known=known, data=data):
-            model = TBNNUDE(recipe=recipe, known_relaxation=known, random_state=arguments.seed)
+            model = TBNNUDE(
+                recipe=recipe, known_relaxation=known, random_state=arguments.seed, n_members=1
+            )
             return model.fit(data.runs).law_
 
         print(case, flush=True)

@@ -227,6 +227,9 @@ class Comparison(NotebookView):
                     for t in outcome.terms
                 ],
                 "errors": self._errors(name, self.judged),
+                "half_widths_of_members": {
+                    flow.name: outcome.half_widths(flow) for flow in self.judged
+                },
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "intervals_hold": IN_LIBRARY if self.explanation.in_library else "no",
                 "train_seconds": outcome.train_seconds,

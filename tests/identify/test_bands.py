@@ -20,7 +20,8 @@ def predictions(lost=0):
 
 def test_the_band_of_draws_is_that_of_their_distribution():
     (band,) = bands_of_predictions(predictions(), [1 + N_DRAWS], [TIMES])
-    np.testing.assert_allclose(band.high - band.low, 3.92 * 0.1, rtol=0.05)
+    # quantiles that are unbiased; the default of NumPy would give nine tenths of this
+    np.testing.assert_allclose(band.high - band.low, 3.92 * 0.1, rtol=0.07)
     assert band.reason == ""
 
 

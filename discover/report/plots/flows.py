@@ -10,6 +10,7 @@ from discover.report.plots.style import (
     LEARNER_STYLES,
     LEARNER_TITLES,
     MEASURED,
+    NETWORK,
     SHADE,
     SPARSE,
     TRUTH_STYLE,
@@ -150,7 +151,20 @@ def _seen(comparison: Comparison, flow: Flow) -> str:
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
-    """Shade what the data leave open: the intervals of the parameters, and the rivals."""
+    """Shade what the data leave open: the intervals of the parameters, rivals, and members."""
+    network = comparison.outcomes.get("tbnn_ude")
+    limits = None if network is None else network.bands.get(flow.key)
+    if limits is not None:
+        low, high = limits[quantity]
+        panel.fill_between(
+            flow.times[shown],
+            low[shown],
+            high[shown],
+            color=NETWORK,
+            alpha=0.18,
+            linewidth=0,
+            label="networks that fit as well",
+        )
     band = comparison.next_measurement.bands.get(flow.key)
     if band is None:
         return
