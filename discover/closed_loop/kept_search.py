@@ -85,6 +85,7 @@ def _state(search: "Search") -> dict[str, Any]:
         "left_out": search.left_out,
         "not_named": search.not_named,
         "refused": sorted(search.refused),
+        "unasked": sorted(search.unasked),
         "known": [[at, *pair] for at, pair in search.known.items()],
     }
 
@@ -116,4 +117,5 @@ def _set(search: "Search", state: dict[str, Any]) -> None:
     search.left_out = state["left_out"]
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
+    search.unasked = set(state.get("unasked", ()))
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

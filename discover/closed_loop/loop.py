@@ -331,7 +331,11 @@ def _stage(search: Search, name: str, bounds, error) -> Stage:
         effect=name,
         kind=effect.kind,
         parameters=parameters,
-        aliases=search.aliases.get(name, ()),
+        aliases=tuple(
+            other
+            for other in search.aliases.get(name, ())
+            if other not in search.active and other not in search.refused
+        ),
         error=error,
         evidence=search.support.get(name, 0.0),
         equation=effect.equation,

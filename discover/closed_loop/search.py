@@ -96,6 +96,8 @@ class Search:
         open; and why, in a sentence without its stop.
     refused
         Those of them that were in the model and are no candidates any more.
+    unasked
+        Effects whose aliases were found beside others than those that are in the model now.
     """
 
     def __init__(
@@ -124,6 +126,7 @@ class Search:
         self.known: dict[int, tuple[float, float]] = {}
         self.not_named: dict[str, str] = {}
         self.refused: set[str] = set()
+        self.unasked: set[str] = set()
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""
@@ -219,6 +222,9 @@ class Search:
             self.keeper.save(self)
         if look_ahead:
             self._hold_against_modes(say)
+        for name in self.active:
+            if name in self.unasked:
+                self._ask_for_aliases(name)
 
     def _hold_against_modes(self, say: Callable[[str], None]) -> None:
         """Take out effects that constants that differ from mode to mode make needless.
@@ -238,6 +244,7 @@ class Search:
                 "relaxation mode to the next"
             )
         self.active = [name for name in self.active if name not in needless]
+        self.unasked = set(self.active)
         self.fit = self._fit(self.active, self.fit.theta)
         self._fit_path()
         self._leave_out()
@@ -263,6 +270,7 @@ class Search:
             self.refused.add(name)
             self.fit = self._without(name)
             self.active.remove(name)
+            self.unasked = set(self.active)
             self._fit_path()
             self._leave_out()
             return name
@@ -298,6 +306,7 @@ class Search:
         dropped = [name for name in self.active if name not in kept]
         if dropped:
             self.fit, self.active = fit, kept
+            self.unasked = set(kept)
             self._fit_path()
             self._leave_out()
         return dropped
@@ -341,6 +350,7 @@ class Search:
             # the first was taken on trust, with the others still missing
             for name in new[:-1]:
                 self._exchange(name)
+            self.unasked = set(self.active)
             return ", ".join(name for name in self.active if name not in active)
         return None
 
@@ -361,10 +371,22 @@ class Search:
             exchanged |= self._exchange(name)
         return exchanged
 
-    def _exchange(self, name: str) -> bool:
+    def _ask_for_aliases(self, name: str) -> None:
+        """Refit the final model with each leading candidate in the place of an effect."""
+        own, choices = self._in_place_of(name)
+        if own is not None:
+            self.aliases[name] = aliases_of(own, choices)
+            self.unasked.discard(name)
+
+    def _in_place_of(self, name: str) -> tuple[Choice | None, list[Choice]]:
+        """Return an effect of the model after a refit, and with it all that could be instead.
+
+        None where its own refit fails, or where the law runs away without it: then nothing can be
+        ranked from there.
+        """
         without = self._without(name)
         if not without.usable:
-            return False  # without it the law runs away: nothing can be ranked from there
+            return None, []
         others = [other for other in self.active if other != name]
 
         def rival(effect: AbstractEffect) -> bool:
@@ -375,9 +397,14 @@ class Search:
         asked = [current, *leading][:_COMPARED]
         choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
         choices = self._possible(choices, others)
-        own_choice = next((c for c in choices if c.candidate is current), None)
+        return next((c for c in choices if c.candidate is current), None), choices
+
+    def _exchange(self, name: str) -> bool:
+        others = [other for other in self.active if other != name]
+        own_choice, choices = self._in_place_of(name)
         if own_choice is None:
             return False
+        current = own_choice.candidate
         # evidence alone would let a term in that fits a little better and predicts worse
         expected = np.mean(own_choice.left_out)
         able = [c for c in choices if c is own_choice or np.mean(c.left_out) < expected]
@@ -389,12 +416,14 @@ class Search:
         if name in self.settled and not (explained and gain > self.support[name]):
             return False
         self.aliases[name] = aliases_of(best, choices)
+        self.unasked.discard(name)
         if best.candidate is current:
             return False
         new = best.candidate.effect
         self.aliases[new] = self.aliases.pop(name)
         self.support[new] = self.support.pop(name)
         self.active[self.active.index(name)] = new
+        self.unasked = {other for other in self.active if other != new}
         self.settled = tuple(n for n in self.settled if n != name)
         own = self.model.positions(name)
         self.known = {at: value for at, value in self.known.items() if at not in own}
@@ -435,6 +464,7 @@ class Search:
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
+        self.unasked = set(self.active)
         kept = [*self.active, name]
         self.fit = self._sharpened(chosen.fit)
         self._polish()
@@ -442,6 +472,7 @@ class Search:
             self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
         )
         if len(self.active) < len(kept):
+            self.unasked = set(self.active)
             # the stages must tell how the final model is reached, so they are fitted again
             self._fit_path()
         else:
