@@ -84,7 +84,10 @@ def read_blocks(
     try:
         rows = [next(csv.reader(io.StringIO(line), delimiter=mark), []) for line in lines]
     except csv.Error as error:
-        raise InputError(f"{path.name} cannot be split into columns: {error}.") from None
+        raise InputError(
+            f"{path.name} cannot be split into columns ({error}). Give the text export of a "
+            "rheometer, and check --delimiter."
+        ) from None
     rows = [[cell.strip() for cell in row] for row in rows]
     sign: Decimal = decimal or _decimal(rows, mark, path.name)
     if sign == ",":
