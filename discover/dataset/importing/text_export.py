@@ -166,10 +166,10 @@ def _decimal(rows: list[list[str]], mark: str, name: str) -> Decimal:
     if mark == ",":
         return "."
     cells = [cell for row in rows for cell in row]
-    if any(re.fullmatch(r"[+-]?\d+\.\d+([eE][+-]?\d+)?", cell) for cell in cells):
+    if any(re.fullmatch(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?", cell) for cell in cells):
         return "."
-    commas = [cell for cell in cells if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", cell)]
-    if commas and all(re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in commas):
+    commas = [cell for cell in cells if re.fullmatch(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?", cell)]
+    if commas and all(re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", cell) for cell in commas):
         raise InputError(
             f"{name} writes numbers such as {commas[0]}: a decimal comma or thousands? Say "
             "--decimal , or --decimal . to decide."
@@ -178,14 +178,14 @@ def _decimal(rows: list[list[str]], mark: str, name: str) -> Decimal:
 
 
 def _with_point(cell: str) -> str:
-    if re.fullmatch(r"[+-]?\d*,\d+([eE][+-]?\d+)?", cell):
+    if re.fullmatch(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?", cell):
         return cell.replace(",", ".")
     return cell
 
 
 def is_number(cell: str) -> bool:
     """Return whether a cell is a number."""
-    return bool(re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell))
+    return bool(re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", cell))
 
 
 def _is_numbers(row: list[str]) -> bool:
