@@ -40,8 +40,8 @@ GENERATORS: tuple[Callable[[random.Random], Case], ...] = (
 # Words of which a message that helps has one: what to do, or what would do
 MENDS = re.compile(
     r"\b(give|write|name|add|remove|correct|use|check|mend|save|rename|choose|leave|keep|run|try|"
-    r"set|put|change|sort|make|sample|widen|wait|download|install|ask|known keys|one of|must|should|"
-    r"is not in the range|is not a valid|no such option|requires an argument|is larger than|say|export)\b",
+    r"set|put|change|sort|make|sample|widen|wait|download|install|ask|say|export|known keys|one of|"
+    r"must|should|is not in the range|is not a valid|no such option|requires an argument)\b",
     re.IGNORECASE,
 )
 
