@@ -86,7 +86,7 @@ def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     if first["type"] == "extra_forbidden":
         text = f"unknown key {place!r}. Known keys there are: {_keys(model, first['loc'][:-1])}"
     elif first["type"] == "missing" and isinstance(first["loc"][-1], int):
-        text = f"{_place(first['loc'][:-1])!r} needs more values than it has"
+        text = f"{_place(first['loc'][:-1])!r} needs more values than it has; add them"
     elif first["type"] == "missing":
         text = f"{place!r} is missing; write it"
     else:

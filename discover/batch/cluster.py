@@ -89,8 +89,12 @@ def _client_of(scheduler: str) -> Iterator[Any]:
 
     try:
         client = Client(scheduler, timeout="20s")
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"No dask scheduler answers at {scheduler!r} ({error}).") from None
+    except Exception as error:  # each kind of address fails in its own way
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(
+            f"No dask scheduler answers at {scheduler[:100]!r} ({reason}). Give the address that "
+            "it prints when it starts, such as tcp://10.0.0.1:8786, and check that it runs."
+        ) from None
     with client:
         yield client
 

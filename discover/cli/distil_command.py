@@ -70,19 +70,19 @@ def distil(
 
 
 def _parse_law(text: str) -> tuple[str, dict[str, float]]:
+    from discover.dataset.importing.text_export import is_number
+
     name, _, rest = text.partition(":")
     parameters = {}
     for part in filter(None, rest.split(",")):
         key, equals, value = part.partition("=")
-        try:
-            parameters[key.strip()] = float(value)
-        except ValueError:
-            equals = ""
-        if not equals:
+        # float() also reads 1_2, nan and digits of other scripts
+        if not equals or not is_number(value.strip()):
             raise InputError(
                 f"Cannot read {part!r} in {text!r}; write parameters as name=number, such as "
                 "giesekus:alpha=0.2."
             )
+        parameters[key.strip()] = float(value)
     return name.strip(), parameters
 
 

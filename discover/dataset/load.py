@@ -31,7 +31,7 @@ _CONSTANT = 1e-6
 # zero comes near 0, one with the wrong sign near -1
 _WRONG_SIGN = -0.5
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 def folder_roots(base: str | Path | None = None) -> list[Path]:

@@ -26,8 +26,8 @@ LARGEST_VALUE = 1e15
 SMALLEST_VALUE = 1e-100
 """What is nearer to zero is zero: no instrument tells them apart, and its square is no number."""
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _IMPORT = "discover data import"
 
 

@@ -2,32 +2,28 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from discover.equations.equation import Box, Equation, EquationTerm, Tested
 from discover.errors import InputError
-from discover.validation import validated
+from discover.validation import Section, validated
 
 FORMAT = "discover law 1"
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class _Term(_Section):
+class _Term(Section):
     term: str = Field(max_length=500)
     coefficient: float
-    inner: dict[str, float] = {}
+    inner: dict[str, float] = Field(default_factory=dict)
     ci95: tuple[float, float] | None = None
 
 
-class _Mode(_Section):
+class _Mode(Section):
     modulus_Pa: float = Field(gt=0)
     relaxation_time_s: float = Field(gt=0)
 
 
-class _Box(_Section):
+class _Box(Section):
     Wi: tuple[float, float]
     De: tuple[float, float]
 
@@ -35,13 +31,13 @@ class _Box(_Section):
         return Box(self.Wi, self.De)
 
 
-class _Tested(_Section):
+class _Tested(Section):
     learned_in: _Box
     judged_in: _Box | None = None
-    worst_errors: dict[str, float] = {}
+    worst_errors: dict[str, float] = Field(default_factory=dict)
 
 
-class _Law(_Section):
+class _Law(Section):
     format: Literal["discover law 1"]
     title: str = ""
     notes: tuple[str, ...] = ()

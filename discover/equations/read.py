@@ -84,7 +84,9 @@ def _read_json(path: Path) -> Any:
     try:
         return json.loads(read_bytes(path, path.name))
     except RecursionError:
-        raise InputError(f"{path.name} is nested too deeply to be a result.") from None
+        raise InputError(
+            f"{path.name} is nested too deeply to be a result. Run again with --overwrite."
+        ) from None
     except (ValueError, UnicodeDecodeError) as error:
         if isinstance(error, InputError):
             raise

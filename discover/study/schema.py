@@ -22,7 +22,9 @@ def _known_or_learned(name: str) -> str:
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
 LawName = Annotated[str, AfterValidator(_known_or_learned)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# wider than any instrument, and narrow enough that squares and ratios compute
+_LEAST, _MOST = 1e-15, 1e15
+Positive = Annotated[float, Field(ge=_LEAST, le=_MOST)]
 
 
 class Synthetic(Section):
@@ -68,7 +70,7 @@ class Model(Section):
     relaxation_time_s: Positive | Literal["fit"] = 1.0
     modes: Literal["lve"] | None = None
     sweep_rad_s: tuple[Positive, Positive] | None = None
-    solvent_viscosity_Pa_s: Annotated[float, Field(ge=0)] = 0.0
+    solvent_viscosity_Pa_s: Annotated[float, Field(ge=0, le=_MOST)] = 0.0
     parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
     known_relaxation: bool = True
 

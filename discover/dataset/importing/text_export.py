@@ -84,7 +84,10 @@ def read_blocks(
     try:
         rows = [next(csv.reader(io.StringIO(line), delimiter=mark), []) for line in lines]
     except csv.Error as error:
-        raise InputError(f"{path.name} cannot be split into columns: {error}.") from None
+        raise InputError(
+            f"{path.name} cannot be split into columns ({error}). Give the text export of a "
+            "rheometer, and check --delimiter."
+        ) from None
     rows = [[cell.strip() for cell in row] for row in rows]
     sign: Decimal = decimal or _decimal(rows, mark, path.name)
     if sign == ",":
@@ -163,10 +166,10 @@ def _decimal(rows: list[list[str]], mark: str, name: str) -> Decimal:
     if mark == ",":
         return "."
     cells = [cell for row in rows for cell in row]
-    if any(re.fullmatch(r"[+-]?\d+\.\d+([eE][+-]?\d+)?", cell) for cell in cells):
+    if any(re.fullmatch(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?", cell) for cell in cells):
         return "."
-    commas = [cell for cell in cells if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", cell)]
-    if commas and all(re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", cell) for cell in commas):
+    commas = [cell for cell in cells if re.fullmatch(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?", cell)]
+    if commas and all(re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", cell) for cell in commas):
         raise InputError(
             f"{name} writes numbers such as {commas[0]}: a decimal comma or thousands? Say "
             "--decimal , or --decimal . to decide."
@@ -175,14 +178,14 @@ def _decimal(rows: list[list[str]], mark: str, name: str) -> Decimal:
 
 
 def _with_point(cell: str) -> str:
-    if re.fullmatch(r"[+-]?\d*,\d+([eE][+-]?\d+)?", cell):
+    if re.fullmatch(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?", cell):
         return cell.replace(",", ".")
     return cell
 
 
 def is_number(cell: str) -> bool:
     """Return whether a cell is a number."""
-    return bool(re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell))
+    return bool(re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", cell))
 
 
 def _is_numbers(row: list[str]) -> bool:
