@@ -2,7 +2,8 @@
 
     python benchmarks/measured_normal_stress.py [FOLDER]
 
-FOLDER holds start-ups with N1 and an ``lve.csv``; $DISCOVER_DATA/pi95k-startup by default. Two rules:
+FOLDER holds start-ups with N1 and an ``lve.csv``; by default it is $DISCOVER_DATA/pi95k-startup.
+Two rules:
 
 - late in a run, Laun's rule N1 = 2G'(1 + (G'/G'')²)^0.7 at ω = γ̇   [Laun 1986, J. Rheol. 30, 459],
   beside Cox and Merz's σ12 = |G*| at ω = γ̇, which says how far such rules hold for this sample;
@@ -25,6 +26,7 @@ def main():
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     sweep = pd.read_csv(folder / "lve.csv").sort_values("omega_rad_s")
     omega, storage, loss = (sweep[c].to_numpy() for c in ("omega_rad_s", "Gp_Pa", "Gpp_Pa"))
+    sweep_moduli = (storage, loss)
 
     times = np.geomspace(1.0 / omega.max(), 1.0 / omega.min(), 60)
     x = omega[:, None] * times

@@ -29,8 +29,8 @@ def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
 
     Smith's list has ten for two symmetric tensors   [Smith 1971, IJES 9, 899]. Two are left out:
     tr γ̇, which vanishes in an incompressible flow, and tr σ²γ̇², which in simple shear follows from
-    the others. In a general flow it does not follow, so a law in these eight is not the most general
-    one there.
+    the others. In a general flow it does not follow, so a law in these eight is not the most
+    general one there.
 
     Parameters
     ----------
