@@ -26,7 +26,6 @@ def main():
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     sweep = pd.read_csv(folder / "lve.csv").sort_values("omega_rad_s")
     omega, storage, loss = (sweep[c].to_numpy() for c in ("omega_rad_s", "Gp_Pa", "Gpp_Pa"))
-    sweep_moduli = (storage, loss)
 
     times = np.geomspace(1.0 / omega.max(), 1.0 / omega.min(), 60)
     x = omega[:, None] * times
