@@ -27,8 +27,8 @@ def integrity_basis(
     """Return I, σ, γ̇, σ², γ̇², σγ̇+γ̇σ, σ²γ̇+γ̇σ², σγ̇²+γ̇²σ   [Smith 1971, IJES 9, 899].
 
     Any isotropic symmetric tensor function of two symmetric tensors is a sum of these with
-    coefficients that depend on the invariants alone, so a law written in them does not depend
-    on the observer.
+    coefficients that depend on the ten invariants of the two alone, so a law written in them does
+    not depend on the observer. `scalar_invariants` has eight of the ten.
     """
     stress_squared = square(stress)
     rate_squared = square(rate)

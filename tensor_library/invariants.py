@@ -1,4 +1,4 @@
-"""The eight scalar invariants of stress and rate of deformation."""
+"""Eight of the scalar invariants of stress and rate of deformation."""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -27,7 +27,10 @@ IDENTICALLY_ZERO_IN_SHEAR = (4,)
 def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
     """Return the invariants of two symmetric tensors named in `INVARIANT_NAMES`.
 
-    tr γ̇ is left out: it vanishes in an incompressible flow   [Smith 1971; Ling et al. 2016].
+    Smith's list has ten for two symmetric tensors   [Smith 1971, IJES 9, 899]. Two are left out:
+    tr γ̇, which vanishes in an incompressible flow, and tr σ²γ̇², which in simple shear follows from
+    the others. In a general flow it does not follow, so a law in these eight is not the most
+    general one there.
 
     Parameters
     ----------

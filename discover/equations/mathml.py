@@ -21,8 +21,7 @@ def number(value: float) -> str:
     mantissa, _, exponent = text.lstrip("-").partition("e")
     body = f"{minus}<mn>{mantissa}</mn>"
     if exponent:
-        ten, sign = int(exponent), "<mo>−</mo>" if int(exponent) < 0 else ""
-        body += f"<mo>×</mo><msup><mn>10</mn><mrow>{sign}<mn>{abs(ten)}</mn></mrow></msup>"
+        body += f"<mo>×</mo><msup><mn>10</mn><mn>{int(exponent)}</mn></msup>"
     return body
 
 

@@ -69,9 +69,10 @@ def high_deborah_picture(comparison: Comparison) -> Picture | None:
             drawing,
             "high_deborah",
             "γ̇ = 3 cos(De t), one cycle after the transient. As De grows the stress has no time to "
-            "change the structure within a cycle: the curve becomes an ellipse (quasi-linear LAOS) "
-            "although the amplitude is large. I₃/I₁ is the third harmonic of the truth over the "
-            "first.",
+            "change the structure within a cycle, and the strain, 3/De, falls: the curve becomes "
+            "an ellipse (quasi-linear LAOS) although the rate is large. A law that names the rate, "
+            "such as Johnson–Segalman's, would bend it at any De if the strain were above one. "
+            "I₃/I₁ is the third harmonic of the truth over the first.",
         )
 
 
