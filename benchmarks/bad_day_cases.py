@@ -97,7 +97,8 @@ class Case:
         """Return the columns of ``lve.csv``, if there is one."""
         if self.modes is None:
             return None
-        return maxwell_sweep(*map(np.array, self.modes), np.geomspace(0.01, 100.0, 25))
+        moduli, times = map(np.array, self.modes)
+        return maxwell_sweep(moduli, times, np.geomspace(0.01, 100.0, 25))
 
 
 KNOWN = {"law": "ucm", "modulus_Pa": G, "relaxation_time_s": LAMBDA}
@@ -258,7 +259,7 @@ CONTROLS = {
 PLANTED = {
     "mobility": Case("Giesekus", recorded(GIESEKUS),
                      planted={"giesekus_mobility": {"alpha": 0.3}}, model=KNOWN),
-    "ptt": Case("linear PTT", recorded(PhanThienTanner(0.3, **SCALE)),
+    "ptt": Case("linear PTT", recorded(PhanThienTanner(0.3, "linear", **SCALE)),
                 planted={"ptt_linear": {"epsilon": 0.3}}, model=KNOWN),
     "ptt_exponential": Case(
         "exponential PTT", recorded(PhanThienTanner(0.3, "exponential", **SCALE)),
