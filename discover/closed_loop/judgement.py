@@ -18,6 +18,7 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
+from discover.statistics.whiteness import SIGNIFICANCE
 
 CARRIED = 3.0
 """A model that misses the held-out runs by more than so many times what it misses the fitted ones
@@ -160,6 +161,8 @@ def judge(
         )
     elif not structured:
         text = f"{missed}, as {causes} ({_percent(expected)})."
+        if left.probability is not None and left.probability <= SIGNIFICANCE and plain:
+            text += " It has a pattern that noise has not, but one no larger than that."
     elif explained:
         text = (
             f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "

@@ -16,7 +16,7 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
-from discover.statistics.whiteness import noise_probability
+from discover.statistics.whiteness import SIGNIFICANCE, noise_probability
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
 
@@ -105,12 +105,16 @@ def what_is_left(
     expected = float(np.hypot(floor, expectation.linear_error))
     known = expectation.noise is not None or tells_noise(weight)
     explained = known and expectation.explains(residual, weight, record)
+    probability = noise_probability(residual, weight, record)
     verdict: FitVerdict = "explained" if explained else "unexplained"
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
         reason = f"what is left ({100 * misfit:.2g} % of the records) is noise, and nearly all"
-    elif explained:
+    elif explained and (probability is None or probability > SIGNIFICANCE):
         reason = f"what is left ({100 * misfit:.2g} %) is noise"
+    elif explained:
+        given = "the noise given" if expectation.noise is not None else "the linear data's error"
+        reason = f"what is left ({100 * misfit:.2g} %) has a pattern no larger than {given}"
     elif misfit > STRUCTURE * expected:
         reason = f"what is left ({100 * misfit:.2g} %) is more than noise ({100 * expected:.2g} %)"
     else:
@@ -123,7 +127,7 @@ def what_is_left(
         misfit,
         floor,
         float(np.mean(summarise(residual, weight).autocorrelation)),
-        noise_probability(residual, weight, record),
+        probability,
         count,
         reason,
         expected,
