@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -10,20 +11,23 @@ from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
 from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.result import RunRecord, Verdict
+from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import (
     FEWEST_FAST,
     STRUCTURE,
     summarise,
     tells_noise,
 )
-
-ONLY_NOISE = 0.9
-"""A model that misses a record by more of it than this says nothing of it."""
+from discover.statistics.whiteness import SIGNIFICANCE
 
 CARRIED = 3.0
 """A model that misses the held-out runs by more than so many times what it misses the fitted ones
 does not carry over to them. The fitted error is an optimistic guess of the other, by the freedom of
 a few constants; three times leaves room for that, and for flows that weigh them otherwise."""
+
+
+Silence = Literal["records", "fluid"]
+"""What holds no signal: the records themselves, or what a fit leaves to the fluid of them."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,10 @@ class Judgement:
     ----------
     verdict, structured
         The verdict, and whether something is left that nothing explains.
-    noise_floor, resolution
-        Relative error of the fitted runs that noise and that arithmetic explain.
+    left
+        What is left of the fitted runs.
+    resolution
+        Relative error of them that arithmetic explains.
     noise_known, carries_over
         Whether the runs are long enough to tell noise from structure, or the noise was given; and
         whether the held-out runs are predicted as well as can be asked.
@@ -65,7 +71,7 @@ class Judgement:
 
     verdict: Verdict
     structured: bool
-    noise_floor: float
+    left: LackOfFit
     resolution: float
     noise_known: bool
     carries_over: bool
@@ -80,6 +86,7 @@ def judge(
     active: Sequence[str],
     records: Sequence[RunRecord],
     held: HeldOut | None,
+    silence: Silence | None = None,
 ) -> Judgement:
     """Return the verdict on a final model.
 
@@ -93,17 +100,17 @@ def judge(
         All runs with their predictions.
     held
         Runs held out, if any.
+    silence
+        What is silent, if anything is.
     """
     expectation, weight = leftover.expectation, leftover.weight
-    error = _error([record for record in records if not record.held_out])
-    floor = expectation.floor(fit.residual, weight)
-    expected = expectation.size(fit.residual, weight)
-    plain = expectation.explains(fit.residual, weight)
+    left = leftover.left(fit.residual)
+    error, expected, given = left.misfit, left.expected, leftover.noise_known
+    plain = not given or left.verdict != "unexplained"
     explained = plain or leftover.explained(fit, active)
     # steps are computed on only where noise alone does not explain what is left
     asked = float("inf") if plain else error
     resolution = leftover.resolution.limit(fit.theta, active, asked)
-    given = expectation.noise is not None or tells_noise(weight)
     known = given or error <= STRUCTURE * resolution
     missed_held_out = _error([record for record in records if record.held_out])
     carries_over = held is None or missed_held_out <= CARRIED * max(error, expected, resolution)
@@ -116,23 +123,37 @@ def judge(
         carries_over |= tells_noise(weight) and not tells_noise(
             np.asarray(held.resolution.batch.weight)
         )
+    nothing = plain and left.verdict == "no_signal"
     structured = not (known and explained and carries_over)
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if active and not structured:
         verdict = "effects_added"
+    silent = silence == "records" or (known and explained and (silence is not None or nothing))
+    if silent:
+        verdict, structured = "no_signal", False
     worst = max(records, key=lambda record: record.errors[-1])
     linear = expectation.linear_error > 0.0
     causes = "noise and the error of the linear data explain" if linear else "noise explains"
     short = tuple(r.name for r in records if given and len(r.time) < FEWEST_FAST)
     which = f"The fitted runs of {FEWEST_FAST} samples or more" if short else "The fitted runs"
     missed = f"{which} are missed by {_percent(error)}"
-    if not known:
+    if silence == "records":
+        text = (
+            "The records are noise about a constant, whatever rate was imposed: they hold no "
+            "signal that a law could be told from."
+        )
+    elif not known:
         text = (
             f"{missed}, and no run has enough samples to tell noise from a missing effect. Sample "
             "more often, or give the noise ([loop] noise)."
         )
-    elif not structured and error > ONLY_NOISE:
+    elif silent and nothing:
         text = f"{missed}, and {causes} that: the records hold hardly anything else."
+    elif silent:
+        text = (
+            f"{missed}, but as well without the fluid, which what was added switches off: that "
+            "explains nothing, and the records hold no signal that a law could be told from."
+        )
     elif not structured and error > STRUCTURE * expected:
         text = (
             f"{missed}, no more than finite steps, rates known only at the samples and rounded "
@@ -140,6 +161,8 @@ def judge(
         )
     elif not structured:
         text = f"{missed}, as {causes} ({_percent(expected)})."
+        if left.probability is not None and left.probability <= SIGNIFICANCE and plain:
+            text += " It has a pattern that noise has not, but one no larger than that."
     elif explained:
         text = (
             f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "
@@ -157,13 +180,13 @@ def judge(
             f"pattern that noise has not; the worst run is {worst.name}. Some effect is still "
             "missing."
         )
+    if left.outliers:
+        text += f" Besides those left out before the fit, {left.outliers} samples are outliers."
     if short:
         text += f" Runs of fewer samples do not judge: {', '.join(short)}."
     # what does not explain the fitted runs has nothing to carry over
     carries_over = carries_over or not explained
-    return Judgement(
-        verdict, structured, floor, resolution, known, carries_over, short, worst, text
-    )
+    return Judgement(verdict, structured, left, resolution, known, carries_over, short, worst, text)
 
 
 def _error(records: Sequence[RunRecord]) -> float:

@@ -8,7 +8,9 @@ from jaxtyping import Float
 
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.resolution import Resolution
-from discover.statistics.residual import SIGNIFICANCE, STRUCTURE, Expectation, noise_probability
+from discover.statistics.lack_of_fit import LackOfFit, what_is_left
+from discover.statistics.residual import STRUCTURE, Expectation, tells_noise
+from discover.statistics.whiteness import SIGNIFICANCE
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,11 @@ class Leftover:
         """Weights of the runs, zero at padding."""
         return np.asarray(self.resolution.batch.weight)
 
+    @property
+    def records(self) -> Float[np.ndarray, "runs n"]:
+        """Measured stress in Pa, padded."""
+        return np.asarray(self.resolution.batch.stress)
+
     def on(self, resolution: Resolution) -> "Leftover":
         """Return the same expectation of other runs."""
         return Leftover(self.expectation, resolution)
@@ -40,12 +47,25 @@ class Leftover:
         error = self.resolution.mean(fit.run_errors)
         return error <= STRUCTURE * self.resolution.limit(fit.theta, active, error)
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether noise can be told from structure: it was given, or some run is long enough."""
+        return self.expectation.noise is not None or tells_noise(self.weight)
+
+    def left(self, residual: Float[np.ndarray, "runs n"]) -> LackOfFit:
+        """Return what weighted residuals hold, by the test that judges a comparison too."""
+        rows, records = [], []
+        for row, w, record in zip(residual, self.weight, self.records, strict=True):
+            rows.append(row[w > 0] / w[w > 0])
+            records.append(record[w > 0])
+        return what_is_left(rows, records, self.expectation)
+
     def explained(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves is what a complete model may leave."""
-        if self.expectation.explains(fit.residual, self.weight) or self.unresolved(fit, active):
+        if self._explains(fit.residual) or self.unresolved(fit, active):
             return True
         corrected = self.resolution.corrected(fit, active)
-        return corrected is not None and self.expectation.explains(corrected, self.weight)
+        return corrected is not None and self._explains(corrected)
 
     def random(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves cannot be told from noise, but for arithmetic.
@@ -57,6 +77,10 @@ class Leftover:
         corrected = self.resolution.corrected(fit, active)
         return corrected is not None and self._is_random(corrected)
 
+    def _explains(self, residual: Float[np.ndarray, "runs n"]) -> bool:
+        # what is too short to be tested does not say that something is missing
+        return not self.noise_known or self.left(residual).verdict != "unexplained"
+
     def _is_random(self, residual: Float[np.ndarray, "runs n"]) -> bool:
-        probability = noise_probability(residual, self.weight)
+        probability = self.left(residual).probability
         return probability is not None and probability > SIGNIFICANCE

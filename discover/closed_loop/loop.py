@@ -1,7 +1,7 @@
 """The closed loop: residual, attribution, augmentation, before and after."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,7 +17,7 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
-from discover.closed_loop.judgement import HeldOut, Judgement, judge
+from discover.closed_loop.judgement import HeldOut, Judgement, Silence, judge
 from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
@@ -25,6 +25,7 @@ from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.result import LoopResult, Stage, StageParameter
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
+from discover.closed_loop.silence import fluid_is_silent, records_are_silent
 from discover.dataset import ShearDataset, ShearRun
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
@@ -41,6 +42,7 @@ from discover.effects import (
 )
 from discover.errors import InputError
 from discover.laws import Fluid
+from discover.statistics import isolated
 from discover.statistics.residual import Expectation, fast_part, summarise
 
 LINEAR_STRAIN = 0.4
@@ -122,7 +124,7 @@ def run_loop(
     """
     started = time.perf_counter()
     say = progress or (lambda line: None)
-    fitted_runs, held_runs = _split(dataset, fit, held_out, strain, most_samples)
+    fitted_runs, held_runs, spikes = _split(dataset, fit, held_out, strain, most_samples)
     candidates = _candidates(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
@@ -145,13 +147,18 @@ def run_loop(
         leftover,
         Keeper(store, name),
     )
-    if search.resume():
+    silent = records_are_silent(fitted_runs)
+    if silent:
+        say("the records are noise about a constant: there is nothing to search in")
+        search.start()
+    elif search.resume():
         say(f"going on from what was kept: {', '.join(search.active)}")
     else:
         say(f"declared model on {len(fitted_runs)} runs")
         search.start()
         _settle(search, fitted_runs, max_effects, say)
-    search.run(max_effects, say)
+    if not silent:
+        search.run(max_effects, say)
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     order = dataset.names
@@ -169,17 +176,24 @@ def run_loop(
     if held_batch is not None:
         left = model.residuals([thetas[-1]], held_batch)[0]
         held = HeldOut(left, Resolution(model, held_batch, held_runs))
-    judgement = judge(leftover, current, active, records, held)
+    silence: Silence | None = "records" if silent else None
+    if not silent and fluid_is_silent(model, batch, current, active):
+        silence = "fluid"
+    judgement = judge(leftover, current, active, records, held, silence)
+    spikes = _with_later_ones(spikes, fitted_runs, judgement)
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),
         error_after=after,
-        noise_floor=judgement.noise_floor,
+        noise_floor=judgement.left.noise,
         stages=stages,
         remaining={
             "structured": judgement.structured,
             "error": after.fit,
-            "noise_floor": judgement.noise_floor,
+            "noise_floor": judgement.left.noise,
+            "outliers": sum(map(len, spikes.values())),
+            "outlier_times_s": spikes,
+            "probability": judgement.left.probability,
             "resolution": judgement.resolution,
             "noise_known": judgement.noise_known,
             "carries_over": judgement.carries_over,
@@ -221,10 +235,36 @@ def _split(dataset, fit, held_out, strain, most):
             f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "
             "told from fewer samples."
         )
-    return [
-        [thin_run(run, _needed(run, most)) for run in cut_to_strain(part.runs, strain)]
+    spikes: dict[str, list[float]] = {}
+    fitted_runs, held_runs = (
+        [
+            thin_run(run, _needed(run, most))
+            for run in _without_spikes(cut_to_strain(part.runs, strain), spikes)
+        ]
         for part in (fitted, held)
-    ]
+    )
+    return fitted_runs, held_runs, spikes
+
+
+def _without_spikes(runs: Sequence[ShearRun], spikes: dict[str, list[float]]) -> Iterator[ShearRun]:
+    """Give the runs without the samples that stand alone in them, whose times are noted."""
+    for run in runs:
+        off = isolated(run.shear_stress)
+        if np.any(off):
+            spikes[run.name] = [float(t) for t in run.time[off]]
+        yield run.window(~off) if np.any(off) else run
+
+
+def _with_later_ones(
+    spikes: dict[str, list[float]], runs: Sequence[ShearRun], judgement: Judgement
+) -> dict[str, list[float]]:
+    """Return the times of all outliers: of those that the fit showed too."""
+    found = dict(spikes)
+    for run, samples in zip(runs, judgement.left.outlier_samples, strict=True):
+        if samples:
+            times = [float(run.time[i]) for i in samples]
+            found[run.name] = sorted([*found.get(run.name, []), *times])
+    return found
 
 
 def _needed(run: ShearRun, most: int) -> int:

@@ -21,7 +21,7 @@ from discover.notebook_view import NotebookView, table_of
 if TYPE_CHECKING:
     from discover.closed_loop.reading import Reading
 
-Verdict = Literal["effects_added", "no_effect_needed", "unexplained"]
+Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 
 
 @dataclass(frozen=True)

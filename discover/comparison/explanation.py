@@ -98,7 +98,7 @@ def _left(
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
-    residuals, records = [], []
+    residuals, records, rates = [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
         for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
@@ -111,7 +111,8 @@ def _left(
                 return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
             residuals.append(np.asarray(prediction[quantity] - record, dtype=float))
             records.append(np.asarray(record, dtype=float))
-    found = lack_of_fit(residuals, records, expectation)
+            rates.append(np.asarray(flow.shear_rate, dtype=float))
+    found = lack_of_fit(residuals, records, expectation, rates)
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"

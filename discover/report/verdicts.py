@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.judgement import ONLY_NOISE
 from discover.closed_loop.result import LoopResult, Stage
 from discover.report.wording import (
     effect_title,
@@ -29,6 +28,7 @@ _LOOP = {
     "effects_added": "The declared model lacked something, and adding it explains the data",
     "no_effect_needed": "Nothing is missing that these data show: the declared model explains them",
     "unexplained": "What is left still has structure that no candidate explains",
+    "no_signal": "The records hold no signal that a law could be told from",
 }
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
 _NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
@@ -41,8 +41,17 @@ def loop_verdict(result: LoopResult) -> list[str]:
 
 
 def _loop_found(result: LoopResult) -> str:
-    if result.verdict == "no_effect_needed" and result.error_after.fit > ONLY_NOISE:
-        return "The records hold hardly anything but noise, so they say nothing of any law."
+    if result.verdict == "no_signal" and not result.stages:
+        return (
+            f"{_LOOP['no_signal']}: they hold hardly anything but noise, or do not follow what was "
+            "imposed."
+        )
+    if result.verdict == "no_signal":
+        names = _several([effect_title(stage.effect) for stage in result.stages], "and")
+        return (
+            f"{_LOOP['no_signal']}: {names} would explain them, with a fluid that is as good as "
+            "absent."
+        )
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
@@ -83,6 +92,9 @@ def _loop_sure(result: LoopResult) -> str:
     if few := result.remaining.get("not_judging", ()):
         verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
         parts.append(f"{_several(few, 'and')} {verb}")
+    if count := result.remaining.get("outliers", 0):
+        which = "samples are outliers" if count > 1 else "sample is an outlier"
+        parts.append(f"{count} {which} and did not count")
     for stage in result.stages:
         if stage.aliases:
             others = _several([*map(effect_title, stage.aliases)], "or")
@@ -106,6 +118,14 @@ def _several(names: Sequence[str], word: str) -> str:
 
 
 def _loop_next(result: LoopResult) -> str:
+    rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
+    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
+    if result.verdict == "no_signal":
+        return (
+            "See that the sensor is connected and the sample there, and measure where the stress "
+            "stands out of the noise: with a larger sample, a more sensitive transducer, or "
+            f"{faster}."
+        )
     doubtful = _most_doubtful(result.stages)
     if doubtful is not None:
         check = doubtful.check.rstrip(". ")
@@ -125,13 +145,6 @@ def _loop_next(result: LoopResult) -> str:
         return (
             "Repeat one run with another geometry or instrument: what changes is the instrument's, "
             "what stays is the fluid's."
-        )
-    rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
-    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
-    if result.error_after.fit > ONLY_NOISE:
-        return (
-            "Measure where the stress stands out of the noise: with a more sensitive transducer, a "
-            f"larger sample, or {faster}."
         )
     hidden = max(
         result.noise_floor,

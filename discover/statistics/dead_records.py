@@ -1,4 +1,4 @@
-"""Do records hold anything that answers to what was imposed, or are they noise about a constant?"""
+"""Whether records answer to what was imposed, or are noise about a constant."""
 
 from collections.abc import Sequence
 

@@ -1,7 +1,7 @@
 """Is what a model leaves of the records noise? One answer, for a comparison and for a loop."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,10 +12,11 @@ from discover.statistics.outliers import stray
 from discover.statistics.residual import (
     STRUCTURE,
     Expectation,
+    judging,
     summarise,
     tells_noise,
 )
-from discover.statistics.whiteness import noise_probability
+from discover.statistics.whiteness import SIGNIFICANCE, noise_probability
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
 
@@ -36,16 +37,18 @@ class LackOfFit:
         Root-mean-square residual over rms measurement, mean over runs.
     noise
         Relative noise of the records, mean over runs.
-    expected
-        Relative error that noise and the error of the linear data explain together.
     lag_one_correlation
         Of neighbouring residuals, mean over runs.
     probability
         Of residuals as structured as these, if they are noise; None where every run is too short.
     outliers
         Number of samples that are far outside the noise and do not vote.
+    outlier_samples
+        Which these are, of each run.
     reason
         The verdict in one sentence.
+    expected
+        Relative error that noise and the error of the linear data explain together.
     """
 
     verdict: FitVerdict
@@ -56,6 +59,7 @@ class LackOfFit:
     outliers: int = 0
     reason: str = ""
     expected: float = 0.0
+    outlier_samples: tuple[tuple[int, ...], ...] = ()
 
 
 def lack_of_fit(
@@ -79,53 +83,72 @@ def lack_of_fit(
     rates
         What was imposed, at the samples; with them a record that never follows it is told.
     """
+    left = what_is_left(residuals, measured, expectation)
+    if holds_signal(measured, rates):
+        return left
+    return replace(
+        left, verdict="no_signal", reason="the records are noise about a constant, whatever flows"
+    )
+
+
+def what_is_left(
+    residuals: Sequence[Float[np.ndarray, " _"]],
+    measured: Sequence[Float[np.ndarray, " _"]],
+    expectation: Expectation | None = None,
+) -> LackOfFit:
+    """Return the same of records that are known to hold a signal; see `lack_of_fit`."""
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)
-    summary = summarise(residual, weight)
-    misfit = float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
+    rows = judging(weight)
+    misfit = float(np.mean(np.sqrt(np.sum(residual[rows] ** 2, axis=1))))
     floor = expectation.floor(residual, weight, record)
     expected = float(np.hypot(floor, expectation.linear_error))
     known = expectation.noise is not None or tells_noise(weight)
     explained = known and expectation.explains(residual, weight, record)
+    probability = noise_probability(residual, weight, record)
     verdict: FitVerdict = "explained" if explained else "unexplained"
-    if not holds_signal(measured, rates):
-        verdict = "no_signal"
-        reason = "the records are noise about a constant, whatever was imposed"
-    elif explained and misfit > ONLY_NOISE:
+    if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
         reason = f"what is left ({100 * misfit:.2g} % of the records) is noise, and nearly all"
-    elif explained:
+    elif explained and (probability is None or probability > SIGNIFICANCE):
         reason = f"what is left ({100 * misfit:.2g} %) is noise"
+    elif explained:
+        given = "the noise given" if expectation.noise is not None else "the linear data's error"
+        reason = f"what is left ({100 * misfit:.2g} %) has a pattern no larger than {given}"
     elif misfit > STRUCTURE * expected:
         reason = f"what is left ({100 * misfit:.2g} %) is more than noise ({100 * expected:.2g} %)"
     else:
         reason = f"what is left ({100 * misfit:.2g} %) has a pattern that noise has not"
-    if outliers:
-        reason += f"; outliers that do not count: {outliers}"
+    count = sum(len(where) for where in outliers)
+    if count:
+        reason += f"; outliers that do not count: {count}"
     return LackOfFit(
         verdict,
         misfit,
         floor,
-        float(np.mean(summary.autocorrelation)),
-        noise_probability(residual, weight, record),
-        outliers,
+        float(np.mean(summarise(residual, weight).autocorrelation)),
+        probability,
+        count,
         reason,
         expected,
+        outliers,
     )
 
 
 def _without_outliers(residuals, measured):
-    """Return weighted residuals, weights and records, padded, and the number of outliers."""
-    kept = []
+    """Return weighted residuals, weights and records, padded, and which samples are outliers."""
+    kept, outliers = [], []
     for row, record in zip(residuals, measured, strict=True):
-        good = ~stray(np.asarray(row, dtype=float), np.asarray(record, dtype=float))
-        kept.append((np.asarray(row)[good], np.asarray(record)[good], np.count_nonzero(~good)))
-    longest = max(len(row) for row, _, _ in kept)
-    residual, weight, record = np.zeros((3, len(kept), longest))
-    for i, (row, values, _) in enumerate(kept):
-        n = len(values)
-        size = float(np.sqrt(np.mean(values**2))) or 1.0
+        values, record = np.asarray(row, dtype=float), np.asarray(record, dtype=float)
+        off = stray(values, record)
+        kept.append((values[~off], record[~off]))
+        outliers.append(tuple(int(i) for i in np.flatnonzero(off)))
+    longest = max(len(row) for row, _ in kept)
+    residual, weight, padded = np.zeros((3, len(kept), longest))
+    for i, (row, record) in enumerate(kept):
+        n = len(record)
+        size = float(np.sqrt(np.mean(record**2))) or 1.0
         weight[i, :n] = 1.0 / (size * np.sqrt(n))
         residual[i, :n] = row * weight[i, :n]
-        record[i, :n] = values
-    return residual, weight, record, int(sum(count for _, _, count in kept))
+        padded[i, :n] = record
+    return residual, weight, padded, tuple(outliers)

@@ -9,6 +9,9 @@ _BESIDE = 3  # samples on either side by which they are judged
 _ABOVE_NOISE = 6.0
 """Robust standard deviations of the noise. Three extrapolations must be missed by so much, to one
 side: of Gaussian noise one sample in more than ten thousand does."""
+_ABOVE_SPREAD = 8.0
+"""Robust standard deviations of a residual. Of noise in proportion to a wave the crest has 1.6
+times the median's."""
 _ABOVE_BENDS = 2.0
 """Times the sharpest bend of what remains: a real peak, or step, leaves a record that is bent."""
 _NEIGHBOURHOOD = 31
@@ -61,21 +64,35 @@ def stray(
     residual, record
         Prediction minus measurement, and the measurement, of one run, in order.
     """
-    off = isolated(record)
-    if len(record) < 2 * _BESIDE + _WIDEST:
-        return off
-    values = np.asarray(residual, dtype=float)
-    missed = values - median_filter(values, _SMOOTH, mode="nearest")
-    halfway = np.abs(np.convolve(values, [-0.5, 1.0, -0.5], "valid")) / np.sqrt(1.5)
+    left = np.flatnonzero(~isolated(record))
+    for _ in range(_PASSES):
+        if len(left) < 2 * _BESIDE + _WIDEST:
+            break
+        found = _missed_alone(np.asarray(residual, float)[left], np.asarray(record, float)[left])
+        if not np.any(found):
+            break
+        left = left[~found]
+    off = np.ones(len(record), dtype=bool)
+    off[left] = False
+    return off
+
+
+def _missed_alone(
+    residual: Float[np.ndarray, " n"], record: Float[np.ndarray, " n"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which samples are missed more than those around, and are off them in the record."""
+    missed = residual - median_filter(residual, _SMOOTH, mode="nearest")
+    halfway = np.abs(np.convolve(residual, [-0.5, 1.0, -0.5], "valid")) / np.sqrt(1.5)
     size = min(_NEIGHBOURHOOD, len(halfway))
     spread = np.pad(1.4826 * median_filter(halfway, size, mode="nearest"), 1, mode="edge")
-    start, excess, _ = _excess(np.asarray(record, dtype=float), 1)
-    alone = np.zeros(len(record))
-    alone[start] = excess
-    same = alone * -missed > 0.0
-    return off | (
-        same & (np.abs(missed) > _ABOVE_NOISE * spread) & (np.abs(alone) > 0.5 * np.abs(missed))
-    )
+    far = np.abs(missed) > _ABOVE_SPREAD * spread
+    off = np.zeros(len(record), dtype=bool)
+    for width in range(1, _WIDEST + 1):
+        start, excess, _ = _excess(record, width)
+        for i in range(width):
+            at = start + i
+            off[at] |= far[at] & (-np.sign(missed[at]) * excess > 0.5 * np.abs(missed[at]))
+    return off
 
 
 def _apart(values: Float[np.ndarray, " n"], width: int) -> Bool[np.ndarray, " n"]:

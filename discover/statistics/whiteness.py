@@ -27,6 +27,7 @@ _TRIED = 10
 _LARGEST = 3.0  # robust standard deviations up to which one innovation counts
 _NEIGHBOURHOOD = FEWEST_TESTED + 1
 _REPEATED = 0.5  # autocorrelation of a record that repeats itself
+_AS_WELL = 0.9
 _FEWEST_CYCLES = 2
 
 
@@ -106,8 +107,15 @@ def cycle(record: Float[np.ndarray, " n"]) -> float | None:
     lost = np.flatnonzero(correlation < 0.0)
     if not len(lost):
         return None
-    best = lost[0] + int(np.argmax(correlation[lost[0] :]))
-    if correlation[best] < _REPEATED or not lost[0] < best < lags[-1]:
+    after = correlation[lost[0] :]
+    alike = np.flatnonzero(after >= max(_REPEATED, _AS_WELL * float(np.max(after))))
+    if not len(alike):
+        return None
+    # several cycles repeat about as well as one: the first maximum counts
+    best = lost[0] + int(alike[0])
+    while best < lags[-1] and correlation[best + 1] > correlation[best]:
+        best += 1
+    if best == lags[-1]:
         return None
     left, top, right = correlation[best - 1 : best + 2]
     bend = left - 2.0 * top + right

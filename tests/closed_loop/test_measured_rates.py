@@ -140,9 +140,9 @@ def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     ]
     declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
     result = run_loop(ShearDataset("noise", tuple(runs)), declared, effects=EFFECTS)
-    assert result.verdict == "no_effect_needed"
+    assert result.verdict == "no_signal"
     assert result.stages == ()
-    assert "hardly anything else" in result.remaining["description"]
+    assert "noise about a constant" in result.remaining["description"]
     assert "hardly anything but noise" in loop_verdict(result)[0]
 
 

@@ -1,0 +1,58 @@
+"""Do the records hold a signal of the fluid? Asked of them alone, and of a fit to them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.least_squares import Fit
+from discover.closed_loop.run_batch import RunBatch
+from discover.dataset import ShearRun
+from discover.effects import ConstitutiveEffect
+from discover.statistics import holds_signal
+from discover.statistics.residual import judging, summarise
+from discover.statistics.whiteness import SIGNIFICANCE
+
+_OFF = 1e-30  # factor on the moduli of a fluid that is switched off
+
+
+def records_are_silent(runs: Sequence[ShearRun]) -> bool:
+    """Return whether records are noise about a constant, whatever rate was imposed."""
+    return not holds_signal([run.shear_stress for run in runs], [run.shear_rate for run in runs])
+
+
+def fluid_is_silent(
+    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str]
+) -> bool:
+    """Return whether a fit explains the records as well without its fluid.
+
+    The fluid is switched off, and what it had lowered the misfit by is held against what as many
+    constants as it has would lower noise by   [Wilks 1938, Ann. Math. Stat. 9, 60], on as many
+    samples as the residual is worth. So an effect that lets no flow reach the fluid, or no stress
+    of it the record, explains nothing, however small the misfit.
+
+    Parameters
+    ----------
+    model, batch
+        The model, and the fitted runs.
+    fit, active
+        The final fit and the effects in it.
+    """
+    declared = model.declared
+    off = replace(declared, modulus=_OFF * declared.modulus, solvent_viscosity=0.0)
+    theta, fluid = fit.theta.copy(), max(len(declared.free_positions), 1)
+    for effect in model.effects:
+        if effect.name in active and isinstance(effect, ConstitutiveEffect):
+            at = model.positions(effect.name)
+            theta[at] = model.zero()[at]
+            fluid += len(at)
+    without = AugmentedModel(off, model.effects).residuals([theta], batch)[0]
+    weight = np.asarray(batch.weight)
+    rows = judging(weight)
+    lost, left = (float(np.sum(r[rows] ** 2)) for r in (without, fit.residual))
+    if not np.isfinite(lost) or left <= 0.0:
+        return False
+    samples = summarise(fit.residual[rows], weight[rows]).effective_samples
+    return bool(samples * np.log(lost / left) < chi2.isf(SIGNIFICANCE, fluid))

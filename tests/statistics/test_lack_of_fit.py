@@ -1,0 +1,139 @@
+"""What a model leaves, judged: noise, something more, or of records that hold nothing."""
+
+import numpy as np
+import pytest
+
+from discover.statistics import holds_signal, lack_of_fit
+from discover.statistics.residual import Expectation
+from discover.statistics.whiteness import cycle, noise_probability
+
+SAMPLES = 300
+TIMES = np.linspace(0.1, 60.0, SAMPLES)
+WAVE = 10.0 * np.sin(TIMES)
+
+
+def correlated(rho, seed, n=SAMPLES):
+    generator = np.random.default_rng(seed)
+    drawn = generator.standard_normal(n)
+    for i in range(1, n):
+        drawn[i] = rho * drawn[i - 1] + np.sqrt(1.0 - rho**2) * drawn[i]
+    return drawn
+
+
+LOUD_START = 1.0 + 15.0 * np.exp(-TIMES)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_residual_that_repeats_every_cycle_is_no_noise_though_the_start_is_louder(noise):
+    # third harmonic of a nonlinear fluid, and the transient of a start that was none
+    left = 0.5 * np.sin(3.0 * TIMES) - 8.0 * np.exp(-3.0 * TIMES) + noise * correlated(0.0, 0)
+    found = lack_of_fit([left], [WAVE])
+    assert found.verdict == "unexplained"
+    assert found.noise < 0.02
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.9])
+def test_noise_with_a_loud_start_is_noise(correlation):
+    verdicts = [
+        lack_of_fit([0.3 * LOUD_START * correlated(correlation, seed)], [WAVE]).verdict
+        for seed in range(20)
+    ]
+    assert verdicts.count("explained") >= 19
+
+
+def test_spikes_once_a_cycle_are_found_by_the_cycle():
+    generator = np.random.default_rng(0)
+    once = np.zeros(SAMPLES)
+    once[::33] = 3.0
+    turn = np.arange(SAMPLES) * 2.0 * np.pi / 33.0
+    record = 10.0 * np.sin(turn)
+    assert cycle(record) == pytest.approx(33.0, abs=0.5)
+    here, weight = generator.standard_normal(SAMPLES), np.ones((1, SAMPLES))
+    assert noise_probability((here + once)[None], weight) > 1e-3
+    assert noise_probability((here + once)[None], weight, record[None]) < 1e-3
+    assert noise_probability(here[None], weight, record[None]) > 1e-3
+
+
+PROPORTIONAL = np.abs(np.sin(TIMES)) + 0.1
+LOUDER_LATER = 1.0 + 4.0 * (TIMES > 30.0)
+
+
+@pytest.mark.parametrize(
+    ("correlation", "size"),
+    [
+        *((rho, np.ones(SAMPLES)) for rho in (0.0, 0.6, 0.9)),
+        *((rho, PROPORTIONAL) for rho in (0.0, 0.6)),
+        *((rho, LOUDER_LATER) for rho in (0.0, 0.9)),
+    ],
+)
+def test_noise_of_any_size_is_rarely_taken_for_structure(correlation, size):
+    weight = np.ones((3, SAMPLES))
+    taken = 0
+    for seed in range(30):
+        rows = np.array([size * correlated(correlation, 100 * seed + i) for i in range(3)])
+        taken += noise_probability(rows, weight, np.tile(WAVE, (3, 1))) <= 1e-3
+    # significance 0.001: more than 2 of 30 has a probability below 1e-5
+    assert taken <= 2
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1])
+def test_outliers_are_counted_and_do_not_vote(share):
+    generator = np.random.default_rng(3)
+    noise = 0.1 * generator.standard_normal(SAMPLES)
+    off = generator.random(SAMPLES) < share
+    spikes = 3.0 * off * generator.choice([-1.0, 1.0], SAMPLES)
+    found = lack_of_fit([noise + spikes], [WAVE - noise - spikes])
+    assert found.outliers > 0.7 * np.count_nonzero(off)
+    assert found.noise < 0.35 * np.sqrt(np.mean((noise + spikes) ** 2)) / 7.07
+    clean = lack_of_fit([noise], [WAVE - noise])
+    assert (clean.outliers, clean.verdict) == (0, "explained")
+    assert clean.noise == pytest.approx(0.1 / 7.07, rel=0.2)
+
+
+# what was imposed: three start-ups and an oscillation
+RATES = [np.full(SAMPLES, 0.3), np.full(SAMPLES, 1.0), np.full(SAMPLES, 3.0), np.cos(TIMES)]
+
+
+def records(answer, noise, seed=0, correlation=0.0):
+    """Return records of what answers to the rates, with noise relative to the largest of them."""
+    exact = [answer(rate) for rate in RATES]
+    size = max(np.max(np.abs(one)) for one in exact) or 1.0
+    return [
+        one + noise * size * correlated(correlation, 10 * seed + i) for i, one in enumerate(exact)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("constant", [0.0, 42.0], ids=["noise", "dead"])
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_noise_about_a_constant_is_no_signal(seed, constant, correlation):
+    drawn = records(lambda rate: constant + 0.0 * rate, 0.05, seed, correlation)
+    assert not holds_signal(drawn, RATES)
+    # nothing that a model says of them explains them
+    said = lack_of_fit([constant - record for record in drawn], drawn, rates=RATES)
+    assert said.verdict == "no_signal"
+
+
+@pytest.mark.parametrize(
+    ("answer", "noise"),
+    [
+        (lambda rate: 7.0 * rate, 0.05),  # Newtonian, steady at once
+        (lambda rate: 7.0 * rate + 1000.0, 0.001),  # with a large offset
+        (lambda rate: rate * -np.expm1(-TIMES), 0.3),  # weak
+        (lambda rate: 2.0 * np.sign(rate), 0.05),  # dry friction
+    ],
+    ids=["newtonian", "offset", "weak", "friction"],
+)
+def test_what_answers_to_the_rate_is_a_signal(answer, noise):
+    assert holds_signal(records(answer, noise), RATES)
+
+
+def test_one_steady_flow_does_not_tell_a_constant_from_an_answer():
+    steady = [42.0 + correlated(0.0, 0)]
+    assert holds_signal(steady, RATES[:1])
+    assert not holds_signal([correlated(0.0, 0)], RATES[:1])
+
+
+def test_a_model_that_misses_all_of_a_record_explains_nothing():
+    found = lack_of_fit([-correlated(0.0, 0)], [correlated(0.0, 0)], Expectation())
+    assert found.verdict == "no_signal"

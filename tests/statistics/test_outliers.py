@@ -1,0 +1,60 @@
+"""Which samples are outliers: spikes, and not noise, peaks or steps."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.statistics.outliers import isolated, stray
+
+TIMES = np.linspace(0.05, 10.0, 200)
+WAVE = np.sin(2.0 * TIMES)
+
+
+def correlated(rho, generator, size=0.02, n=200):
+    drawn = generator.standard_normal(n)
+    for i in range(1, n):
+        drawn[i] = rho * drawn[i - 1] + np.sqrt(1.0 - rho**2) * drawn[i]
+    return size * drawn
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1])
+def test_spikes_of_thirty_times_the_noise_are_found(share):
+    generator = np.random.default_rng(0)
+    found = there = 0
+    for _ in range(10):
+        off = generator.random(200) < share
+        off[:3] = off[-3:] = False
+        spikes = 0.02 * 30.0 * off * generator.choice([-1.0, 1.0], 200)
+        record = WAVE + correlated(0.0, generator) + spikes
+        found += np.count_nonzero(stray(WAVE - record, record) & off)
+        there += np.count_nonzero(off)
+    # some stand side by side, and cannot be told from something real
+    assert found > 0.7 * there
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+@pytest.mark.parametrize("size", [1.0, np.abs(WAVE), 1.0 + (TIMES > 5.0)], ids=["", "prop", "step"])
+def test_noise_has_fewer_than_one_outlier_in_a_thousand_samples(correlation, size):
+    generator = np.random.default_rng(1)
+    count = 0
+    for _ in range(20):
+        noise = size * correlated(correlation, generator)
+        count += np.count_nonzero(stray(-noise, WAVE + noise))
+    assert count <= 4  # of 4000
+
+
+@pytest.mark.parametrize("samples", [15, 40, 200])
+@pytest.mark.parametrize("noise", [0.0, 0.005])
+def test_peaks_and_steps_are_no_outliers(samples, noise):
+    time = np.linspace(0.0, 10.0, samples)
+    generator = np.random.default_rng(2)
+    # σ' = γ̇ − σ − ε σ³ (a law that overshoots with its structure), by scipy, and dry friction
+    change = lambda t, y: [3.0 * y[1] - y[0], -2.0 * (y[1] - 0.2)]  # noqa: E731
+    peak = solve_ivp(change, (0.0, 10.0), [0.0, 3.0], t_eval=time, rtol=1e-8).y[0]
+    friction = np.sin(2.0 * time) + 0.4 * np.sign(np.cos(2.0 * time))
+    for record in (peak, friction, np.abs((time % 2.0) - 1.0)):
+        drawn = record + noise * generator.standard_normal(samples)
+        assert not np.any(isolated(drawn))
+        # nor are they to a model that has them not, or a sample too late
+        assert not np.any(stray(-drawn, drawn))
+        assert np.count_nonzero(stray(np.roll(record, 1) - drawn, drawn)) == 0
