@@ -27,7 +27,7 @@ from discover.simulate import synthetic_dataset
 
 FLOWS = {f"laos_{wi:g}_0.5": oscillatory_shear(wi, 0.5) for wi in (1.0, 2.0)}
 TEST, TIMES = start_up(2.0), np.linspace(0.0, 5.0, 26)
-RECIPE = DefaultRecipe(width=6, steps=8, polish_steps=40, max_tensors=1)
+RECIPE = DefaultRecipe(width=6, steps=8, polish_steps=20, max_tensors=1)
 STRESS, RATE = 1, 2
 
 
@@ -76,8 +76,9 @@ def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, o
 
 @pytest.fixture(scope="module")
 def constant():
+    flows = {f"{wi} {de}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
     data = synthetic_dataset(
-        "giesekus", {"alpha": 0.3}, FLOWS, noise=0.01, duration=8.0, n_samples=41
+        "giesekus", {"alpha": 0.3}, flows, noise=0.005, duration=8.0, n_samples=65
     )
     return TBNNUDE(recipe=RECIPE).fit(data.runs)
 
@@ -88,23 +89,24 @@ def test_where_constants_suffice_members_learn_from_halves_of_the_runs(constant)
     assert constant.law_ is constant.members_[0]
     mobilities = [float(member.constants[3]) for member in constant.members_]
     assert len(set(mobilities)) == 3
-    np.testing.assert_allclose(mobilities, 0.3, rtol=0.1)
+    np.testing.assert_allclose(mobilities[0], 0.3, rtol=0.05)
 
 
-def test_members_that_fit_are_handed_on_and_their_spread_is_of_the_size_of_the_noise(constant):
-    assert constant.result_.members[0] is constant.law_
-    predicted = constant.predict_members(TEST, TIMES)
-    low, high = predicted.band("N1")
-    width = np.linalg.norm(high - low) / np.linalg.norm(high)
-    assert 1e-5 < width < 0.1
+def test_members_that_fit_are_handed_on_and_the_others_are_not(constant):
+    fits = [member["fits"] for member in constant.result_.details["members"]]
+    assert fits[0]
+    assert len(constant.fitting_) == sum(fits)
+    assert constant.fitting_[0] is constant.law_
+    handed_on = constant.result_.members
+    assert len(handed_on) == (sum(fits) if sum(fits) > 1 else 0)
+    # of the size of the noise: those that fit all data cannot lie far from the truth
+    fluids = [Fluid.dimensionless(law) for law in constant.fitting_]
+    low, high = member_predictions(fluids, TEST, TIMES).band("N1")
+    assert np.linalg.norm(high - low) < 0.1 * np.linalg.norm(high)
 
 
-def trained(n_tensors):
-    return Trained(None, None, np.zeros(1), 0.0, n_tensors > 0, "", tuple(range(n_tensors)))  # type: ignore[arg-type]
-
-
-def test_the_simplest_of_the_members_that_fit_is_taken():
-    members = [trained(3), trained(1), trained(2)]
+def test_the_simplest_of_the_members_that_fit_is_taken(first):
+    members = [replace(first, tensors=tuple(range(n))) for n in (3, 1, 2)]
     chosen, fits = choose_member(members, np.array([0.0100, 0.0102, 0.0101]), 5e-4)
     assert chosen == 1
     assert np.all(fits)
@@ -147,11 +149,7 @@ def test_a_member_that_runs_away_is_counted_and_left_out_of_the_band(others):
 
 def test_a_single_run_has_no_halves(problem, first):
     alone = replace(first, varies=False)
-    one = make_problem(
-        synthetic_dataset("ucm", {}, dict([*FLOWS.items()][:1]), n_samples=11).runs,
-        np.ones(1),
-        np.ones(1),
-    )
+    one = eqx.tree_at(lambda tree: tree.target, problem, problem.target[:1])
     members, how = train_others(one, alone, jax.random.split(jax.random.key(0), 2), RECIPE)
     assert members == [alone, alone]
     assert "do not differ" in how

@@ -1,7 +1,9 @@
 """The scikit-learn estimator: runs in, a trained network law out."""
 
+import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -229,8 +231,10 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         if len(keys) == 1:
             return [first], "a single member"
         if isinstance(recipe, PaperRecipe):
-            others = [self._train(problem, key, recipe) for key in keys[1:]]
-            return [first, *others], "trained one after the other from initial weights of their own"
+            # the first has compiled the program; its steps are too small to be shared out
+            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+                others = list(pool.map(lambda key: self._train(problem, key, recipe), keys[1:]))
+            return [first, *others], "trained from initial weights of their own"
         others, agreement = train_others(problem, first, keys[1:], recipe, self.progress)
         return [first, *others], agreement
 
