@@ -70,7 +70,11 @@ def export_case(r: random.Random) -> Case:
     case.nonsense += [] if form and form != "docx" else ["a format that is none"]
     case.arguments = ["export", "{}/out", "--format", form]
     if form == "rheotool":
-        case.arguments += ["--density", r.choice(["1000", "1000", "nan", "-1", "inf", "0"])]
+        option = r.choice(["--density", "--density", "--tolerance"])
+        value = r.choice(["1000", "0.01", "nan", "-1", "inf", "0", "x", "1_000"])
+        case.arguments += [option, value]
+        fine = value in (("1000", "0.01", "1_000") if option == "--density" else ("0.01", "0"))
+        case.nonsense += [] if fine else [f"{option} {value}"]
     if r.random() < 0.3:
         case.arguments += [
             "--out",
