@@ -58,7 +58,8 @@ def export(
     equation = choose_law(read_result_laws(results), law)
     text = write_equation(equation, form, density, tolerance)
     if out is None:
-        typer.echo(text, nl=False)
+        # half a character in a title, which no terminal can show
+        typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)
         return
     if os.path.isdir(out):
         raise InputError(f"{out} is a folder; give the name of a file.")
