@@ -1,5 +1,6 @@
 """The command that writes a law out in a form that other programs take."""
 
+import math
 import os
 from pathlib import Path
 from typing import Annotated
@@ -47,11 +48,18 @@ def export(
     from discover.precision import enable_x64
     from discover.study.atomic import make_folder, write_text
 
+    if density is not None and not 0.0 < density < math.inf:
+        raise InputError(
+            f"--density must be a positive number of kg/m3; got {density}. Try 1000."
+        )
+    if tolerance is not None and math.isnan(tolerance):
+        raise InputError("--tolerance must be a number from 0 to 0.5; got nan. Try 0.01.")
     enable_x64()
     equation = choose_law(read_result_laws(results), law)
     text = write_equation(equation, form, density, tolerance)
     if out is None:
-        typer.echo(text, nl=False)
+        # half a character in a title, which no terminal can show
+        typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)
         return
     if os.path.isdir(out):
         raise InputError(f"{out} is a folder; give the name of a file.")

@@ -77,7 +77,7 @@ def prediction_bands(
     rivals: Sequence[Contender],
     declared: Fluid,
     protocols: Sequence[ShearProtocol],
-    times: Sequence[Float[np.ndarray, " n"]],
+    times: Sequence[Float[np.ndarray, " _"]],
     n_draws: int = 100,
     seed: int = 0,
 ) -> list[PredictionBand]:

@@ -110,7 +110,7 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
 def predict_laws(
     fluids: Fluid,
     protocols: Sequence[ShearProtocol],
-    times: Sequence[Float[np.ndarray, " n"]],
+    times: Sequence[Float[np.ndarray, " _"]],
 ) -> Float[np.ndarray, "laws flows n 3"]:
     """Return σ12, N1 and N2 in Pa of every law in every flow; not finite where a law runs away.
 
