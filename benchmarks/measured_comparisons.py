@@ -46,7 +46,7 @@ STUDIES = {
 
 def main() -> None:
     """Run the studies and print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="discover compare on measured data")
     parser.add_argument("--out", type=Path, required=True, help="folder of results")
     parser.add_argument("--only", nargs="*", choices=[*STUDIES], default=[*STUDIES])
     parser.add_argument("--learners", nargs="*", choices=LEARNERS, default=LEARNERS)

@@ -33,22 +33,27 @@ def left_by_sampled_rates(
         Of the fluid, by the key of the flow.
     """
     misfits, changes = [], []
-    training = [flow for flow in flows if flow.kind == "training" and flow.measured is not None]
-    for flow in training:
-        prediction = predictions[flow.key]
-        size = float(np.sqrt(np.mean(np.square(flow.measured))))
-        if prediction is None or size == 0.0:
+    for flow in flows:
+        measured, prediction = flow.measured, predictions[flow.key]
+        if flow.kind != "training" or measured is None:
+            continue
+        if prediction is None or not np.any(measured):
             return 0.0
-        misfits.append(np.sqrt(np.mean((prediction["sigma12"] - flow.measured) ** 2)) / size)
+        misfits.append(_relative(prediction["sigma12"] - measured, measured))
     if not misfits or float(np.mean(misfits)) > LARGEST:
         return 0.0
-    for flow in training:
+    for flow in flows:
+        measured, prediction = flow.measured, predictions[flow.key]
+        if flow.kind != "training" or measured is None or prediction is None:
+            continue
         smooth = smooth_between_samples(flow.protocol)
         other = None if smooth is None else predict(fluid, replace(flow, protocol=smooth))
-        prediction, change = predictions[flow.key], 0.0
-        if other is not None and prediction is not None:
-            size = np.sqrt(np.mean(np.square(flow.measured)))
-            difference = other["sigma12"] - prediction["sigma12"]
-            change = float(np.sqrt(np.mean(difference**2)) / size)
+        change = 0.0
+        if other is not None:
+            change = _relative(other["sigma12"] - prediction["sigma12"], measured)
         changes.append(change)
     return float(np.mean(changes))
+
+
+def _relative(difference: np.ndarray, measured: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(difference**2) / np.mean(measured**2)))

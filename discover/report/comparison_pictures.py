@@ -1,6 +1,6 @@
 """The pictures of a comparison's page, each drawn by itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from discover.comparison.comparison import Comparison
@@ -40,6 +40,6 @@ def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn
     return _drawn(found), _drawn(training)
 
 
-def _drawn(pictures: list[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:
+def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:
     drawn = [attempt(title, draw) for title, draw in pictures]
     return [one for one in drawn if one is not None]

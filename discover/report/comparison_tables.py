@@ -45,7 +45,7 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
             "range": list(_by_run(row).values()),
             "bic": row["bic"] - lowest if known(row["bic"]) else None,
             "rules": ", ".join(
-                RULES.get(rule, rule)
+                RULES.get(rule, str(rule))
                 for rule, support in chosen.items()
                 if support == row["support"]
             ),

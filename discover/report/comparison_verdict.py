@@ -41,8 +41,8 @@ def _found(comparison: Comparison) -> str:
         names = " and ".join(_law_of(name) for name in explanation.by)
         verb = "explains" if len(explanation.by) == 1 else "explain"
         sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
-        rest = "is noise" if len(explanation.by) == 1 else "are noise"
-        parts.append(f"explained: {names} {verb} the data, and what is left ({sizes}) {rest}")
+        rest = "what is left" if len(explanation.by) == 1 else "what each leaves"
+        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) is noise")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
@@ -51,10 +51,12 @@ def _found(comparison: Comparison) -> str:
             parts.append(f"{_law_of(name)} leaves {_left(one)}")
     if sparse is not None and explanation.in_library:
         parts.append(_terms_found(comparison, sparse))
+    elif sparse is not None and not sparse.terms:
+        parts.append("sparse regression found no term that helps")
     elif sparse is not None:
         parts.append(
-            f"its terms, {terms_text(sparse, intervals=False)}, describe the data and are no "
-            "finding"
+            f"sparse regression's terms, {terms_text(sparse, intervals=False)}, describe the data "
+            "and are no finding"
         )
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
@@ -153,7 +155,8 @@ def _next(comparison: Comparison) -> str:
             "Measure where the stress stands out of the noise: at higher rates, with a more "
             "sensitive transducer, or with a larger sample."
         )
-    if "tensor_sindy" in comparison.outcomes and not explanation.in_library:
+    lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
+    if lacking or explanation.verdict == "unexplained":
         return (
             "Before measuring more, find what the law lacks: discover close-loop tries effects of "
             "the instrument and of the flow on the same runs, and [compare] library and max_terms "

@@ -153,11 +153,17 @@ def terms_text(outcome: LearnerOutcome, intervals: bool = True) -> str:
         return "no term at all"
     parts = []
     for term in outcome.terms:
-        text = f"{estimate(term.coefficient, term.ci95)} {spoken(term.term)}"
+        text = f"{estimate(term.coefficient, term.ci95)} {_factor(spoken(term.term))}"
         if intervals and term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)
+
+
+def _factor(text: str) -> str:
+    """Return a term as a number may stand before it: a sum in brackets, unless it has them."""
+    outside = re.sub(r"\([^()]*\)", "", text)
+    return f"({text})" if "+" in outside or "−" in outside else text
 
 
 RULES = {

@@ -18,7 +18,14 @@ from discover.report.comparison_report import write_comparison
 from discover.report.comparison_verdict import comparison_verdict
 from discover.report.parts import Missing, attempt
 from discover.report.verdicts import QUESTIONS
-from discover.report.wording import estimate, interval, percent, percent_range, significant
+from discover.report.wording import (
+    estimate,
+    interval,
+    percent,
+    percent_range,
+    significant,
+    terms_text,
+)
 from discover.statistics import LackOfFit
 from discover.study import RunFolder
 
@@ -228,6 +235,14 @@ def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):
     assert unconditional("The data rule out every other law at 5 %.") != []
 
 
+def test_a_sum_stands_in_brackets_behind_its_coefficient():
+    terms = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "(exp(epsilon*tr(sigma))-1)*sigma")
+    one = replace(outcome("tensor_sindy", 0.01, False), terms=tuple(
+        RecoveredTerm(name, 0.2) for name in terms
+    ))  # fmt: skip
+    assert terms_text(one) == "0.2 σ·σ, 0.2 (σ·γ̇+γ̇·σ), 0.2 (exp(ε tr(σ))-1) σ"
+
+
 def test_where_only_the_network_explains_nothing_is_determined():
     comparison = made_up(sparse="unexplained", statements=UNEXPLAINED)
     found, sure, _ = comparison_verdict(comparison)
@@ -235,6 +250,13 @@ def test_where_only_the_network_explains_nothing_is_determined():
     assert found.startswith("Explained: the neural network's law explains the data")
     assert "sparse regression's law leaves" in found
     assert "nothing is determined" in sure
+
+
+def test_a_network_alone_that_explains_nothing_is_no_reason_to_measure_more():
+    comparison = made_up(sparse=None, network="unexplained", statements=UNEXPLAINED)
+    found, _, following = comparison_verdict(comparison)
+    assert found.startswith("Unexplained: the law does not explain the data")
+    assert "close-loop" in following
 
 
 def test_no_signal_reports_no_law(tmp_path, no_pictures):
