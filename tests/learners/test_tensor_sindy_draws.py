@@ -1,7 +1,5 @@
 """Constants that exchange each other, in data by scipy alone."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -12,9 +10,9 @@ from discover.dataset.run import ShearRun
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
-from discover.learners.tensor_sindy.linear_model import LinearModel
 from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import refit
+from discover.learners.tensor_sindy.search import SupportSearch
 from discover.protocols import oscillatory_shear
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary
@@ -83,11 +81,7 @@ class Fitted:
         """The term as the learner reports it."""
         learner = TensorSINDy()
         learner.uncertainty_, learner.draws_ = self.uncertainty, self.draws
-        search = SimpleNamespace(
-            problem=self.problem,
-            largest=1,
-            model_at=lambda fit: LinearModel.at(self.problem, fit),
-        )
+        search = SupportSearch(self.problem, "stlsq", 1, 1e-5)
         (term,) = learner._terms(search, self.fit)
         return term
 
