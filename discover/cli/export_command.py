@@ -49,9 +49,7 @@ def export(
     from discover.study.atomic import make_folder, write_text
 
     if density is not None and not 0.0 < density < math.inf:
-        raise InputError(
-            f"--density must be a positive number of kg/m3; got {density}. Try 1000."
-        )
+        raise InputError(f"--density must be a positive number of kg/m3; got {density}. Try 1000.")
     if tolerance is not None and math.isnan(tolerance):
         raise InputError("--tolerance must be a number from 0 to 0.5; got nan. Try 0.01.")
     enable_x64()
