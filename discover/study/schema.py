@@ -24,7 +24,15 @@ LawName = Annotated[str, AfterValidator(_known_or_learned)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
 # wider than any instrument, and narrow enough that squares and ratios compute
 _LEAST, _MOST = 1e-15, 1e15
-Positive = Annotated[float, Field(ge=_LEAST, le=_MOST)]
+
+
+def _not_tiny(value: float) -> float:
+    if value < _LEAST:
+        raise ValueError(f"should be at least {_LEAST:g}; got {value:g}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
 
 
 class Synthetic(Section):

@@ -6,7 +6,8 @@ from hostile_inputs import MENDS, all_cases, nonsense_taken, run, up_to_the_firs
 
 GOOD = {
     "data/runs.csv": b"file\na.csv\n",
-    "data/a.csv": b"time_s,shear_rate_1_s,stress_Pa\n0.1,1,1\n0.2,1,2\n0.3,1,3\n",
+    "data/a.csv": b"time_s,shear_rate_1_s,stress_Pa\n"
+    + b"".join(b"0.%d,1,%d\n" % (i, i) for i in range(1, 9)),
     "s.toml": b'[data]\nfolder = "data"\n',
 }
 

@@ -136,7 +136,7 @@ BAD = [
     ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n2,1,1\n1,1,1\n"}, "line 4 holds 1 s"),
     ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n-1,1,1\n"}, "start at or after 0"),
     ({"a__csv": "time_s,shear_rate_1_s,stress_Pa\n0,1,1\n1,1,1,1,1\n"}, "not a comma-separated"),
-    ({"lve__csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n1,-5,5\n"}, "G' in lve.csv must be positive"),
+    ({"lve__csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n1,-5,5\n"}, "Gp_Pa in lve.csv must be positive"),
     ({"lve__csv": "omega_rad_s,Gp_Pa\n1,5\n"}, "no column Gpp_Pa"),
 ]
 
