@@ -1,68 +1,20 @@
-"""Units as instruments and users write them, read by a small grammar of their own.
+"""Units as instruments and users write them.
 
-Text from a file is never calculated: a unit is a product of known words with small exponents, and
-the only number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no
-units, and ``9**9**9`` is not worked out.
+Text from a file is never calculated: a unit is a product of words with small exponents, and the only
+number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no units, and
+``9**9**9`` is not worked out. What a single word means is asked of pint.
 """
 
-import math
 import re
 from dataclasses import dataclass
+from functools import cache
 
 _LONGEST = 40  # characters
 
-# Factor to SI and exponents of kg, m, s. Defined values: BIPM, The International System of Units,
-# 9th ed.; others: NIST SP 811 (2008), appendix B.8
-_STEMS: dict[str, tuple[float, tuple[int, int, int]]] = {
-    "s": (1.0, (0, 0, 1)),
-    "Pa": (1.0, (1, -1, -2)),
-    "bar": (1e5, (1, -1, -2)),
-    "N": (1.0, (1, 1, -2)),
-    "dyn": (1e-5, (1, 1, -2)),
-    "m": (1.0, (0, 1, 0)),
-    "g": (1e-3, (1, 0, 0)),
-    "rad": (1.0, (0, 0, 0)),
-    "Hz": (1.0, (0, 0, -1)),
-}
-"""Words that take a prefix."""
+_SPELLINGS = {"%": "percent", "pct": "percent", "°": "degree", "rev": "turn"}
+"""What pint does not know under this name."""
 
-_WORDS: dict[str, tuple[float, tuple[int, int, int]]] = {
-    "min": (60.0, (0, 0, 1)),
-    "h": (3600.0, (0, 0, 1)),
-    "d": (86400.0, (0, 0, 1)),
-    "psi": (6894.757293168361, (1, -1, -2)),
-    "ksi": (6894757.293168361, (1, -1, -2)),
-    "atm": (101325.0, (1, -1, -2)),
-    "torr": (101325.0 / 760.0, (1, -1, -2)),
-    "lbf": (4.4482216152605, (1, 1, -2)),
-    "kgf": (9.80665, (1, 1, -2)),
-    "gf": (9.80665e-3, (1, 1, -2)),
-    "in": (0.0254, (0, 1, 0)),
-    "ft": (0.3048, (0, 1, 0)),
-    "deg": (math.pi / 180.0, (0, 0, 0)),
-    "rev": (2.0 * math.pi, (0, 0, 0)),
-    "rpm": (2.0 * math.pi / 60.0, (0, 0, -1)),
-    "%": (0.01, (0, 0, 0)),
-    "ppm": (1e-6, (0, 0, 0)),
-}
-"""Words that take none."""
-
-_NAMES = {
-    "second": "s", "sec": "s", "minute": "min", "hour": "h", "hr": "h", "day": "d", "pascal": "Pa",
-    "newton": "N", "dyne": "dyn", "meter": "m", "metre": "m", "inch": "in", "foot": "ft",
-    "gram": "g", "radian": "rad", "degree": "deg", "°": "deg", "hertz": "Hz", "turn": "rev",
-    "revolution": "rev", "percent": "%", "pct": "%",
-}  # fmt: skip
-"""Other words for the same, in lower case; all that are whole words also with an s at the end."""
-
-_PREFIXES = {
-    "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "µ": 1e-6,
-    "n": 1e-9, "p": 1e-12,
-}  # fmt: skip
-_LONG_PREFIXES = {
-    "giga": 1e9, "mega": 1e6, "kilo": 1e3, "hecto": 1e2, "centi": 1e-2, "milli": 1e-3,
-    "micro": 1e-6, "nano": 1e-9,
-}  # fmt: skip
+_DIMENSIONS = ("[mass]", "[length]", "[time]")
 
 
 @dataclass(frozen=True)
@@ -168,20 +120,26 @@ def _power(text: str) -> Unit | None:
     return None if word is None else Unit().times(word, int(match.group(2) or 1))
 
 
+@cache
 def _word(text: str) -> Unit | None:
-    if text in _WORDS:
-        return Unit(*_WORDS[text])
-    for prefix, factor in (("", 1.0), *_PREFIXES.items()):
-        stem = text.removeprefix(prefix)
-        if text.startswith(prefix) and stem in _STEMS:
-            size, dimension = _STEMS[stem]
-            return Unit(factor * size, dimension, stem == "Hz")
-    name = text.lower()
-    if name not in _NAMES and len(name) > 4:
-        name = name.removesuffix("s")
-    for prefix, factor in (("", 1.0), *_LONG_PREFIXES.items()):
-        symbol = _NAMES.get(name.removeprefix(prefix), "") if name.startswith(prefix) else ""
-        if symbol and (not prefix or symbol in _STEMS):
-            unit = _word(symbol)
-            return None if unit is None else Unit(factor, cycles=unit.cycles).times(unit)
+    """Return a single word, such as kPa or seconds, from pint."""
+    word = _SPELLINGS.get(text, text)
+    # whole words may begin with a capital; of short symbols the case has a meaning
+    for name in (word, word.lower()) if len(word) > 3 else (word,):
+        try:
+            size = _registry().Quantity(1.0, name).to_base_units()
+        except Exception:  # pint raises errors of many kinds for what is no unit
+            continue
+        found = dict(size.dimensionality)
+        if set(found) <= set(_DIMENSIONS):
+            kg, m, s = (int(found.get(key, 0)) for key in _DIMENSIONS)
+            return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(_registry().Unit(name)))
     return None
+
+
+@cache
+def _registry():
+    # pint takes a noticeable time to load; files in SI units never need it
+    import pint
+
+    return pint.UnitRegistry()
