@@ -1,8 +1,8 @@
 """Units as instruments and users write them.
 
-Text from a file is never calculated: a unit is a product of words with small exponents, and the only
-number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no units, and
-``9**9**9`` is not worked out. What a single word means is asked of pint.
+Text from a file is never calculated: a unit is a product of words with small exponents, and the
+only number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no units,
+and ``9**9**9`` is not worked out. What a single word means is asked of pint.
 """
 
 import re
@@ -15,6 +15,9 @@ _SPELLINGS = {"%": "percent", "pct": "percent", "°": "degree", "rev": "turn"}
 """What pint does not know under this name."""
 
 _DIMENSIONS = ("[mass]", "[length]", "[time]")
+
+_NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
+"""Units without a dimension; pint counts constants such as pi among them."""
 
 
 @dataclass(frozen=True)
@@ -127,13 +130,14 @@ def _word(text: str) -> Unit | None:
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 3 else (word,):
         try:
-            size = _registry().Quantity(1.0, name).to_base_units()
+            unit = _registry().Unit(name)
+            size = _registry().Quantity(1.0, unit).to_base_units()
         except Exception:  # pint raises errors of many kinds for what is no unit
             continue
         found = dict(size.dimensionality)
-        if set(found) <= set(_DIMENSIONS):
+        if set(found) <= set(_DIMENSIONS) and (found or str(unit).endswith(_NUMBERS)):
             kg, m, s = (int(found.get(key, 0)) for key in _DIMENSIONS)
-            return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(_registry().Unit(name)))
+            return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
     return None
 
 
