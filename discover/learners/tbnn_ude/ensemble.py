@@ -71,11 +71,13 @@ def train_others(
             for half, key in zip(halves, keys, strict=True)
         ]
         return members, "trained on halves of the runs"
+    # what the first one needed later may have been the better beginning
+    starts = sorted(first.passed_over, key=lambda tensor: tensor not in first.tensors)
     members = []
     for i, key in enumerate(keys):
         groups = [first.tensors]
-        if i % 2 == 0 and i // 2 < len(first.passed_over):
-            other = first.passed_over[i // 2]
+        if i % 2 == 0 and i // 2 < len(starts):
+            other = starts[i // 2]
             beside = [t for t in first.tensors if t != other]
             groups = [(other,), beside[: recipe.max_tensors - 1]]
         members.append(
