@@ -14,7 +14,7 @@ from discover.protocols.shear import ShearProtocol, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SyntheticDataset(ShearDataset):
     """A data set whose law is known.
 
