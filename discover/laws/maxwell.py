@@ -24,6 +24,6 @@ NAMED = {
         "upper convected Maxwell",
         UpperConvectedMaxwell,
         {},
-        "Oldroyd 1950, Proc. R. Soc. London A 200, 523",
+        source="Oldroyd 1950, Proc. R. Soc. London A 200, 523",
     )
 }

@@ -40,19 +40,18 @@ _RANGE_SOURCE = {
 }
 
 NAMED = {
-    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, _RANGE, _RANGE_SOURCE),
-    "ptt_exponential": NamedLaw(
-        "exponential PTT", ExponentialPhanThienTanner, _RANGE, _RANGE_SOURCE
-    source="ptt_linear": NamedLaw(
+    "ptt_linear": NamedLaw(
         "linear PTT",
         LinearPhanThienTanner,
-        {"epsilon": (0.0, 10.0)},
-        "Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
     ),
     "ptt_exponential": NamedLaw(
         "exponential PTT",
         ExponentialPhanThienTanner,
-        {"epsilon": (0.0, 10.0)},
-        "Phan-Thien 1978, J. Rheol. 22, 259",
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien 1978, J. Rheol. 22, 259",
     ),
 }

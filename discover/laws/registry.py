@@ -126,7 +126,7 @@ def register_law(
             )
         ranges[str(key)] = (low, high)
     _require_law(name, build, ranges)
-    entry = NamedLaw(title or name.replace("_", " "), build, ranges, source)
+    entry = NamedLaw(title or name.replace("_", " "), build, ranges, source=source)
     LAWS[name] = entry
     return entry
 
