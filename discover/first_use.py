@@ -47,7 +47,7 @@ def require_double() -> None:
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
         raise InputError(
             "JAX computes in single precision here, in which no law can be told from another. "
-            "Leave the disable_x64 block, or undo it with "
+            "Leave the block that turned double precision off, or turn it on again with "
             "jax.config.update('jax_enable_x64', True)."
         )
 

@@ -1,7 +1,6 @@
 """A law whose coefficients in the tensor basis are a neural network."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
@@ -11,6 +10,11 @@ from tensor_library.integrity_basis import integrity_basis
 from tensor_library.invariants import scalar_invariants
 
 N_COEFFICIENTS = 8
+
+
+def _tanh(value: Float[Array, ""]) -> Float[Array, ""]:
+    # JAX's own cannot be pickled once a module holds it
+    return jnp.tanh(value)
 
 
 class TensorBasisNetwork(AbstractConstitutiveLaw):
@@ -46,7 +50,7 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        network = eqx.nn.MLP(N_COEFFICIENTS, N_COEFFICIENTS, width, depth, jax.nn.tanh, key=key)
+        network = eqx.nn.MLP(N_COEFFICIENTS, N_COEFFICIENTS, width, depth, _tanh, key=key)
         return cls(
             network=network,
             constants=jnp.zeros(N_COEFFICIENTS),

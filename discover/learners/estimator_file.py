@@ -105,7 +105,7 @@ class EstimatorFile:
         except (ValueError, EOFError, zlib.error, RecursionError, NotImplementedError) as error:
             if isinstance(error, InputError):
                 raise
-            raise self._damaged(error) from None
+            raise self.damaged(error) from None
         self.learner = str(self._header.get("learner"))
 
     def read(self, types: Sequence[type]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -125,7 +125,7 @@ class EstimatorFile:
         except InputError as error:  # a law that is not registered here
             raise InputError(f"{self._path}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise self._damaged(error) from None
+            raise self.damaged(error) from None
         return parameters, fitted
 
     def _read_header(self, file: zipfile.ZipFile) -> dict[str, Any]:
@@ -148,7 +148,8 @@ class EstimatorFile:
             "estimator.save(path) wrote; a law by itself is read elsewhere."
         )
 
-    def _damaged(self, error: Exception) -> InputError:
+    def damaged(self, error: Exception) -> InputError:
+        """Return what to raise where something in the file is not as it was written."""
         first = (str(error).splitlines() or [""])[0][:200]
         return InputError(
             f"{self._path} is damaged ({type(error).__name__}: {first}). Copy it again, or fit "

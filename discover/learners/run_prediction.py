@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -110,18 +110,21 @@ class RunPrediction:
         )
 
     @classmethod
-    def _from_file(cls, file: EstimatorFile) -> Self:
+    def _from_file(cls, file: EstimatorFile) -> Any:
         parameters, fitted = file.read(cls._saved_types)
-        estimator = cls(**parameters)
-        for name in cls._saved:
-            setattr(estimator, name, fitted[name])
+        try:
+            estimator = cls(**parameters)
+            for name in cls._saved:
+                setattr(estimator, name, fitted[name])
+        except (KeyError, TypeError) as error:
+            raise file.damaged(error) from None
         return estimator
 
-    def predict(self, X: Iterable[Any]) -> Float[np.ndarray, " rows"]:
+    def predict(self, X: Any) -> Float[np.ndarray, " rows"]:
         """Return σ12 in Pa at the samples of all runs, one run after the other."""
         return np.concatenate(self._predict_runs(as_runs(X)))
 
-    def score(self, X: Iterable[Any], y=None, sample_weight=None) -> float:
+    def score(self, X: Any, y=None, sample_weight=None) -> float:
         """Return one minus the relative error of σ12, averaged over runs: 1 is perfect.
 
         The error of a run is the root-mean-square of prediction minus measurement over the

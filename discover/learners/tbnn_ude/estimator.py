@@ -139,13 +139,13 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.progress = progress
         self.base = base
 
-    def fit(self, X: Sequence, y=None) -> "TBNNUDE":
+    def fit(self, X: Any, y=None) -> "TBNNUDE":
         """Train on σ12 of these runs.
 
         Parameters
         ----------
         X
-            Runs, a sequence of `ShearRun`.
+            Runs (`ShearRun`), or a data set.
         y
             Ignored: the observations are part of the runs.
 

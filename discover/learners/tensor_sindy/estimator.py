@@ -1,7 +1,6 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from collections.abc import Iterable
 from typing import Any
 
 import jax.numpy as jnp
@@ -181,7 +180,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.progress = progress
         self.base = base
 
-    def fit(self, X: Iterable[Any], y=None) -> "TensorSINDy":
+    def fit(self, X: Any, y=None) -> "TensorSINDy":
         """Find the law of these runs.
 
         Parameters
