@@ -12,9 +12,15 @@ from tensor_library.invariants import scalar_invariants
 N_COEFFICIENTS = 8
 
 
+# JAX's and Equinox's own have no name by which a network that holds them could be unpickled
+
+
 def _tanh(value: Float[Array, ""]) -> Float[Array, ""]:
-    # JAX's own cannot be pickled once a module holds it
     return jnp.tanh(value)
+
+
+def _unchanged(value: Float[Array, " n"]) -> Float[Array, " n"]:
+    return value
 
 
 class TensorBasisNetwork(AbstractConstitutiveLaw):
@@ -50,7 +56,9 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        network = eqx.nn.MLP(N_COEFFICIENTS, N_COEFFICIENTS, width, depth, _tanh, key=key)
+        network = eqx.nn.MLP(
+            N_COEFFICIENTS, N_COEFFICIENTS, width, depth, _tanh, _unchanged, key=key
+        )
         return cls(
             network=network,
             constants=jnp.zeros(N_COEFFICIENTS),
