@@ -19,7 +19,7 @@ def _tanh(value: Float[Array, ""]) -> Float[Array, ""]:
     return jnp.tanh(value)
 
 
-def _unchanged(value: Float[Array, " n"]) -> Float[Array, " n"]:
+def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
     return value
 
 

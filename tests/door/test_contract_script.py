@@ -31,19 +31,13 @@ def after(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         quick = {"library": LIBRARY, "max_terms": 1, "n_folds": 0, "n_stability": 0}
-        for learner, less in ((TensorSINDy, quick), (TBNNUDE, {"quick": True})):
-            made = learner.__init__
-            defaults = dict(zip(_names(made), made.__defaults__, strict=True)) | less
-            patch.setattr(made, "__defaults__", tuple(defaults.values()))
+        patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, **quick))
+        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, quick=True))
         few = partial(in_memory.run_loop, effects=["giesekus_mobility", "stress_gain"])
         patch.setattr(in_memory, "run_loop", few)
         left: dict = {"folder": folder}
         exec(compile(script(), "docs/python.md", "exec"), left)
         yield left
-
-
-def _names(function):
-    return function.__code__.co_varnames[1 : function.__code__.co_argcount]
 
 
 def test_the_page_has_the_script_word_for_word():
@@ -110,7 +104,7 @@ def test_an_estimator_from_a_file_is_compared_with_its_runs_at_hand(after):
     [
         (lambda s: dc.compare([s["sindy"]], s["train"]), "both fitted and held out"),
         (lambda s: dc.compare([s["sindy"], s["sindy"]], s["test"]), "one TensorSINDy at most"),
-        (lambda s: dc.compare([dc.TBNNUDE()], s["test"]), "is not fitted"),
+        (lambda s: dc.compare([TBNNUDE()], s["test"]), "is not fitted"),
         (lambda s: dc.compare([], s["test"]), "got none"),
         (lambda s: dc.compare(["law.discover"], s["test"]), "got a str"),
         (lambda s: dc.compare([s["sindy"]], s["base"]), "Give the data set that judges"),
