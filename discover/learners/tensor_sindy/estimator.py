@@ -32,6 +32,7 @@ from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_he
 from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
+from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
 from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
@@ -130,6 +131,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         "coefficients_",
         "inner_",
         "uncertainty_",
+        "draws_",
         "stability_",
         "provenance_",
     )
@@ -139,6 +141,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         ParameterUncertainty,
         NoiseModel,
         Stability,
+        WeighedDraws,
         Provenance,
     )
 
