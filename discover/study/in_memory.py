@@ -72,8 +72,10 @@ def joined(data: ShearDataset, more: Sequence[ShearRun]) -> ShearDataset:
             "Divide the runs with train, test = data.split(held_out=[...])."
         )
     runs = (*data.runs, *more)
-    if isinstance(data, SyntheticDataset) and all(run.name in (data.exact or {}) for run in runs):
+    exact = data.exact or {} if isinstance(data, SyntheticDataset) else None
+    if exact is None or all(run.name in exact for run in runs):
         return replace(data, runs=runs)
+    # the truth of what was added is not known
     return ShearDataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
