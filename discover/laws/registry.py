@@ -75,7 +75,8 @@ def name_of(law: AbstractConstitutiveLaw) -> tuple[str, dict[str, float]] | None
             continue
         if len(values) != len(entry.parameters):
             continue
-        if _same_law(entry.build(*values), law):
+        made = entry.build(*values)  # pyright: ignore[reportArgumentType]
+        if _same_law(made, law):
             return name, dict(zip(entry.parameters, values, strict=True))
     return None
 

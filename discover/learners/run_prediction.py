@@ -58,6 +58,7 @@ class RunPrediction:
 
     fluid_: "Fluid"
     result_: "LearnerResult"
+    runs_: tuple[ShearRun, ...]
     provenance_: Provenance
 
     learner: ClassVar[str]

@@ -119,18 +119,19 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
         ω in rad/s, shape (n,); by default 25 over two decades to each side of the relaxation times.
     """
     times = np.asarray(fluid.relaxation_time)
-    if frequencies is None:
-        frequencies = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
+    omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
+    if frequencies is not None:
+        omega = frequencies
     decay, drive = (np.asarray(part) for part in _at_rest(fluid.law))
-    modulus = np.zeros(len(frequencies), dtype=complex)
+    modulus = np.zeros(len(omega), dtype=complex)
     for size, time in zip(np.asarray(fluid.modulus), times, strict=True):
         # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
-        left = 1j * time * frequencies[:, None, None] * np.eye(4) - decay
-        drives = np.broadcast_to(drive[:, None], (len(frequencies), 4, 1))
+        left = 1j * time * omega[:, None, None] * np.eye(4) - decay
+        drives = np.broadcast_to(drive[:, None], (len(omega), 4, 1))
         stress = np.linalg.solve(left, drives)[:, 3, 0]
-        modulus += size * 1j * time * frequencies * stress
-    modulus += 1j * frequencies * float(fluid.solvent_viscosity)
-    return LinearSweep(frequencies, modulus.real, modulus.imag)
+        modulus += size * 1j * time * omega * stress
+    modulus += 1j * omega * float(fluid.solvent_viscosity)
+    return LinearSweep(omega, np.real(modulus), np.imag(modulus))
 
 
 @eqx.filter_jit
