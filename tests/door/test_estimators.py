@@ -53,7 +53,7 @@ def network(data, base):
     ]  # fmt: skip
     made = dc.TBNNUDE(base=base, n_members=2, recipe="paper")
     made.n_features_in_, made.members_, made.ensemble_ = 1, laws, "made by a test"
-    made.law_ = laws[0]
+    made.law_, made.fitting_ = laws[0], laws
     made.fluid_, *_ = made.ensemble_fluids_ = [
         dc.Fluid(law, base.modulus, base.relaxation_time) for law in laws
     ]
