@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -79,13 +79,13 @@ def joined(data: ShearDataset, more: Sequence[ShearRun]) -> ShearDataset:
     return ShearDataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
-def declared_fluid(base: Fluid | None, data: ShearDataset) -> DeclaredModel:
+def declared_fluid(base: Any, data: ShearDataset) -> DeclaredModel:
     """Return a fluid as the declared model of a study.
 
     Parameters
     ----------
     base
-        The fluid; None for upper convected Maxwell with G = 1 Pa and λ = 1 s.
+        A `Fluid`; None for upper convected Maxwell with G = 1 Pa and λ = 1 s.
     data
         The data; where the modes are those of its linear sweep, the error of the sweep is known.
 
