@@ -4,7 +4,117 @@ Two learners (a frame-invariant sparse regression and a tensor-basis neural netw
 the differential equation), a comparison of what each recovered, and a closed loop from a
 measured residual to the effect that explains it.
 
-Importing this package imports nothing heavy: ``discover --help`` must answer at once.
+Importing this package imports nothing heavy: what is named here is loaded when it is first used,
+and with it double precision and the cache of compiled programs are set up.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
+    from discover.closed_loop.in_memory import close_loop as close_loop
+    from discover.comparison.in_memory import compare as compare
+    from discover.dataset import LinearSweep as LinearSweep
+    from discover.dataset import ShearDataset as ShearDataset
+    from discover.dataset import ShearRun as ShearRun
+    from discover.dataset import check_folder as check_folder
+    from discover.dataset import load_dataset as load_dataset
+    from discover.effects.registry import effects_table as effects
+    from discover.effects.registry import register_effect as register_effect
+    from discover.errors import InputError as InputError
+    from discover.laws import AbstractConstitutiveLaw as AbstractConstitutiveLaw
+    from discover.laws import Fluid as Fluid
+    from discover.laws import make_law as make_law
+    from discover.laws.registry import laws_table as laws
+    from discover.laws.registry import register_law as register_law
+    from discover.learners.load import load as load
+    from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
+    from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
+    from discover.protocols import measured_rate as measured_rate
+    from discover.protocols import oscillatory_shear as oscillatory_shear
+    from discover.protocols import start_up as start_up
+    from discover.protocols import step_rates as step_rates
+    from discover.simulate import synthetic_dataset as synthetic_dataset
+    from tensor_library import build_library as build_library
+
+__all__ = [
+    "TBNNUDE",
+    "AbstractConstitutiveLaw",
+    "Fluid",
+    "InputError",
+    "LinearSweep",
+    "ShearDataset",
+    "ShearRun",
+    "TensorSINDy",
+    "build_library",
+    "check_folder",
+    "close_loop",
+    "compare",
+    "effects",
+    "laws",
+    "load",
+    "load_dataset",
+    "make_law",
+    "measured_rate",
+    "oscillatory_shear",
+    "register_effect",
+    "register_law",
+    "start_up",
+    "step_rates",
+    "synthetic_dataset",
+]
+
+_PLACES = {
+    "discover.closed_loop.in_memory": ("close_loop",),
+    "discover.comparison.in_memory": ("compare",),
+    "discover.dataset": (
+        "LinearSweep",
+        "ShearDataset",
+        "ShearRun",
+        "check_folder",
+        "load_dataset",
+    ),
+    "discover.effects.registry": ("register_effect",),
+    "discover.errors": ("InputError",),
+    "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),
+    "discover.laws.registry": ("register_law",),
+    "discover.learners.load": ("load",),
+    "discover.learners.tbnn_ude": ("TBNNUDE",),
+    "discover.learners.tensor_sindy": ("TensorSINDy",),
+    "discover.protocols": ("measured_rate", "oscillatory_shear", "start_up", "step_rates"),
+    "discover.simulate": ("synthetic_dataset",),
+    "tensor_library": ("build_library",),
+}
+_PLACE = {name: place for place, names in _PLACES.items() for name in names}
+
+_PACKAGES = (
+    "closed_loop",
+    "comparison",
+    "dataset",
+    "effects",
+    "equations",
+    "identify",
+    "laws",
+    "learners",
+    "protocols",
+    "simulate",
+    "statistics",
+    "study",
+)
+"""Packages that need no import of their own; of these, `effects` and `laws` answer calls too."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return import_module(f"discover.{name}")
+    if name not in _PLACE:
+        raise AttributeError(f"module 'discover' has no attribute {name!r}")
+    value = getattr(import_module(_PLACE[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, *_PACKAGES})

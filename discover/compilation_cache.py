@@ -15,8 +15,8 @@ os.environ.setdefault("EQX_ON_ERROR", "nan")
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """Let JAX keep what it compiled, so that a second start does not compile again.
 
-    Called by every command and by the tests' ``conftest``; importing the library alone changes
-    no global setting.
+    Called when something that computes is first used (`discover.first_use`), and by the tests'
+    ``conftest`` before that; ``import discover`` alone changes no global setting.
 
     Parameters
     ----------
@@ -37,13 +37,12 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     if folder is None and chosen:
         return Path(chosen)  # by the user, or by an earlier call
     if folder is None:
-        root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folder = Path(root) / "discover" / "compiled"
-    folder = Path(folder)
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "discover" / "compiled"
     try:
+        folder = Path(folder).expanduser()
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None  # a home that cannot be written to costs time, not the run
+    except (OSError, RuntimeError):
+        return None  # a home that cannot be found or written to costs time, not the run
     with suppress(OSError):
         remove_cut_short(folder)
     jax.config.update("jax_compilation_cache_dir", str(folder))

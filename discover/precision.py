@@ -4,8 +4,8 @@
 def enable_x64() -> None:
     """Make JAX compute in float64.
 
-    Called by the command line, by notebooks and by the tests' ``conftest``: sparse regression
-    and reference solutions need it. Importing the library alone changes no global setting.
+    Sparse regression and reference solutions need it. Whatever computes calls this when it is first
+    used (`discover.first_use`); ``import discover`` alone changes no global setting.
     """
     import jax
 

@@ -17,6 +17,7 @@ from discover.equations import Equation, HasEquation, equation_to_json
 from discover.errors import InputError
 from discover.laws import Fluid
 from discover.notebook_view import NotebookView, table_of
+from discover.page_view import PageView
 
 if TYPE_CHECKING:
     from discover.closed_loop.reading import Reading
@@ -145,7 +146,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class LoopResult(HasEquation, NotebookView):
+class LoopResult(PageView, HasEquation, NotebookView):
     """The outcome of a closed loop.
 
     Attributes
@@ -175,6 +176,8 @@ class LoopResult(HasEquation, NotebookView):
         are then their means.
     seconds
         Time taken.
+    title, summary
+        Name of the data, and data and declared model in words, for the page.
     """
 
     verdict: Verdict
@@ -189,6 +192,16 @@ class LoopResult(HasEquation, NotebookView):
     fluid: Fluid | None = field(repr=False, default=None)
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
+    title: str = field(repr=False, default="")
+    summary: str = field(repr=False, default="")
+
+    _page = "discover.report.in_memory:loop_page"
+
+    def __repr__(self) -> str:
+        added = ", ".join(stage.effect for stage in self.stages) or "no effect"
+        fit, held = self.error_after.fit, self.error_after.held_out
+        judged = "" if held is None else f", held out {100 * held:.2g} %"
+        return f"<LoopResult: {self.verdict}; {added}; error {100 * fit:.2g} %{judged}>"
 
     def equation(self) -> Equation:
         """Return the augmented fluid as an equation; see `discover.closed_loop.equation`."""
@@ -215,6 +228,10 @@ class LoopResult(HasEquation, NotebookView):
                 lines.append({**line, "aliases": ", ".join(stage.aliases)})
         columns = ["stage", "effect", "kind", "parameter", "value", "unit", "low", "high"]
         return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return `table`: the effects that were added, one line for each of their parameters."""
+        return self.table()
 
     def ranking_table(self, stage: int = 0) -> pd.DataFrame:
         """Return the candidates at one stage, counted from 0, the best first.

@@ -19,6 +19,7 @@ from discover.comparison.truth import TrueTerm
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
 from discover.notebook_view import NotebookView, table_of
+from discover.page_view import PageView
 from discover.statistics import FitVerdict
 
 
@@ -51,7 +52,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Comparison(NotebookView):
+class Comparison(PageView, NotebookView):
     """Both learners beside the known part alone, in the same flows.
 
     Attributes
@@ -113,6 +114,16 @@ class Comparison(NotebookView):
     explanation: Explanation = field(default_factory=Explanation)
     classical: Sequence[ClassicalFit] = ()
     warnings: tuple[str, ...] = ()
+
+    _page = "discover.report.in_memory:comparison_page"
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{n}: {len(o.terms)} terms" for n, o in self.outcomes.items())
+        return f"<Comparison {self.name!r}: {self.verdict}; {found}>"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return `errors_table` with flow and quantity as columns."""
+        return self.errors_table().reset_index()
 
     @property
     def verdict(self) -> FitVerdict:

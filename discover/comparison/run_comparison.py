@@ -1,7 +1,7 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from discover.comparison.classical import fit_classical_laws
@@ -29,11 +29,14 @@ from discover.comparison.training import (
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.dataset.run import ShearDataset
 from discover.errors import InputError
+from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
+from discover.learners.result import LearnerResult
 from discover.statistics.residual import Expectation
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
+from tensor_library.library import TermLibrary
 
 
 def compare(
@@ -42,6 +45,11 @@ def compare(
     progress: Progress = silent,
     store: RunFolder | None = None,
     settle: Callable[[DeclaredModel, ShearDataset], DeclaredModel] | None = None,
+    *,
+    data: StudyData | None = None,
+    declared: DeclaredModel | None = None,
+    made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
+    library: TermLibrary | None = None,
 ) -> Comparison:
     """Run a study's learners on identical data and look at what each found.
 
@@ -57,6 +65,12 @@ def compare(
         Where finished learners are kept and found again.
     settle
         Fits what the declared law leaves open; without it, open parameters are an error.
+    data, declared
+        Data and known part that are at hand, in place of the study's.
+    made
+        Learners that are fitted already: what they found, by learner.
+    library
+        The terms that they searched, in place of the study's.
 
     Raises
     ------
@@ -64,11 +78,11 @@ def compare(
         If the study asks for something that its data cannot give.
     """
     options = study.compare
-    data = load_study_data(study, seed)
+    data = load_study_data(study, seed) if data is None else data
     _require_plain_runs(data)
     _require_teacher(study)
     sweep = _sweep_studies(study)
-    declared = declared_model(study, data.dataset)
+    declared = declared_model(study, data.dataset) if declared is None else declared
     model = declared if settle is None else settle(declared, data.fit)
     require_numbers(model)
     following_options = options.next
@@ -86,7 +100,7 @@ def compare(
     outcomes = {}
     for learner in options.learners:
         outcomes[learner] = _outcome(
-            learner, learner, study, model, data, flows, learner_seed, step(learner), store
+            learner, learner, study, model, data, flows, learner_seed, step(learner), store, made
         )
         done += 1
     points = []
@@ -111,7 +125,7 @@ def compare(
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
     judged = judged or [flow for flow in flows if flow.kind == "training"]
     if chosen is not None and explanation.verdict != "no_signal":
-        library = study_library(study)
+        library = study_library(study) if library is None else library
         met = chosen.details.get("rivals", ())
         rivals = find_rivals(chosen.terms, met, model, flows, library, chosen.predictions)
         structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
@@ -184,12 +198,16 @@ def _outcome(
     seed: int,
     progress: Callable[[str, float], None],
     store: RunFolder | None,
+    made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
 ) -> LearnerOutcome:
     kept = None if store is None else store.load(part)
     if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
         return LearnerOutcome.from_state(kept)
     progress("starting", 0.0)
-    result, fluid = train(learner, study, model, data.fit.runs, seed, progress)
+    if made is not None:
+        result, fluid = made[learner]
+    else:
+        result, fluid = train(learner, study, model, data.fit.runs, seed, progress)
     outcome = LearnerOutcome.of(result, fluid, flows)
     if part == learner:
         # a sweep's outcomes are looked at in one flow only
@@ -304,6 +322,7 @@ def _known_part(model: DeclaredModel, study: Study, fitted: tuple[str, ...]) -> 
 def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     if not study.model.known_relaxation:
         return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
-    title = LAWS[model.law_name].described(model.parameters)
+    named = LAWS.get(model.law_name)
+    title = model.law_name if named is None else named.described(model.parameters)
     modes = len(model.modulus)
     return title if modes == 1 else f"{title}, {modes} relaxation modes from the linear sweep"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from discover.dataset.run import ShearRun
 from discover.errors import InputError
@@ -11,6 +12,9 @@ from discover.learners.result import LearnerResult
 from discover.study.build import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
+
+if TYPE_CHECKING:
+    from discover.learners.tensor_sindy import TensorSINDy
 
 Progress = Callable[[str, float], None]
 """Called with what is going on and the fraction done, 0 to 1."""
@@ -73,9 +77,7 @@ def train(
     }
     library = study_library(study)
     if learner == "tensor_sindy":
-        from discover.identify.rivals import MOST_RIVALS, find_rivals
         from discover.learners.tensor_sindy import TensorSINDy
-        from discover.learners.tensor_sindy.report import uncertainty_row
 
         sparse = TensorSINDy(
             library=library,
@@ -87,15 +89,8 @@ def train(
             progress=lambda text: progress(text, 0.5),
             **shared,
         ).fit(list(runs))
-        result = sparse.result_
         # while the search with all its fits is at hand; only its result is kept in files
-        found = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]])
-        table = found.to_json()
-        for row, rival in zip(table["rivals"][:MOST_RIVALS], found.rivals, strict=False):
-            assert rival.fit is not None  # the search at hand refitted it
-            row.update(uncertainty_row(sparse.search_, rival.fit, seed))
-        table["rivals_text"] = table.pop("text")
-        return replace(result, details={**result.details, **table}), sparse.fluid_
+        return searched(sparse, seed), sparse.fluid_
     if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
@@ -117,6 +112,29 @@ def train(
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
     raise InputError(f"Unknown learner {learner!r}; write tensor_sindy or tbnn_ude.")
+
+
+def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:
+    """Return what a fitted sparse learner found, with the rivals that its search left standing.
+
+    Parameters
+    ----------
+    sparse
+        Fitted here, not read from a file: its search is needed.
+    seed
+        Of draws within the uncertainty.
+    """
+    from discover.identify.rivals import MOST_RIVALS, find_rivals
+    from discover.learners.tensor_sindy.report import uncertainty_row
+
+    result = sparse.result_
+    found = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]])
+    table = found.to_json()
+    for row, rival in zip(table["rivals"][:MOST_RIVALS], found.rivals, strict=False):
+        assert rival.fit is not None  # the search at hand refitted it
+        row.update(uncertainty_row(sparse.search_, rival.fit, seed))
+    table["rivals_text"] = table.pop("text")
+    return replace(result, details={**result.details, **table})
 
 
 def study_library(study: Study) -> TermLibrary:

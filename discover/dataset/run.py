@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,9 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.notebook_view import NotebookView
 from discover.protocols.shear import ShearProtocol
+
+if TYPE_CHECKING:
+    from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
@@ -108,6 +111,26 @@ class ShearRun:
     def __len__(self) -> int:
         return self.time.shape[0]
 
+    def __repr__(self) -> str:
+        kinds = [name for name, values in self._recorded().items() if values is not None]
+        span = f"{self.time[0]:.4g} to {self.time[-1]:.4g} s"
+        return f"<ShearRun {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
+
+    def _recorded(self) -> dict[str, np.ndarray | None]:
+        return {
+            "time_s": self.time,
+            "shear_rate_1_s": self.shear_rate,
+            "stress_Pa": self.shear_stress,
+            "N1_Pa": self.first_normal_stress_difference,
+            "N2_Pa": self.second_normal_stress_difference,
+            "strain": self.strain,
+        }
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the samples, one line each, in the columns of a data folder's files."""
+        columns = {name: values for name, values in self._recorded().items() if values is not None}
+        return pd.DataFrame(columns)
+
     @property
     def flows(self) -> bool:
         """Whether anything flows in the run, or did just before it."""
@@ -180,10 +203,43 @@ class LinearSweep:
     loss_modulus: Float[np.ndarray, " n"]
     thinned: str = ""
 
+    def __len__(self) -> int:
+        return self.angular_frequency.shape[0]
+
+    def __repr__(self) -> str:
+        omega = self.angular_frequency
+        span = f", {omega[0]:.4g} to {omega[-1]:.4g} rad/s" if len(self) else ""
+        return f"<LinearSweep: {len(self)} frequencies{span}>"
+
+    def relaxation_spectrum(self, **options: Any) -> "RelaxationSpectrum":
+        """Return the modes of this sweep.
+
+        Parameters
+        ----------
+        **options
+            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+        """
+        from discover.dataset.linear_viscoelasticity import relaxation_spectrum
+
+        return relaxation_spectrum(self, **options)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the sweep, one line for each frequency, in the columns of ``lve.csv``."""
+        return pd.DataFrame(
+            {
+                "omega_rad_s": self.angular_frequency,
+                "Gp_Pa": self.storage_modulus,
+                "Gpp_Pa": self.loss_modulus,
+            }
+        )
+
 
 @dataclass(frozen=True)
 class ShearDataset(NotebookView):
-    """Runs on one fluid.
+    """Runs on one fluid: a sequence of runs, for Python and for scikit-learn.
+
+    ``data["a.csv"]`` and ``data[0]`` are a run; ``data[:3]``, ``data[[0, 2]]`` and
+    ``data[["a.csv", "b.csv"]]`` are data sets, and so is what a boolean array chooses.
 
     Attributes
     ----------
@@ -219,7 +275,38 @@ class ShearDataset(NotebookView):
     def __iter__(self) -> Iterator[ShearRun]:
         return iter(self.runs)
 
-    def __getitem__(self, name: str) -> ShearRun:
+    def __repr__(self) -> str:
+        sweep = "" if self.linear_sweep is None else ", linear sweep"
+        samples = sum(len(run) for run in self.runs)
+        kind = type(self).__name__
+        return f"<{kind} {self.name!r}: {len(self)} runs, {samples} samples{sweep}>"
+
+    @overload
+    def __getitem__(self, which: str | int | np.integer) -> ShearRun: ...
+
+    @overload
+    def __getitem__(self, which: slice | Sequence[Any] | np.ndarray) -> "ShearDataset": ...
+
+    def __getitem__(self, which: Any) -> "ShearRun | ShearDataset":
+        if isinstance(which, str):
+            return self._named(which)
+        if isinstance(which, slice):
+            return replace(self, runs=self.runs[which])
+        chosen = np.asarray(which)
+        if chosen.ndim == 0 and np.issubdtype(chosen.dtype, np.integer):
+            return self._numbered(int(chosen))
+        if chosen.ndim == 1 and (chosen.size == 0 or chosen.dtype.kind in "iu"):
+            return replace(self, runs=tuple(self._numbered(int(i)) for i in chosen))
+        if chosen.ndim == 1 and chosen.dtype.kind == "U":
+            return self.select([str(name) for name in chosen])
+        if chosen.dtype == bool and chosen.shape == (len(self),):
+            return replace(self, runs=tuple(self.runs[i] for i in np.flatnonzero(chosen)))
+        raise InputError(
+            f"A run of the data set {self.name!r} is chosen by its name or number, several by a "
+            f"slice, by names, by numbers, or by {len(self)} booleans; got {which!r}."
+        )
+
+    def _named(self, name: str) -> ShearRun:
         for run in self.runs:
             if run.name == name:
                 return run
@@ -231,6 +318,14 @@ class ShearDataset(NotebookView):
         raise InputError(
             f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
         )
+
+    def _numbered(self, number: int) -> ShearRun:
+        if not -len(self) <= number < len(self):
+            # an IndexError: it ends a loop over the numbers of a sequence
+            raise IndexError(
+                f"The data set {self.name!r} has {len(self)} runs; there is no number {number}."
+            )
+        return self.runs[number]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -287,4 +382,47 @@ class ShearDataset(NotebookView):
         InputError
             If a run does not exist.
         """
-        return replace(self, runs=tuple(self[name] for name in names))
+        return replace(self, runs=tuple(self._named(name) for name in names))
+
+    def split(
+        self, held_out: Sequence[str], fit: Sequence[str] | None = None
+    ) -> "tuple[ShearDataset, ShearDataset]":
+        """Return the runs to fit and those that only judge, as two data sets.
+
+        Parameters
+        ----------
+        held_out
+            Names of the runs that no fit may see.
+        fit
+            Names of the runs to fit; by default all others.
+
+        Raises
+        ------
+        InputError
+            If a run does not exist or is in both, or one of the two would be empty.
+        """
+        for label, names in (("held_out", held_out), ("fit", fit)):
+            if isinstance(names, str):
+                raise InputError(
+                    f"{label} must be a list of names; got {names!r}. Write [{names!r}]."
+                )
+        test = self.select(list(held_out))
+        train = self.select([n for n in self.names if n not in held_out] if fit is None else fit)
+        both = set(train.names) & set(test.names)
+        if both:
+            raise InputError(f"The run {sorted(both)[0]!r} is both in fit and in held_out.")
+        if not len(train) or not len(test):
+            empty = "fit" if not len(train) else "hold out"
+            raise InputError(
+                f"No run is left to {empty}; the data set {self.name!r} has "
+                f"{', '.join(self.names)}. Divide them."
+            )
+        return train, test
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all samples, one line each: the column ``run``, then those of its file."""
+        table = pd.concat(
+            [run.to_dataframe().assign(run=run.name) for run in self.runs], ignore_index=True
+        )
+        table.insert(0, "run", table.pop("run"))
+        return table

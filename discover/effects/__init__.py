@@ -1,5 +1,7 @@
 """The dictionary of effects that a model may lack."""
 
+from discover import first_use as first_use  # double precision, before any array is made
+from discover.callable_package import answer_calls
 from discover.effects.base import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -13,7 +15,12 @@ from discover.effects.base import (
 )
 from discover.effects.library_term import LibraryTerm, library_effects, library_term
 from discover.effects.mode_dependence import BY_MODE, ModeDependence
-from discover.effects.registry import make_effect, named_effects
+from discover.effects.registry import (
+    effects_table,
+    make_effect,
+    named_effects,
+    register_effect,
+)
 
 __all__ = [
     "BY_MODE",
@@ -28,8 +35,12 @@ __all__ = [
     "SeriesElement",
     "SignalEffect",
     "StateEffect",
+    "effects_table",
     "library_effects",
     "library_term",
     "make_effect",
     "named_effects",
+    "register_effect",
 ]
+
+answer_calls(__name__, effects_table)

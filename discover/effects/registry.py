@@ -1,26 +1,82 @@
-"""All effects by name. A new file in one of the three folders is a new effect; nothing else."""
+"""All effects by name. A new file in one of the three folders is a new effect; nothing else.
+
+A program that uses this package registers effects of its own instead.
+"""
 
 import importlib
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
+from typing import TYPE_CHECKING
 
 from discover.effects import constitutive, kinematic, signal
-from discover.effects.base import AbstractEffect
+from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
 from discover.effects.library_term import library_term
 from discover.errors import InputError
+from discover.laws.registry import require_new_name
 from tensor_library.terms import parse_term
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_registered: dict[str, AbstractEffect] = {}
 
 
 @cache
 def named_effects() -> Mapping[str, AbstractEffect]:
-    """Return the effects that have a name, in the order constitutive, kinematic, signal."""
+    """Return the effects that have a name: constitutive, kinematic, signal, then registered."""
     effects = {}
     for package in (constitutive, kinematic, signal):
         for module in pkgutil.iter_modules(package.__path__):
             effect = importlib.import_module(f"{package.__name__}.{module.name}").EFFECT
             effects[effect.name] = effect
-    return effects
+    return effects | _registered
+
+
+def effects_table() -> "pd.DataFrame":
+    """Return the effects that are known by name, one line for each parameter, the amplitude first.
+
+    An amplitude of zero is no effect.
+    """
+    import pandas as pd
+
+    lines = [
+        {"effect": effect.name, "kind": effect.kind, "parameter": p.name, "unit": p.unit or "1",
+         "low": p.low, "high": p.high, "visible": effect.visible, "source": effect.source}
+        for effect in named_effects().values()
+        for p in effect.parameters
+    ]  # fmt: skip
+    return pd.DataFrame(lines).set_index("effect")
+
+
+def register_effect(effect: AbstractEffect) -> AbstractEffect:
+    """Make an effect of one's own known by name, to studies and loops in this process.
+
+    Parameters
+    ----------
+    effect
+        Made as docs/adding-an-effect.md shows.
+
+    Returns
+    -------
+    The effect.
+
+    Raises
+    ------
+    InputError
+        If it is no effect, has no parameter, or its name is taken or is none.
+    """
+    if not isinstance(effect, ConstitutiveEffect | KinematicEffect | SignalEffect):
+        raise InputError(
+            "An effect must be a ConstitutiveEffect, a KinematicEffect or a SignalEffect; got "
+            f"{effect!r}. See docs/adding-an-effect.md."
+        )
+    require_new_name(effect.name, list(named_effects()), "effect")
+    if not effect.parameters:
+        raise InputError(f"The effect {effect.name!r} needs a parameter: its amplitude, first.")
+    _registered[effect.name] = effect
+    named_effects.cache_clear()
+    return effect
 
 
 def make_effect(name: str) -> AbstractEffect:

@@ -1,5 +1,7 @@
 """Constitutive laws behind one interface."""
 
+from discover import first_use as first_use  # double precision, before any array is made
+from discover.callable_package import answer_calls
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.fene_p import FenePeterlin
@@ -9,7 +11,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.named import NamedLaw
 from discover.laws.phan_thien_tanner import ExponentialPhanThienTanner, LinearPhanThienTanner
-from discover.laws.registry import LAWS, make_law
+from discover.laws.registry import LAWS, laws_table, make_law, register_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 
 __all__ = [
@@ -25,5 +27,9 @@ __all__ = [
     "NamedLaw",
     "TensorBasisNetwork",
     "UpperConvectedMaxwell",
+    "laws_table",
     "make_law",
+    "register_law",
 ]
+
+answer_calls(__name__, laws_table)

@@ -43,5 +43,6 @@ NAMED = {
             "L2": "Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already; at a million, "
             "longer than of any polymer, the springs are Hooke's"
         },
+        source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
     )
 }

@@ -26,5 +26,6 @@ NAMED = {
         Giesekus,
         {"alpha": (0.0, 1.0)},
         {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
+        source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
     )
 }

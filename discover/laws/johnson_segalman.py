@@ -25,5 +25,6 @@ NAMED = {
         JohnsonSegalman,
         {"xi": (0.0, 2.0)},
         {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
+        source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
     )
 }

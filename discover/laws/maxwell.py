@@ -19,4 +19,11 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
         return jnp.zeros_like(stress)
 
 
-NAMED = {"ucm": NamedLaw("upper convected Maxwell", UpperConvectedMaxwell, {})}
+NAMED = {
+    "ucm": NamedLaw(
+        "upper convected Maxwell",
+        UpperConvectedMaxwell,
+        {},
+        source="Oldroyd 1950, Proc. R. Soc. London A 200, 523",
+    )
+}

@@ -1,6 +1,7 @@
 """A fluid: one law in each of several relaxation modes, with units."""
 
 from collections.abc import Sequence
+from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -8,7 +9,18 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
+from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.maxwell import UpperConvectedMaxwell
+
+
+@runtime_checkable
+class HasSpectrum(Protocol):
+    """Linear data that know their relaxation modes, such as a `LinearSweep`."""
+
+    def relaxation_spectrum(self, **options: Any) -> Any:
+        """Return modes with `modulus` in Pa and `relaxation_time` in s, both of shape (k,)."""
+        ...
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
@@ -42,6 +54,45 @@ class Fluid(eqx.Module):
     def dimensionless(cls, law: AbstractConstitutiveLaw) -> "Fluid":
         """Return the single mode with unit modulus and unit relaxation time."""
         return cls(law, 1.0, 1.0)
+
+    @classmethod
+    def from_sweep(
+        cls,
+        sweep: HasSpectrum | None,
+        law: AbstractConstitutiveLaw | None = None,
+        solvent_viscosity: float = 0.0,
+        **options: Any,
+    ) -> "Fluid":
+        """Return the fluid with the modes of a linear sweep, as ``modes = "lve"`` in a study.
+
+        Parameters
+        ----------
+        sweep
+            Small-amplitude data, such as `ShearDataset.linear_sweep`.
+        law
+            The law of every mode; by default upper convected Maxwell.
+        solvent_viscosity
+            η_s, in Pa s.
+        **options
+            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+
+        Raises
+        ------
+        InputError
+            If there is no sweep, or it is too short.
+        """
+        if sweep is None:
+            raise InputError(
+                "There is no linear sweep to take the modes from: the data set has no lve.csv. "
+                "Give the modes: Fluid(law, modulus, relaxation_time), in Pa and s."
+            )
+        spectrum = sweep.relaxation_spectrum(**options)
+        return cls(
+            UpperConvectedMaxwell() if law is None else law,
+            spectrum.modulus,
+            spectrum.relaxation_time,
+            solvent_viscosity,
+        )
 
     @property
     def n_modes(self) -> int:

@@ -17,15 +17,18 @@ class NamedLaw:
     build
         Makes the law from its parameters, in the order of `parameters`.
     parameters
-        Name and physical range of each parameter.
+        Name and physical range of each parameter; laws are dimensionless, and so are these.
     range_sources
         Where each range comes from: literature, or the argument in a sentence.
+    source
+        Literature on the law.
     """
 
     title: str
     build: Callable[..., AbstractConstitutiveLaw]
     parameters: Mapping[str, tuple[float, float]]
     range_sources: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

@@ -40,8 +40,18 @@ _RANGE_SOURCE = {
 }
 
 NAMED = {
-    "ptt_linear": NamedLaw("linear PTT", LinearPhanThienTanner, _RANGE, _RANGE_SOURCE),
+    "ptt_linear": NamedLaw(
+        "linear PTT",
+        LinearPhanThienTanner,
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
+    ),
     "ptt_exponential": NamedLaw(
-        "exponential PTT", ExponentialPhanThienTanner, _RANGE, _RANGE_SOURCE
+        "exponential PTT",
+        ExponentialPhanThienTanner,
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien 1978, J. Rheol. 22, 259",
     ),
 }

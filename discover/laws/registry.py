@@ -1,18 +1,27 @@
 """Named laws, as study files and the command line spell them.
 
 A file in this folder that says ``NAMED = {...}`` is a law that can be asked for; nothing else has
-to be edited.
+to be edited. A program that uses this package registers laws of its own instead.
 """
 
 import importlib
 import math
 import pkgutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _CLASSICAL = ("maxwell", "johnson_segalman", "giesekus", "phan_thien_tanner", "fene_p")
 """Files whose laws come first in lists, in the order of textbooks."""
@@ -28,8 +37,142 @@ def _named_laws() -> dict[str, NamedLaw]:
     return laws
 
 
-LAWS: Mapping[str, NamedLaw] = _named_laws()
+LAWS: dict[str, NamedLaw] = _named_laws()
 """Named laws by the name in study files."""
+
+RESERVED = ("learned",)
+"""What a study file may write in place of the name of a law."""
+
+
+def laws_table() -> "pd.DataFrame":
+    """Return the laws that are known by name, one line for each parameter.
+
+    Laws are dimensionless, stress over modulus and time over relaxation time, and so are their
+    parameters.
+    """
+    import pandas as pd
+
+    lines = [
+        {"law": name, "title": law.title, "parameter": parameter, "unit": unit, "low": low,
+         "high": high, "source": law.source}
+        for name, law in LAWS.items()
+        for parameter, unit, (low, high) in (
+            [(key, "1", ends) for key, ends in law.parameters.items()]
+            or [("", "", (math.nan, math.nan))]
+        )
+    ]  # fmt: skip
+    return pd.DataFrame(lines).set_index("law")
+
+
+def name_of(law: AbstractConstitutiveLaw) -> tuple[str, dict[str, float]] | None:
+    """Return name and parameters of a law; None if no named law makes it.
+
+    Whether −σ is part of it does not matter.
+    """
+    values = [float(leaf) for leaf in jax.tree.leaves(law) if jnp.ndim(leaf) == 0]
+    for name, entry in LAWS.items():
+        if isinstance(entry.build, type) and entry.build is not type(law):
+            continue
+        if len(values) != len(entry.parameters):
+            continue
+        made = entry.build(*values)  # pyright: ignore[reportArgumentType]
+        if _same_law(made, law):
+            return name, dict(zip(entry.parameters, values, strict=True))
+    return None
+
+
+def _same_law(made: AbstractConstitutiveLaw, law: AbstractConstitutiveLaw) -> bool:
+    if type(made) is not type(law):
+        return False
+    if made.linear_relaxation != law.linear_relaxation:
+        made = replace(made, linear_relaxation=law.linear_relaxation)  # pyright: ignore
+    return bool(eqx.tree_equal(made, law))
+
+
+def register_law(
+    name: str,
+    build: Callable[..., AbstractConstitutiveLaw],
+    parameters: Mapping[str, tuple[float, float]] | None = None,
+    title: str = "",
+    source: str = "",
+) -> NamedLaw:
+    """Make a law of one's own known by name, to studies and loops in this process.
+
+    Parameters
+    ----------
+    name
+        As studies are to spell it: lower-case letters, digits and underscores.
+    build
+        The class of the law, or a function that makes the law from its parameters, in their order.
+    parameters
+        Name and admissible range (low, high) of each parameter; they are dimensionless.
+    title, source
+        Name for readers, by default `name` in words, and literature.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or is none, a range is none, or `build` makes no law.
+    """
+    require_new_name(name, [*LAWS, *RESERVED], "law")
+    ranges = {}
+    for key, ends in (parameters or {}).items():
+        try:
+            low, high = map(float, ends)
+        except (TypeError, ValueError):
+            low, high = math.nan, math.nan
+        if not low < high:
+            raise InputError(
+                f"The range of {key!r} must be two numbers (low, high), low < high; got {ends!r}."
+            )
+        ranges[str(key)] = (low, high)
+    _require_law(name, build, ranges)
+    entry = NamedLaw(title or name.replace("_", " "), build, ranges, source=source)
+    LAWS[name] = entry
+    return entry
+
+
+def require_new_name(name: str, known: list[str], what: str) -> None:
+    """Check a name that is to be registered.
+
+    Raises
+    ------
+    InputError
+        If it is taken, or could not be written in a study file.
+    """
+    if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
+        raise InputError(
+            f"The name of a {what} must be lower-case letters, digits and underscores; got {name!r}"
+            f". Write it like {known[0]!r}."
+        )
+    if name in known:
+        raise InputError(
+            f"The {what} {name!r} is known already, and what was computed with it is kept under "
+            "that name. Choose another name, or start Python anew."
+        )
+
+
+def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) -> None:
+    values = [min(max(0.1, low), high) for low, high in ranges.values()]
+    try:
+        law = build(*values)
+    except TypeError as error:
+        raise InputError(
+            f"The law {name!r} cannot be made from its parameters {', '.join(ranges) or '(none)'}: "
+            f"{error}. Give the range of each, in the order in which {build!r} takes them."
+        ) from None
+    if not isinstance(law, AbstractConstitutiveLaw):
+        raise InputError(
+            f"The law {name!r} must be an AbstractConstitutiveLaw; {build!r} makes a "
+            f"{type(law).__name__}. See docs/adding-a-law.md."
+        )
+    for shape in ((3, 3), (4,)):
+        extra = law.extra_term(jnp.zeros(shape), jnp.zeros(shape))
+        if jnp.shape(extra) != shape:
+            raise InputError(
+                f"The extra term of the law {name!r} must have the shape {shape} of the stress; "
+                f"got {jnp.shape(extra)}. Write it with tensor_library.algebra."
+            )
 
 
 def make_law(name: str, parameters: Mapping[str, float] | None = None) -> AbstractConstitutiveLaw:

@@ -1,7 +1,6 @@
 """A law whose coefficients in the tensor basis are a neural network."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
@@ -11,6 +10,17 @@ from tensor_library.integrity_basis import integrity_basis
 from tensor_library.invariants import scalar_invariants
 
 N_COEFFICIENTS = 8
+
+
+# JAX's and Equinox's own have no name by which a network that holds them could be unpickled
+
+
+def _tanh(value: Float[Array, ""]) -> Float[Array, ""]:
+    return jnp.tanh(value)
+
+
+def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
+    return value
 
 
 class TensorBasisNetwork(AbstractConstitutiveLaw):
@@ -46,7 +56,9 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         cls, key: PRNGKeyArray, width: int = 32, depth: int = 2, linear_relaxation: bool = True
     ) -> "TensorBasisNetwork":
         """Return a network of the paper's size (8 → 32 → 32 → 8, tanh) with random weights."""
-        network = eqx.nn.MLP(N_COEFFICIENTS, N_COEFFICIENTS, width, depth, jax.nn.tanh, key=key)
+        network = eqx.nn.MLP(
+            N_COEFFICIENTS, N_COEFFICIENTS, width, depth, _tanh, _unchanged, key=key
+        )
         return cls(
             network=network,
             constants=jnp.zeros(N_COEFFICIENTS),

@@ -80,6 +80,10 @@ class LearnerResult(HasEquation, TermTables):
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()
 
+    def __repr__(self) -> str:
+        terms = " ".join(f"{t.coefficient:+.4g} {t.term}" for t in self.terms) or "no term"
+        return f"<LearnerResult {self.learner}: {terms.removeprefix('+')}; {self.message}>"
+
     def equation(self) -> Equation:
         """Return the law term by term, a known law below it included, dimensionless.
 

@@ -1,24 +1,46 @@
 """What every learner does with runs once it has a fluid: predict them, and be scored on them."""
 
 from abc import abstractmethod
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import ShearRun
 from discover.errors import InputError
+from discover.first_use import require_double
+from discover.learners.estimator_file import EstimatorFile, write_estimator
+from discover.learners.provenance import Provenance
+
+if TYPE_CHECKING:
+    from discover.equations import Equation
+    from discover.laws.multimode import Fluid
+    from discover.learners.result import LearnerResult
 
 
-def as_runs(runs: Iterable[Any]) -> list[ShearRun]:
+def as_runs(runs: Any) -> list[ShearRun]:
     """Return the runs as a list, having checked that they are runs.
 
     Raises
     ------
     InputError
-        If there is none, or one is something else.
+        If there is none, one is something else, or JAX computes in single precision.
     """
+    require_double()
+    if isinstance(runs, ShearRun):
+        raise InputError(
+            f"A learner takes several runs; got the single run {runs.name!r}. Put it in a list: "
+            "fit([run])."
+        )
+    if isinstance(runs, str) or not isinstance(runs, Iterable):
+        raise InputError(
+            f"A learner takes a data set or a sequence of ShearRun; got a {type(runs).__name__}. "
+            "Load a folder with load_dataset."
+        )
     listed = list(runs)
     if not listed:
         raise InputError("A learner needs at least one run; got none.")
@@ -32,17 +54,92 @@ def as_runs(runs: Iterable[Any]) -> list[ShearRun]:
 
 
 class RunPrediction:
-    """Prediction and score by run, for an estimator that knows how to simulate runs."""
+    """What is common to estimators once they are fitted: prediction, score, law, file."""
 
-    def predict(self, X: Iterable[Any]) -> Float[np.ndarray, " rows"]:
+    fluid_: "Fluid"
+    result_: "LearnerResult"
+    runs_: tuple[ShearRun, ...]
+    provenance_: Provenance
+
+    learner: ClassVar[str]
+    """Name of the learner, in files and tables."""
+
+    _saved: ClassVar[tuple[str, ...]]
+    """Attributes of the fit that a file holds."""
+
+    _saved_types: ClassVar[tuple[type, ...]]
+    """Dataclasses among them and among the parameters."""
+
+    @property
+    def equation_(self) -> "Equation":
+        """The law with its modes as an equation: ``latex()``, ``sympy()``, ``fluid()``.
+
+        Of a network this is its projection on the library.
+        """
+        check_is_fitted(self, "result_")
+        return replace(
+            self.result_.equation(),
+            modulus=tuple(map(float, self.fluid_.modulus)),
+            relaxation_time=tuple(map(float, self.fluid_.relaxation_time)),
+            solvent_viscosity=float(self.fluid_.solvent_viscosity),
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the fitted estimator to one file, without pickle; `discover.load` reads it.
+
+        The file holds parameters, modes, law, terms and what the fit was made from by name, but no
+        data, and of the search only its result. `progress` is not kept.
+
+        Parameters
+        ----------
+        path
+            The file, such as ``law.discover``; replaced whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If a parameter or a law cannot be written without pickle.
+        """
+        check_is_fitted(self, "result_")
+        parameters: Mapping[str, Any] = self.get_params(deep=False)  # pyright: ignore
+        return write_estimator(
+            path,
+            self.learner,
+            {name: value for name, value in parameters.items() if name != "progress"},
+            {name: getattr(self, name) for name in self._saved},
+            self._saved_types,
+        )
+
+    @classmethod
+    def _from_file(cls, file: EstimatorFile) -> Any:
+        parameters, fitted = file.read(cls._saved_types)
+        try:
+            estimator = cls(**parameters)
+            for name in cls._saved:
+                setattr(estimator, name, fitted[name])
+        except (KeyError, TypeError) as error:
+            raise file.damaged(error) from None
+        return estimator
+
+    def predict(self, X: Any) -> Float[np.ndarray, " rows"]:
         """Return σ12 in Pa at the samples of all runs, one run after the other."""
         return np.concatenate(self._predict_runs(as_runs(X)))
 
-    def score(self, X: Iterable[Any], y=None, sample_weight=None) -> float:
-        """Return one minus the relative error of σ12, averaged over runs.
+    def score(self, X: Any, y=None, sample_weight=None) -> float:
+        """Return one minus the relative error of σ12, averaged over runs: 1 is perfect.
 
         The error of a run is the root-mean-square of prediction minus measurement over the
-        root-mean-square of the measurement. A law that runs away scores minus infinity.
+        root-mean-square of the measurement, so that predicting no stress scores 0, and noise of
+        2 % leaves 0.98 to the true law. It is not R²: a relative error is what rheologists quote,
+        and it does not depend on the mean of a signal that oscillates about zero. A law that runs
+        away scores minus infinity.
+
+        Parameters
+        ----------
+        X
+            Runs or a data set, such as one that no fit saw.
+        y, sample_weight
+            Ignored; scikit-learn passes them.
         """
         del y, sample_weight
         runs = as_runs(X)

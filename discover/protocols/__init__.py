@@ -1,5 +1,6 @@
 """Shear protocols."""
 
+from discover import first_use as first_use  # double precision, before any array is made
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
 from discover.protocols.shear import (
     ShearProtocol,

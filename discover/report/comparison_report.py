@@ -17,7 +17,11 @@ from discover.study.run_folder import RunFolder
 
 
 def write_comparison(
-    comparison: Comparison, folder: RunFolder, linear_relaxation: bool, study_text: str = ""
+    comparison: Comparison,
+    folder: RunFolder,
+    linear_relaxation: bool,
+    study_text: str = "",
+    run: dict | None = None,
 ) -> Path:
     """Write ``comparison.json``, ``predictions.csv``, ``equations.tex``, the figures and the page.
 
@@ -34,6 +38,8 @@ def write_comparison(
         Whether −σ was part of the known law.
     study_text
         The study file, shown at the end.
+    run
+        What the page says of the run that made it, where that was no command.
 
     Returns
     -------
@@ -47,7 +53,7 @@ def write_comparison(
     for drawn in (*pictures, *training):
         if isinstance(drawn, Picture):
             folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
-    run = made_by(
+    run = run or made_by(
         folder.fingerprint,
         f"discover compare {comparison.name}.toml --seed {comparison.seed}",
         ("comparison.json", "predictions.csv", "equations.tex", "figures/*.svg"),

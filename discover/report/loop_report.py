@@ -31,7 +31,12 @@ from discover.study.run_folder import RunFolder
 
 
 def write_loop(
-    result: LoopResult, folder: RunFolder, name: str, summary: str, study_text: str = ""
+    result: LoopResult,
+    folder: RunFolder,
+    name: str,
+    summary: str,
+    study_text: str = "",
+    run: dict | None = None,
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
@@ -45,6 +50,8 @@ def write_loop(
         Title, and the data and declared model in words.
     study_text
         The study file, shown at the end.
+    run
+        What the page says of the run that made it, where that was no command.
 
     Returns
     -------
@@ -87,7 +94,8 @@ def write_loop(
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
         ],
         pictures=drawn,
-        run=made_by(
+        run=run
+        or made_by(
             folder.fingerprint,
             f"discover close-loop {name}.toml",
             ("loop.json", "predictions.csv", "equations.tex", "figures/*.svg"),

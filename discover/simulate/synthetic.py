@@ -3,9 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from discover.dataset.run import ShearDataset, ShearRun
+from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
@@ -14,7 +18,7 @@ from discover.protocols.shear import ShearProtocol, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SyntheticDataset(ShearDataset):
     """A data set whose law is known.
 
@@ -24,10 +28,13 @@ class SyntheticDataset(ShearDataset):
         The fluid that made it.
     exact
         Noise-free stresses of each run, normal stresses included.
+    noise
+        Standard deviation of the noise over the root-mean-square stress of each run.
     """
 
     truth: Fluid | None = None
     exact: Mapping[str, ShearStress] | None = None
+    noise: float = 0.0
 
 
 def synthetic_dataset(
@@ -40,6 +47,8 @@ def synthetic_dataset(
     duration: float = TRAINING_DURATION,
 ) -> SyntheticDataset:
     """Return σ12 of a named dimensionless law in shear flows, with white noise.
+
+    The linear sweep is exact.
 
     Parameters
     ----------
@@ -91,7 +100,41 @@ def synthetic_dataset(
     return SyntheticDataset(
         name=f"synthetic {law}",
         runs=tuple(runs),
+        linear_sweep=linear_sweep(fluid),
         provenance=f"computed from the {law} law, noise {noise:g}, seed {seed}",
         truth=fluid,
         exact=exact,
+        noise=float(noise),
     )
+
+
+def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = None) -> LinearSweep:
+    """Return G′ and G″ of a fluid, from its law linearised at rest.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    frequencies
+        ω in rad/s, shape (n,); by default 25 over two decades to each side of the relaxation times.
+    """
+    times = np.asarray(fluid.relaxation_time)
+    omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
+    if frequencies is not None:
+        omega = frequencies
+    decay, drive = (np.asarray(part) for part in _at_rest(fluid.law))
+    modulus = np.zeros(len(omega), dtype=complex)
+    for size, time in zip(np.asarray(fluid.modulus), times, strict=True):
+        # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
+        left = 1j * time * omega[:, None, None] * np.eye(4) - decay
+        drives = np.broadcast_to(drive[:, None], (len(omega), 4, 1))
+        stress = np.linalg.solve(left, drives)[:, 3, 0]
+        modulus += size * 1j * time * omega * stress
+    modulus += 1j * omega * float(fluid.solvent_viscosity)
+    return LinearSweep(omega, np.real(modulus), np.imag(modulus))
+
+
+@eqx.filter_jit
+def _at_rest(law):
+    """Return the derivatives of the stress rate to stress and shear rate, (4, 4) and (4,)."""
+    return jax.jacfwd(law.stress_rate, argnums=(0, 1))(jnp.zeros(4), jnp.zeros(()))

@@ -18,6 +18,8 @@ from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.known_part import KnownPart, known_part
+from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
@@ -54,6 +56,9 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         Whether −σ is known. If not, the network has to find it too.
     base_law
         A known dimensionless law to which the network is added; by default UCM.
+    base
+        The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law` and
+        `known_relaxation`.
     n_members
         Networks that reach the data by different ways (see `ensemble`). One of the simplest that
         fit is taken; what those that fit disagree on, the data leave open.
@@ -85,7 +90,28 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         How the members came about.
     fitting_ : list of TensorBasisNetwork
         Members that fit the data about as well as the best, `law_` first.
+    runs_ : tuple of ShearRun
+        What was fitted; a file does not hold it.
+    provenance_ : Provenance
+        The same in words, with a hash.
+    equation_ : Equation
+        The projection with the modes, for SymPy, LaTeX, JSON.
     """
+
+    learner = "tbnn_ude"
+    _saved = (
+        "n_features_in_",
+        "law_",
+        "fluid_",
+        "terms_",
+        "result_",
+        "members_",
+        "ensemble_fluids_",
+        "ensemble_",
+        "fitting_",
+        "provenance_",
+    )
+    _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
     def __init__(
         self,
@@ -99,6 +125,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         quick: bool = False,
         random_state: int = 0,
         progress: Any = None,
+        base: Fluid | None = None,
     ):
         self.recipe = recipe
         self.modulus = modulus
@@ -110,14 +137,15 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.quick = quick
         self.random_state = random_state
         self.progress = progress
+        self.base = base
 
-    def fit(self, X: Sequence, y=None) -> "TBNNUDE":
+    def fit(self, X: Any, y=None) -> "TBNNUDE":
         """Train on σ12 of these runs.
 
         Parameters
         ----------
         X
-            Runs, a sequence of `ShearRun`.
+            Runs (`ShearRun`), or a data set.
         y
             Ignored: the observations are part of the runs.
 
@@ -130,22 +158,25 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         started = time.perf_counter()
         runs = as_runs(X)
         recipe = self._recipe()
-        problem = self._problem(runs)
+        known = known_part(self)
+        problem = _problem(runs, known)
         if self.n_members < 1:
             raise InputError(f"n_members must be at least 1; got {self.n_members}.")
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
-        trained, agreement = self._train_all(problem, keys, recipe)
+        trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
         misfits = member_misfits(members, problem)
         chosen, fits = choose_member(trained, misfits, _resolved(recipe))
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
         self.n_features_in_ = 1
+        self.runs_ = tuple(runs)
+        self.provenance_ = provenance_of(X, runs)
         self.members_ = members
         self.ensemble_ = agreement
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
-        modulus = jnp.atleast_1d(jnp.asarray(self.modulus, dtype=float))
+        modulus = jnp.atleast_1d(jnp.asarray(known.modulus, dtype=float))
         self.fluid_ = Fluid(best.law, modulus, problem.relaxation_time)
         self.ensemble_fluids_ = [Fluid(law, modulus, problem.relaxation_time) for law in members]
         cloud = sample_states(best.law, problem)
@@ -196,22 +227,10 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
 
     def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        problem = self._problem(runs)
+        fluid = self.fluid_
+        problem = make_problem(runs, np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
         return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
-
-    def _problem(self, runs: Sequence[ShearRun]) -> TrainingProblem:
-        modulus, relaxation_time = (
-            np.atleast_1d(np.asarray(value, dtype=float))
-            for value in (self.modulus, self.relaxation_time)
-        )
-        bad = modulus.shape != relaxation_time.shape or modulus.ndim != 1
-        if bad or not (np.all(modulus > 0) and np.all(relaxation_time > 0)):
-            raise InputError(
-                "modulus and relaxation_time must be positive, with one value for each mode; got "
-                f"{self.modulus!r} and {self.relaxation_time!r}."
-            )
-        return make_problem(runs, modulus, relaxation_time)
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
@@ -225,28 +244,28 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
 
-    def _train_all(self, problem: TrainingProblem, keys, recipe) -> tuple[list[Trained], str]:
+    def _train_all(
+        self, problem: TrainingProblem, keys, recipe, known: KnownPart
+    ) -> tuple[list[Trained], str]:
         """Return all members, and how they came about."""
-        first = self._train(problem, keys[0], recipe)
+        first = self._train(problem, keys[0], recipe, known)
         if len(keys) == 1:
             return [first], "a single member"
         if isinstance(recipe, PaperRecipe):
             # the first has compiled the program; its steps are too small to be shared out
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-                others = list(pool.map(lambda key: self._train(problem, key, recipe), keys[1:]))
+                others = list(
+                    pool.map(lambda key: self._train(problem, key, recipe, known), keys[1:])
+                )
             return [first, *others], "trained from initial weights of their own"
         others, agreement = train_others(problem, first, keys[1:], recipe, self.progress)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe) -> Trained:
-        relaxes = (
-            self.known_relaxation if self.base_law is None else self.base_law.linear_relaxation
-        )
+    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart) -> Trained:
+        relaxes = known.linear_relaxation
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, self.progress, self.base_law)
-        law, losses = train_paper(
-            problem, key, relaxes, recipe, self.progress, base_law=self.base_law
-        )
+            return train_default(problem, key, relaxes, recipe, self.progress, known.law)
+        law, losses = train_paper(problem, key, relaxes, recipe, self.progress, base_law=known.law)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
@@ -254,6 +273,25 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
 
 def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
+
+
+def _problem(runs: Sequence[ShearRun], known: KnownPart) -> TrainingProblem:
+    modulus, relaxation_time = (
+        np.atleast_1d(np.asarray(value, dtype=float))
+        for value in (known.modulus, known.relaxation_time)
+    )
+    bad = modulus.shape != relaxation_time.shape or modulus.ndim != 1
+    if bad or not (np.all(modulus > 0) and np.all(relaxation_time > 0)):
+        raise InputError(
+            "modulus and relaxation_time must be positive, with one value for each mode; got "
+            f"{known.modulus!r} and {known.relaxation_time!r}."
+        )
+    if known.solvent_viscosity:
+        raise InputError(
+            f"The network takes no solvent viscosity yet; base has {known.solvent_viscosity:g} "
+            "Pa s. Use a base without one, or TensorSINDy."
+        )
+    return make_problem(runs, modulus, relaxation_time)
 
 
 def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:

@@ -1,7 +1,6 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from collections.abc import Iterable
 from typing import Any
 
 import jax.numpy as jnp
@@ -14,10 +13,12 @@ from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
+from discover.learners.known_part import KnownPart, known_part
+from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tensor_sindy.deviance import draws_of_fit
-from discover.learners.tensor_sindy.intervals import parameter_uncertainty
+from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
     check_optimiser,
     default_support,
@@ -29,9 +30,11 @@ from discover.learners.tensor_sindy.report import path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
 from discover.learners.tensor_sindy.selectors import compare_selectors
-from discover.learners.tensor_sindy.stability import selection_stability
+from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
+from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
 from discover.simulate.solve import solve_batch
+from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
 
 SELECTIONS = ("bic", "held_out")
@@ -60,6 +63,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         Whether −σ is known. If not, the learner has to find ``sigma`` too.
     base_law
         A known dimensionless law to which terms are added; by default UCM.
+    base
+        The known `Fluid`, in place of `modulus`, `relaxation_time`, `solvent_viscosity`,
+        `base_law` and `known_relaxation`.
     use_normal_stresses
         Whether N1 and N2, where measured, join as observed rows.
     selection
@@ -106,7 +112,38 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         The best fit of each size, from empty on.
     search_ : SupportSearch
         Every support that was refitted.
+    runs_ : tuple of ShearRun
+        What was fitted. A file holds neither these nor `search_` and `path_`.
+    provenance_ : Provenance
+        The same in words, with a hash.
+    equation_ : Equation
+        The law with its modes, for SymPy, LaTeX, JSON.
     """
+
+    learner = "tensor_sindy"
+    _saved = (
+        "n_features_in_",
+        "law_",
+        "fluid_",
+        "terms_",
+        "result_",
+        "library_",
+        "coefficients_",
+        "inner_",
+        "uncertainty_",
+        "draws_",
+        "stability_",
+        "provenance_",
+    )
+    _saved_types = (
+        LearnerResult,
+        RecoveredTerm,
+        ParameterUncertainty,
+        NoiseModel,
+        Stability,
+        WeighedDraws,
+        Provenance,
+    )
 
     def __init__(
         self,
@@ -126,6 +163,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         strain_step: float = 0.2,
         random_state: int | None = 0,
         progress: Any = None,
+        base: Fluid | None = None,
     ):
         self.library = library
         self.optimizer = optimizer
@@ -143,8 +181,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.strain_step = strain_step
         self.random_state = random_state
         self.progress = progress
+        self.base = base
 
-    def fit(self, X: Iterable[Any], y=None) -> "TensorSINDy":
+    def fit(self, X: Any, y=None) -> "TensorSINDy":
         """Find the law of these runs.
 
         Parameters
@@ -164,14 +203,15 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self._check_parameters()
         library = build_library() if self.library is None else self.library
         runs = as_runs(X)  # once, for it may be read only once
+        known = known_part(self)
         problem = make_problem(
             runs,
             library,
-            self.modulus,
-            self.relaxation_time,
-            self.solvent_viscosity,
-            self.base_law,
-            self.known_relaxation,
+            known.modulus,
+            known.relaxation_time,
+            known.solvent_viscosity,
+            known.law,
+            known.linear_relaxation,
             self.use_normal_stresses,
             self.strain_step,
         )
@@ -199,13 +239,15 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             chosen = choose_by_bic(criterion)
         fit = path[chosen]
 
+        self.runs_ = tuple(runs)
+        self.provenance_ = provenance_of(X, runs)
         self.search_ = search
         self.path_ = path
         self.library_ = library
         self.n_features_in_ = 1
         self.coefficients_ = fit.dense(len(library))
         self.inner_ = fit.inner
-        self.law_ = self._law(library, fit)
+        self.law_ = _law(library, fit, known)
         self.fluid_ = Fluid(
             self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
         )
@@ -282,22 +324,6 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         problem = make_problem(runs, self.library_, strain_step=self.strain_step)
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
         return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
-
-    def _law(self, library: TermLibrary, fit: Fit) -> LibraryExpansion:
-        support = list(fit.support)
-        smaller = library.subset(support) if support else library.subset([0])
-        coefficients = fit.coefficients if support else np.zeros(1)
-        inner = [fit.inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
-        relaxes = (
-            self.known_relaxation if self.base_law is None else self.base_law.linear_relaxation
-        )
-        return LibraryExpansion(
-            coefficients=jnp.asarray(coefficients),
-            inner=jnp.asarray(inner, float),
-            library=smaller,
-            linear_relaxation=relaxes,
-            base=self.base_law,
-        )
 
     def _frequencies(self, library: TermLibrary) -> list[dict[str, Any]]:
         """Return how often each term was chosen from halves of the data, the most often first."""
@@ -402,3 +428,17 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             raise InputError(f"max_terms must be at least 1; got {self.max_terms}.")
         if not self.misfit_floor > 0:
             raise InputError(f"misfit_floor must be positive; got {self.misfit_floor}.")
+
+
+def _law(library: TermLibrary, fit: Fit, known: KnownPart) -> LibraryExpansion:
+    support = list(fit.support)
+    smaller = library.subset(support) if support else library.subset([0])
+    coefficients = fit.coefficients if support else np.zeros(1)
+    inner = [fit.inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
+    return LibraryExpansion(
+        coefficients=jnp.asarray(coefficients),
+        inner=jnp.asarray(inner, float),
+        library=smaller,
+        linear_relaxation=known.linear_relaxation,
+        base=known.law,
+    )

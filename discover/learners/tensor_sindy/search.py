@@ -26,6 +26,11 @@ BREADTH = 8
 _FEWEST_SLOTS = 5
 
 
+def _silent(line: str) -> None:
+    # a name, so that a search can be pickled
+    del line
+
+
 class SupportSearch:
     """Every support that was refitted, and the moves between them.
 
@@ -63,7 +68,7 @@ class SupportSearch:
         # never fewer, so that searches of small supports share a compilation
         self.slots = max(self.largest, _FEWEST_SLOTS)
         self.floor = floor
-        self.progress = progress or (lambda line: None)
+        self.progress = progress or _silent
         self.fits: dict[tuple[int, ...], Fit] = {}
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)

@@ -1,0 +1,27 @@
+"""Packages that answer a call: ``discover.laws()`` beside ``discover.laws.Giesekus``."""
+
+import sys
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+
+def answer_calls(package: str, answer: Callable[[], Any]) -> None:
+    """Let a package be called.
+
+    The name of a package is taken: once it is imported, it is what its parent holds under that
+    name. So a function of the same name has to be the package itself.
+
+    Parameters
+    ----------
+    package
+        Its full name; called from its ``__init__``.
+    answer
+        What a call returns.
+    """
+
+    class CallablePackage(ModuleType):
+        def __call__(self) -> Any:
+            return answer()
+
+    sys.modules[package].__class__ = CallablePackage

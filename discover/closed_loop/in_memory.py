@@ -1,0 +1,107 @@
+"""A closed loop on data that a program holds."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.each_run import run_loop_on_each
+from discover.closed_loop.loop import run_loop
+from discover.closed_loop.result import LoopResult
+from discover.dataset.run import ShearDataset
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.laws.registry import LAWS
+from discover.study.build import DeclaredModel as DeclaredFluid
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid
+
+
+def close_loop(
+    data: ShearDataset,
+    base: Fluid | None = None,
+    *,
+    held_out: HeldOut = (),
+    free: Sequence[str] = (),
+    progress: Callable[[str], None] | None = None,
+    **options: Any,
+) -> LoopResult:
+    """Find what a fluid lacks on these data, add it, and judge it on runs that no fit saw.
+
+    Parameters
+    ----------
+    data
+        The runs to fit.
+    base
+        The declared fluid; by default upper convected Maxwell with G = 1 Pa and λ = 1 s.
+    held_out
+        Runs that only judge: a data set of their own, names of runs of `data`, or ``"each"`` to
+        hold each run out in turn.
+    free
+        What of the base is fitted along: parameters of its law, which must be one with a name, and
+        ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
+    progress
+        Called with a line of text now and then.
+    **options
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples` of
+        `discover.closed_loop.run_loop`.
+
+    Returns
+    -------
+    The result, with ``to_html``, ``to_dataframe`` and ``equation``.
+
+    Raises
+    ------
+    InputError
+        If data, base or an option is not as it should be.
+    """
+    unknown = set(options) - {"effects", "max_effects", "strain", "noise", "most_samples"}
+    if unknown:
+        raise InputError(
+            f"close_loop has no option {sorted(unknown)[0]!r}; it has effects, max_effects, "
+            "strain, noise and most_samples."
+        )
+    divided = data_in_memory(data, held_out)
+    fluid = declared_fluid(base, data)
+    declared = _declared(fluid, free)
+    options |= {"fit": divided.fit.names, "progress": progress}
+    if divided.each:
+        result = run_loop_on_each(divided.dataset, declared, **options)
+    else:
+        result = run_loop(divided.dataset, declared, held_out=divided.held_out.names, **options)
+    judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
+    summary = (
+        f"Data: {data.name}, {len(divided.fit)} runs fitted, {judged}. Declared model: "
+        f"{_described(fluid)}, {len(fluid.modulus)} relaxation "
+        f"mode{'s' if len(fluid.modulus) > 1 else ''}. {data.thinned}"
+    ).strip()
+    return replace(result, title=data.name, summary=summary)
+
+
+def _described(fluid: DeclaredFluid) -> str:
+    named = LAWS.get(fluid.law_name)
+    return fluid.law_name if named is None else named.described(fluid.parameters)
+
+
+def _declared(fluid: DeclaredFluid, free: Sequence[str]) -> DeclaredModel:
+    options: dict[str, Any] = {
+        "solvent_viscosity": fluid.solvent_viscosity,
+        "linear_error": 0.0 if fluid.spectrum is None else fluid.spectrum.relative_error,
+    }
+    if isinstance(free, str):
+        raise InputError(f"free must be a list of names; got {free!r}. Write [{free!r}].")
+    modes = fluid.modulus, fluid.relaxation_time
+    if fluid.law_name in LAWS and fluid.law.linear_relaxation:
+        return DeclaredModel.named(fluid.law_name, fluid.parameters, *modes, free=free, **options)
+    unknown = [name for name in free if name not in ("modulus_Pa", "relaxation_time_s")]
+    if unknown:
+        raise InputError(
+            f"{unknown[0]!r} cannot be fitted: the law {fluid.law_name} has no name. Register it "
+            "with register_law."
+        )
+    return DeclaredModel(
+        fluid.law,
+        *modes,
+        fit_modulus="modulus_Pa" in free,
+        fit_relaxation_time="relaxation_time_s" in free,
+        **options,
+    )

@@ -1,0 +1,200 @@
+"""A comparison of estimators, or on data, that a program holds."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, overload
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.run_comparison import compare as compare_study
+from discover.comparison.training import Progress, searched, silent
+from discover.dataset.run import ShearDataset
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.laws.registry import name_of
+from discover.learners.known_part import known_part
+from discover.learners.provenance import fingerprint_of
+from discover.learners.result import LearnerResult
+from discover.learners.run_prediction import RunPrediction
+from discover.simulate.synthetic import SyntheticDataset
+from discover.study.build import DeclaredModel, StudyData
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined
+from discover.study.read import parse_study
+from discover.study.schema import Study
+
+
+@overload
+def compare(
+    first: Sequence[RunPrediction],
+    second: ShearDataset,
+    *,
+    train: ShearDataset | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Comparison: ...
+
+
+@overload
+def compare(
+    first: ShearDataset,
+    second: Fluid | None = None,
+    *,
+    held_out: HeldOut = (),
+    seed: int = 0,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Comparison: ...
+
+
+def compare(
+    first: Any,
+    second: Any = None,
+    *,
+    train: Any = None,
+    held_out: Any = (),
+    seed: int = 0,
+    progress: Any = None,
+    **options: Any,
+) -> Comparison:
+    """Compare fitted estimators on runs that no fit saw, or fit both learners to data and compare.
+
+    Parameters
+    ----------
+    first
+        Fitted estimators, one of each learner at most, or a data set.
+    second
+        For estimators the data set that judges them; for a data set the known `Fluid`, by default
+        upper convected Maxwell with G = 1 Pa and λ = 1 s.
+    train
+        What the estimators were fitted to; needed only for those from a file, which holds no data.
+    held_out
+        Runs of the data set that only judge, by name, or a data set of them.
+    seed
+        Of the learners, and of draws within intervals.
+    progress
+        Called with what is going on and the fraction done.
+    **options
+        For a data set: what ``[compare]`` in a study may hold, such as ``quick=True``,
+        ``members=5``, ``learners=["tensor_sindy"]``, ``library={"degree": 1}``.
+
+    Raises
+    ------
+    InputError
+        If estimators are not fitted, or not to the same runs with the same known part, a run
+        judges that was fitted, or an option is unknown.
+    """
+    say = progress or silent
+    if isinstance(first, ShearDataset):
+        if train is not None:
+            raise InputError("train is for estimators from a file; leave it out.")
+        data = data_in_memory(first, held_out)
+        model = declared_fluid(second, first)
+        study = _study(data, model, options)
+        return compare_study(study, seed, say, data=data, declared=model)
+    if options or len(held_out):
+        unknown = next(iter(options), "held_out")
+        raise InputError(
+            f"{unknown} is for a data set; the estimators are fitted already. Leave it out."
+        )
+    estimators = _fitted(first)
+    runs = _training_runs(estimators, train)
+    if not isinstance(second, ShearDataset) or not len(second):
+        raise InputError(
+            "Give the data set that judges the estimators, with one run at least: "
+            "compare([sindy, network], test)."
+        )
+    data = StudyData(joined(second, runs), ShearDataset(second.name, runs), second)
+    model = declared_fluid(_common_base(estimators), second)
+    sparse = estimators.get("tensor_sindy")
+    asked = {
+        "learners": list(estimators),
+        "use_normal_stresses": bool(getattr(sparse, "use_normal_stresses", False)),
+    }
+    made = {name: (_result(e), e.fluid_) for name, e in estimators.items()}
+    library = getattr(sparse, "library_", None)
+    return compare_study(
+        _study(data, model, asked), seed, say, data=data, declared=model, made=made, library=library
+    )
+
+
+def _study(data: StudyData, model: DeclaredModel, options: Mapping[str, Any]) -> Study:
+    """Return the study that would ask for the same with files."""
+    source: dict[str, Any] = {"folder": data.dataset.name or "data in memory"}
+    whole = data.dataset
+    if isinstance(whole, SyntheticDataset) and whole.truth is not None:
+        found = name_of(whole.truth.law)
+        if found is not None:
+            made = {"law": found[0], "parameters": found[1], "noise": whole.noise}
+            source = {"synthetic": made}
+    known = {"known_relaxation": bool(model.law.linear_relaxation)}
+    content = {"data": source, "model": known, "compare": dict(options)}
+    return parse_study(content, "compare()")
+
+
+def _fitted(estimators: Any) -> dict[str, RunPrediction]:
+    listed = list(estimators) if isinstance(estimators, Iterable) else [estimators]
+    by_learner: dict[str, RunPrediction] = {}
+    for one in listed:
+        if not isinstance(one, RunPrediction):
+            raise InputError(
+                "compare takes fitted estimators and a data set, or a data set and a Fluid; got a "
+                f"{type(one).__name__}."
+            )
+        if not hasattr(one, "result_"):
+            raise InputError(f"{type(one).__name__} is not fitted; call fit(train) first.")
+        if one.learner in by_learner:
+            raise InputError(
+                f"compare takes one {type(one).__name__} at most; got more. Compare their score() "
+                "instead."
+            )
+        by_learner[one.learner] = one
+    if not by_learner:
+        raise InputError("compare needs one fitted estimator at least; got none.")
+    return by_learner
+
+
+def _training_runs(estimators: Mapping[str, RunPrediction], train: Any):
+    wanted = {one.provenance_.fingerprint for one in estimators.values()}
+    if len(wanted) > 1:
+        names = " and ".join(
+            f"{name}: {', '.join(one.provenance_.runs)}" for name, one in estimators.items()
+        )
+        raise InputError(
+            f"The estimators were fitted to different runs ({names}), so they cannot be compared. "
+            "Fit them to the same."
+        )
+    if train is None:
+        kept = [one.runs_ for one in estimators.values() if hasattr(one, "runs_")]
+        if not kept:
+            raise InputError(
+                "A file holds no data, so estimators from one are compared with the runs that they "
+                "were fitted to at hand: compare([...], test, train=train)."
+            )
+        return kept[0]
+    runs = tuple(train)
+    if fingerprint_of(runs) not in wanted:
+        expected = ", ".join(next(iter(estimators.values())).provenance_.runs)
+        raise InputError(
+            f"train does not hold the samples that the estimators were fitted to ({expected}). "
+            "Give those."
+        )
+    return runs
+
+
+def _common_base(estimators: Mapping[str, RunPrediction]) -> Fluid:
+    fluids = [known_part(one).fluid for one in estimators.values()]
+    for other in fluids[1:]:
+        if not _same_fluid(fluids[0], other):
+            raise InputError(
+                f"The estimators have different known parts ({fluids[0]!r} and {other!r}), so "
+                "their terms cannot be compared. Give both the same base."
+            )
+    return fluids[0]
+
+
+def _same_fluid(one: Fluid, other: Fluid) -> bool:
+    import equinox as eqx
+
+    return bool(eqx.tree_equal(one, other, rtol=1e-12))
+
+
+def _result(estimator: Any) -> LearnerResult:
+    return searched(estimator) if hasattr(estimator, "search_") else estimator.result_

@@ -1,0 +1,75 @@
+"""What is set up when something that computes is first used: double precision, kept programs.
+
+Importing this module does it. Whatever needs JAX imports it before JAX, so that it holds in every
+process: in a script, in a notebook, and in a worker that only unpickles a fitted estimator.
+``import discover`` alone does not import it.
+"""
+
+import sys
+
+from discover.compilation_cache import enable_compilation_cache
+from discover.errors import InputError
+from discover.precision import enable_x64
+
+_SINGLE = ("float32", "complex64")
+
+
+def set_up() -> None:
+    """Turn on double precision and keep compiled programs between starts.
+
+    A cache folder, or double precision, that the user has chosen already is left as it is.
+
+    Raises
+    ------
+    InputError
+        If JAX holds arrays of single precision that were made before. Programs compiled before are
+        no harm: JAX compiles them again.
+    """
+    import jax
+
+    if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        _require_no_single_arrays(jax)
+        enable_x64()
+    require_double()
+    enable_compilation_cache()
+
+
+def require_double() -> None:
+    """Check that JAX computes in double precision here and now.
+
+    Raises
+    ------
+    InputError
+        If it was turned off, for the program or for a block of it.
+    """
+    import jax
+
+    if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        raise InputError(
+            "JAX computes in single precision here, in which no law can be told from another. "
+            "Leave the block that turned double precision off, or turn it on again with "
+            "jax.config.update('jax_enable_x64', True)."
+        )
+
+
+def _require_no_single_arrays(jax) -> None:
+    if not _has_started():
+        return  # asking for arrays would start JAX, which is for the user to do
+    count = sum(str(array.dtype) in _SINGLE for array in jax.live_arrays())
+    if count:
+        raise InputError(
+            f"JAX holds {count} array{'s' if count > 1 else ''} of single precision, made before "
+            "discover was used, which computes in double precision. Begin the program with "
+            "jax.config.update('jax_enable_x64', True), or call that now if these arrays are not "
+            "for discover."
+        )
+
+
+def _has_started() -> bool:
+    """Return whether JAX has a device, without which there is no array."""
+    bridge = sys.modules.get("jax._src.xla_bridge")  # JAX has no public name for it
+    started = getattr(bridge, "backends_are_initialized", None)
+    return True if started is None else bool(started())
+
+
+set_up()

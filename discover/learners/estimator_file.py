@@ -1,0 +1,170 @@
+"""A fitted estimator in one file: JSON and arrays in a zip, versioned, without pickle."""
+
+import io
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from discover import __version__
+from discover.errors import InputError
+from discover.learners.plain_values import PlainReader, PlainWriter
+
+FORMAT, VERSION = "discover estimator", 1
+_HEADER = "estimator.json"
+_LARGEST = 2**30
+"""No part of a file is larger than this, in bytes: an estimator of megabytes is a large one."""
+
+
+def write_estimator(
+    path: str | Path,
+    learner: str,
+    parameters: Mapping[str, Any],
+    fitted: Mapping[str, Any],
+    types: Sequence[type],
+) -> Path:
+    """Write an estimator to a file, replacing it whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The file.
+    learner
+        Name of the learner.
+    parameters, fitted
+        What it was made with, and the attributes of the fit, by name.
+    types
+        Dataclasses that may occur in them.
+
+    Raises
+    ------
+    InputError
+        If something of it cannot be written.
+    """
+    writer = PlainWriter(types)
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "made_by": f"discover {__version__}",
+        "learner": learner,
+        "parameters": {k: writer.plain(v, f"The parameter {k!r}") for k, v in parameters.items()},
+        "fitted": {k: writer.plain(v, f"The attribute {k!r}") for k, v in fitted.items()},
+    }
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr(_HEADER, json.dumps(header, allow_nan=False, ensure_ascii=False))
+        for name, values in writer.arrays.items():
+            content = io.BytesIO()
+            np.lib.format.write_array(content, values, allow_pickle=False)
+            file.writestr(f"{name}.npy", content.getvalue())
+    os.replace(partial, path)
+    return path
+
+
+class EstimatorFile:
+    """What a file written by `write_estimator` holds.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Attributes
+    ----------
+    learner
+        Name of the learner.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is something else, it is damaged, or it is of a later version.
+    """
+
+    def __init__(self, path: str | Path):
+        self._path = Path(path)
+        try:
+            with zipfile.ZipFile(self._path) as file:
+                self._header = self._read_header(file)
+                self._arrays = {
+                    info.filename.removesuffix(".npy"): _read_array(file, info)
+                    for info in file.infolist()
+                    if info.filename.endswith(".npy")
+                }
+        except OSError as error:
+            raise InputError(
+                f"The file {self._path} cannot be read: {error.strerror or error}."
+            ) from None
+        except zipfile.BadZipFile:
+            raise self._other() from None
+        except (ValueError, EOFError, zlib.error, RecursionError, NotImplementedError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise self.damaged(error) from None
+        self.learner = str(self._header.get("learner"))
+
+    def read(self, types: Sequence[type]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the parameters and the fitted attributes, by name.
+
+        Parameters
+        ----------
+        types
+            Dataclasses that may occur in them.
+        """
+        reader = PlainReader(types, self._arrays)
+        try:
+            parameters, fitted = (
+                {name: reader.value(value) for name, value in self._header[part].items()}
+                for part in ("parameters", "fitted")
+            )
+        except InputError as error:  # a law that is not registered here
+            raise InputError(f"{self._path}: {error}") from None
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise self.damaged(error) from None
+        return parameters, fitted
+
+    def _read_header(self, file: zipfile.ZipFile) -> dict[str, Any]:
+        if _HEADER not in file.namelist():
+            raise self._other()
+        header = json.loads(_read(file, file.getinfo(_HEADER)))
+        if not isinstance(header, dict) or header.get("format") != FORMAT:
+            raise self._other()
+        if header.get("version") != VERSION:
+            raise InputError(
+                f"{self._path} was written by {header.get('made_by', 'another version')} in the "
+                f"form {header.get('version')}; this is discover {__version__}, which reads the "
+                f"form {VERSION}. Use that version, or fit again."
+            )
+        return header
+
+    def _other(self) -> InputError:
+        return InputError(
+            f"{self._path} is no whole estimator of discover. Give a file that "
+            "estimator.save(path) wrote; a law by itself is read elsewhere."
+        )
+
+    def damaged(self, error: Exception) -> InputError:
+        """Return what to raise where something in the file is not as it was written."""
+        first = (str(error).splitlines() or [""])[0][:200]
+        return InputError(
+            f"{self._path} is damaged ({type(error).__name__}: {first}). Copy it again, or fit "
+            "again."
+        )
+
+
+def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
+    if info.file_size > _LARGEST:
+        raise ValueError(f"{info.filename} is too large")
+    try:
+        return file.read(info)
+    except zipfile.BadZipFile as error:  # a checksum that does not fit: ours, but damaged
+        raise ValueError(str(error)) from None
+
+
+def _read_array(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    return np.lib.format.read_array(io.BytesIO(_read(file, info)), allow_pickle=False)

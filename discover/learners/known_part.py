@@ -1,0 +1,95 @@
+"""What a learner is told of the fluid before it fits."""
+
+import inspect
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.multimode import Fluid
+
+_HELD_BY_BASE = (
+    "modulus",
+    "relaxation_time",
+    "solvent_viscosity",
+    "base_law",
+    "known_relaxation",
+)
+
+
+@dataclass(frozen=True)
+class KnownPart:
+    """The known fluid, to which a learner adds terms.
+
+    Attributes
+    ----------
+    law
+        A known dimensionless law; None for upper convected Maxwell.
+    modulus, relaxation_time
+        In Pa and s, numbers, or one value for each mode.
+    solvent_viscosity
+        In Pa s.
+    linear_relaxation
+        Whether −σ is known.
+    """
+
+    law: AbstractConstitutiveLaw | None
+    modulus: Any
+    relaxation_time: Any
+    solvent_viscosity: float
+    linear_relaxation: bool
+
+    @property
+    def fluid(self) -> Fluid:
+        """The known part alone, as a fluid."""
+        law = UpperConvectedMaxwell(self.linear_relaxation) if self.law is None else self.law
+        return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
+
+
+def known_part(estimator: Any) -> KnownPart:
+    """Return what an estimator is told of the fluid: by `base`, or part by part.
+
+    Parameters
+    ----------
+    estimator
+        Has `base`, `modulus`, `relaxation_time`, `base_law`, `known_relaxation`, and perhaps
+        `solvent_viscosity`.
+
+    Raises
+    ------
+    InputError
+        If `base` is no fluid, or something that it holds is given too.
+    """
+    base = estimator.base
+    if base is None:
+        law = estimator.base_law
+        return KnownPart(
+            law,
+            estimator.modulus,
+            estimator.relaxation_time,
+            getattr(estimator, "solvent_viscosity", 0.0),
+            estimator.known_relaxation if law is None else law.linear_relaxation,
+        )
+    if not isinstance(base, Fluid):
+        raise InputError(
+            f"base must be a Fluid; got a {type(base).__name__}. Make one with "
+            "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
+        )
+    defaults = inspect.signature(type(estimator).__init__).parameters
+    for name in _HELD_BY_BASE:
+        if name in defaults and not _same(getattr(estimator, name), defaults[name].default):
+            raise InputError(f"base holds {name} already; got both. Leave {name} out, or base.")
+    return KnownPart(
+        None if isinstance(base.law, UpperConvectedMaxwell) else base.law,
+        np.asarray(base.modulus),
+        np.asarray(base.relaxation_time),
+        float(base.solvent_viscosity),
+        base.law.linear_relaxation,
+    )
+
+
+def _same(value: Any, default: Any) -> bool:
+    return value is default or (np.ndim(value) == 0 and bool(value == default))

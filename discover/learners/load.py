@@ -1,0 +1,33 @@
+"""A saved estimator, whichever learner it is of."""
+
+from pathlib import Path
+
+from discover.errors import InputError
+from discover.learners.estimator_file import EstimatorFile
+from discover.learners.tbnn_ude import TBNNUDE
+from discover.learners.tensor_sindy import TensorSINDy
+
+_LEARNERS = {"tensor_sindy": TensorSINDy, "tbnn_ude": TBNNUDE}
+
+
+def load(path: str | Path) -> TensorSINDy | TBNNUDE:
+    """Return the fitted estimator in a file that its `save` wrote; it predicts the same numbers.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is something else or damaged, or it needs a law that is not
+        registered here.
+    """
+    file = EstimatorFile(path)
+    if file.learner not in _LEARNERS:
+        raise InputError(
+            f"{path} holds an estimator of the kind {file.learner!r}; known are "
+            f"{', '.join(_LEARNERS)}."
+        )
+    return _LEARNERS[file.learner]._from_file(file)

@@ -1,0 +1,126 @@
+"""Data sets and fluids that a program holds, as the tasks take them from a study."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.run import ShearDataset, ShearRun, require_signal
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.laws.registry import name_of
+from discover.simulate.synthetic import SyntheticDataset
+from discover.study.build import DeclaredModel, StudyData
+
+HeldOut = ShearDataset | Sequence[str] | Literal["each"]
+"""What only judges: a data set of its own, or names of runs of the data set."""
+
+
+def data_in_memory(data: ShearDataset, held_out: HeldOut = ()) -> StudyData:
+    """Return data divided into runs to fit and runs held out.
+
+    Parameters
+    ----------
+    data
+        The runs to fit, and the held-out ones too where they are given by name.
+    held_out
+        A data set of runs that only judge, names of runs of `data`, or ``"each"``.
+
+    Raises
+    ------
+    InputError
+        If no data set is given, a run is both fitted and held out, none is left to fit, or those
+        to fit hold no signal.
+    """
+    if not isinstance(data, ShearDataset):
+        raise InputError(
+            f"This needs a data set; got a {type(data).__name__}. Load one with load_dataset, or "
+            'make one of runs: ShearDataset("name", runs).'
+        )
+    if isinstance(held_out, ShearDataset):
+        whole = joined(data, held_out.runs)
+        divided = StudyData(whole, data, held_out)
+    elif isinstance(held_out, str):
+        if held_out != "each":
+            raise InputError(
+                f"held_out must be a data set, a list of names or 'each'; got {held_out!r}. Write "
+                f"[{held_out!r}] for this run."
+            )
+        divided = StudyData(data, data, data.select([]), each=True)
+    elif len(held_out):
+        divided = StudyData(data, *data.split(held_out))
+    else:
+        divided = StudyData(data, data, data.select([]))
+    require_signal(divided.fit.runs)
+    return divided
+
+
+def joined(data: ShearDataset, more: Sequence[ShearRun]) -> ShearDataset:
+    """Return a data set with further runs, which must have names of their own.
+
+    Raises
+    ------
+    InputError
+        If a run of the same name is there already.
+    """
+    both = set(data.names) & {run.name for run in more}
+    if both:
+        raise InputError(
+            f"The run {sorted(both)[0]!r} is both fitted and held out, so it proves nothing. "
+            "Divide the runs with train, test = data.split(held_out=[...])."
+        )
+    runs = (*data.runs, *more)
+    exact = data.exact or {} if isinstance(data, SyntheticDataset) else None
+    if exact is None or all(run.name in exact for run in runs):
+        return replace(data, runs=runs)
+    # the truth of what was added is not known
+    return ShearDataset(data.name, runs, data.linear_sweep, data.provenance)
+
+
+def declared_fluid(base: Any, data: ShearDataset) -> DeclaredModel:
+    """Return a fluid as the declared model of a study.
+
+    Parameters
+    ----------
+    base
+        A `Fluid`; None for upper convected Maxwell with G = 1 Pa and λ = 1 s.
+    data
+        The data; where the modes are those of its linear sweep, the error of the sweep is known.
+
+    Raises
+    ------
+    InputError
+        If `base` is no fluid.
+    """
+    if base is None:
+        from discover.laws.maxwell import UpperConvectedMaxwell
+
+        base = Fluid.dimensionless(UpperConvectedMaxwell())
+    if not isinstance(base, Fluid):
+        raise InputError(
+            f"base must be a Fluid; got a {type(base).__name__}. Make one with "
+            "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
+        )
+    name, parameters = name_of(base.law) or (type(base.law).__name__, {})
+    modulus, relaxation_time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
+    return DeclaredModel(
+        base.law,
+        name,
+        parameters,
+        modulus,
+        relaxation_time,
+        (),
+        _spectrum(data, modulus, relaxation_time),
+        float(base.solvent_viscosity),
+    )
+
+
+def _spectrum(data: ShearDataset, modulus, relaxation_time) -> RelaxationSpectrum | None:
+    """Return the spectrum of the data's linear sweep if the modes are those."""
+    if data.linear_sweep is None:
+        return None
+    found = relaxation_spectrum(data.linear_sweep)
+    same = np.array_equal(found.modulus, modulus)
+    return found if same and np.array_equal(found.relaxation_time, relaxation_time) else None

@@ -1,0 +1,122 @@
+"""The script of the page on Python runs as it stands."""
+
+import re
+from functools import partial
+from pathlib import Path
+
+import pytest
+from independent_folder import MOBILITY, write_folder
+
+import discover as dc
+from discover.closed_loop import in_memory
+from discover.learners.tbnn_ude.estimator import TBNNUDE
+from discover.learners.tensor_sindy.estimator import TensorSINDy
+from tensor_library import parse_term
+from tensor_library.library import TermLibrary
+
+PAGE = Path(__file__).parents[2] / "docs" / "python.md"
+LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
+
+
+def script():
+    return re.search(r"^```python\n(import discover as dc.*?)^```", PAGE.read_text("utf-8"),
+                     re.S | re.M)[1]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def after(tmp_path_factory):
+    """What the script leaves behind, with settings that cost less: its words are not changed."""
+    folder = tmp_path_factory.mktemp("door")
+    write_folder(folder / "FOLDER")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        quick = {"library": LIBRARY, "max_terms": 1, "n_folds": 0, "n_stability": 0}
+        patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, **quick))
+        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, quick=True))
+        few = partial(in_memory.run_loop, effects=["giesekus_mobility", "stress_gain"])
+        patch.setattr(in_memory, "run_loop", few)
+        left: dict = {"folder": folder}
+        exec(compile(script(), "docs/python.md", "exec"), left)
+        yield left
+
+
+def test_the_page_has_the_script_word_for_word():
+    lines = script().splitlines()
+    assert lines[0].startswith("import discover as dc ")
+    for call in ("dc.load_dataset", "data.split(", "Fluid.from_sweep", "dc.TensorSINDy(base=base)",
+                 "dc.TBNNUDE(base=base)", "dc.compare([sindy, network], test)",
+                 "dc.close_loop(train, base, held_out=test)", ".to_html(", ".save(", "dc.load(",
+                 ".score(test)", ".equation_.latex()", ".to_dataframe()", "dc.laws()",
+                 "dc.effects()"):  # fmt: skip
+        assert call in script(), call
+
+
+def test_the_script_finds_what_scipy_planted(after):
+    (term,) = after["sindy"].terms_
+    assert (term.term, term.coefficient) == ("sigma.sigma", pytest.approx(MOBILITY, abs=0.03))
+    loop = after["loop"]
+    assert [stage.effect for stage in loop.stages] == ["giesekus_mobility"]
+    table = loop.to_dataframe()
+    assert table.loc[0, "value"] == pytest.approx(MOBILITY, abs=0.03)
+    assert loop.error_after.held_out < 0.02 < loop.error_before.held_out
+    assert "giesekus_mobility" in repr(loop)
+
+
+def test_the_comparison_judges_on_what_no_fit_saw(after):
+    comparison = after["comparison"]
+    assert list(comparison.outcomes) == ["tensor_sindy", "tbnn_ude"]
+    assert [flow.name for flow in comparison.judged] == ["fast.csv"]
+    errors = comparison.errors_table().loc[("fast.csv", "sigma12")]
+    assert errors["tensor_sindy"] < 0.02 < errors["before"]
+    assert errors["tensor_sindy"] == pytest.approx(1.0 - after["sindy"].score(after["test"]), 0.01)
+    assert comparison.verdict == "explained"
+    assert set(comparison.to_dataframe()) >= {"flow", "quantity", "before", "tbnn_ude"}
+    assert len(repr(comparison)) < 200
+
+
+def test_pages_are_whole_and_say_that_no_command_made_them(after):
+    for name, call in (("comparison", "discover.compare(...)"), ("loop", "discover.close_loop(")):
+        page = (after["folder"] / f"{name}.html").read_text("utf-8")
+        assert page.lstrip().lower().startswith("<!doctype html>")
+        assert "</html>" in page
+        assert call in page
+        assert "<svg" in page
+    left = sorted(path.name for path in after["folder"].iterdir())
+    assert left == ["FOLDER", "comparison.html", "law.discover", "loop.html"]
+
+
+def test_an_estimator_from_a_file_is_compared_with_its_runs_at_hand(after):
+    saved = dc.load(after["folder"] / "law.discover")
+    with pytest.raises(dc.InputError, match="train=train"):
+        dc.compare([saved], after["test"])
+    with pytest.raises(dc.InputError, match="does not hold the samples"):
+        dc.compare([saved], after["test"], train=after["test"])
+    again = dc.compare([saved], after["test"], train=after["train"])
+    first, second = (
+        c.errors_table().loc[("fast.csv", "sigma12"), "tensor_sindy"]
+        for c in (after["comparison"], again)
+    )
+    assert second == pytest.approx(first, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda s: dc.compare([s["sindy"]], s["train"]), "both fitted and held out"),
+        (lambda s: dc.compare([s["sindy"], s["sindy"]], s["test"]), "one TensorSINDy at most"),
+        (lambda s: dc.compare([TBNNUDE()], s["test"]), "is not fitted"),
+        (lambda s: dc.compare([], s["test"]), "got none"),
+        (lambda s: dc.compare(["law.discover"], s["test"]), "got a str"),
+        (lambda s: dc.compare([s["sindy"]], s["base"]), "Give the data set that judges"),
+        (lambda s: dc.compare([s["sindy"]], s["test"], quick=True), "fitted already"),
+        (lambda s: dc.compare(s["data"], s["base"], gremlins=1), "unknown key"),
+        (lambda s: dc.compare(s["data"], "ucm"), "must be a Fluid"),
+        (lambda s: dc.close_loop(s["train"], s["base"], held_out=s["train"]), "proves nothing"),
+        (lambda s: dc.close_loop(s["train"], s["base"], held_out="fast.csv"), "for this run"),
+        (lambda s: dc.close_loop(s["train"], s["base"], gremlins=1), "no option 'gremlins'"),
+        (lambda s: dc.close_loop(s["train"], s["base"], free=["alpha"]), "cannot be fitted"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(after, call, message):
+    with pytest.raises(dc.InputError, match=message):
+        call(after)

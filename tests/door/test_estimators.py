@@ -1,0 +1,252 @@
+"""Fitted estimators survive every way out of a process, and take a fluid as their base."""
+
+import copy
+import io
+import json
+import pickle
+import subprocess
+import sys
+import zipfile
+
+import jax
+import numpy as np
+import pytest
+from independent_folder import MOBILITY, write_folder
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import cross_validate
+
+import discover as dc
+from discover.laws import TensorBasisNetwork
+from discover.learners.provenance import provenance_of
+from discover.learners.result import LearnerResult, RecoveredTerm
+from tensor_library import parse_term
+from tensor_library.library import TermLibrary
+
+LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return dc.load_dataset(write_folder(tmp_path_factory.mktemp("door") / "melt"))
+
+
+@pytest.fixture(scope="module")
+def base(data):
+    return dc.Fluid.from_sweep(data.linear_sweep)
+
+
+@pytest.fixture(scope="module")
+def sindy(data, base):
+    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, base=base)
+    return made.fit(data.split(["fast.csv"])[0])
+
+
+@pytest.fixture(scope="module")
+def network(data, base):
+    """As if trained: two members with random weights, one with a law beneath it."""
+    train = data.split(["fast.csv"])[0]
+    laws = [
+        jax.tree.map(lambda leaf: 0.1 * leaf if eqx_array(leaf) else leaf,
+                     TensorBasisNetwork.initialise(jax.random.key(seed), 6))
+        for seed in (0, 1)
+    ]  # fmt: skip
+    made = dc.TBNNUDE(base=base, n_members=2, recipe="paper")
+    made.n_features_in_, made.members_, made.ensemble_ = 1, laws, "made by a test"
+    made.law_, made.fitting_ = laws[0], laws
+    made.fluid_, *_ = made.ensemble_fluids_ = [
+        dc.Fluid(law, base.modulus, base.relaxation_time) for law in laws
+    ]
+    made.terms_ = (RecoveredTerm("sigma.sigma", 0.3, ci95=(0.2, 0.4)),)
+    made.runs_, made.provenance_ = train.runs, provenance_of(train, train.runs)
+    history = (np.arange(1, 3), np.array([1.0, np.nan]))
+    details = {"recipe": "PaperRecipe", "misfit": np.float64(0.1), "members": [{"misfit": 1.0}]}
+    made.result_ = LearnerResult("tbnn_ude", laws[0], made.terms_, 1.0, history, details, "done")
+    return made
+
+
+def eqx_array(leaf):
+    return isinstance(leaf, jax.Array)
+
+
+def test_a_base_is_modulus_time_and_law_at_once(data, base, sindy):
+    (term,) = sindy.terms_
+    assert term.term == "sigma.sigma"
+    assert term.coefficient == pytest.approx(MOBILITY, abs=0.03)  # planted by scipy
+    parts = dc.TensorSINDy(
+        library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, modulus=np.asarray(base.modulus),
+        relaxation_time=np.asarray(base.relaxation_time),
+    ).fit(data.split(["fast.csv"])[0])  # fmt: skip
+    assert parts.terms_[0].coefficient == term.coefficient
+
+
+@pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
+def test_a_base_and_its_parts_are_not_both_given(data, base, learner):
+    for name, value in (("modulus", 2.0), ("relaxation_time", [1.0, 2.0]),
+                        ("known_relaxation", False)):  # fmt: skip
+        with pytest.raises(dc.InputError, match=f"base holds {name} already"):
+            learner(base=base, **{name: value}).fit(data)
+    with pytest.raises(dc.InputError, match=r"must be a Fluid.*Fluid\(law"):
+        learner().set_params(base=dc.make_law("ucm")).fit(data)
+
+
+def test_the_network_refuses_a_solvent_with_a_way_on(data, base):
+    wet = dc.Fluid(base.law, base.modulus, base.relaxation_time, 0.5)
+    with pytest.raises(dc.InputError, match="no solvent viscosity yet"):
+        dc.TBNNUDE(base=wet).fit(data)
+
+
+@pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
+def test_a_bare_run_is_refused_with_what_to_write(data, learner):
+    with pytest.raises(dc.InputError, match=r"fit\(\[run\]\)"):
+        learner().fit(data[0])
+    for wrong in (None, "melt", 3.0):
+        with pytest.raises(dc.InputError, match="sequence of ShearRun"):
+            learner().fit(wrong)
+
+
+def test_an_equation_has_the_modes_and_comes_after_the_fit(sindy, base):
+    equation = sindy.equation_
+    assert equation.modulus == tuple(map(float, base.modulus))
+    assert r"\sigma" in equation.latex()
+    with pytest.raises(NotFittedError):
+        dc.TensorSINDy().equation_  # noqa: B018
+    with pytest.raises(NotFittedError):
+        dc.TensorSINDy().save("nowhere")
+
+
+def test_the_score_is_one_less_the_relative_error(sindy, data):
+    run = data["fast.csv"]
+    missed = sindy.predict([run]) - run.shear_stress
+    error = np.linalg.norm(missed) / np.linalg.norm(run.shear_stress)
+    assert sindy.score([run]) == pytest.approx(1.0 - error)
+    assert 0.98 < sindy.score([run]) < 1.0  # noise of half a per cent
+
+
+@pytest.mark.parametrize("which", ["sindy", "network"])
+def test_an_estimator_is_the_same_after_every_way(which, request, data, tmp_path):
+    fitted = request.getfixturevalue(which)
+    expected = fitted.predict(data)
+    saved = dc.load(fitted.save(tmp_path / "law.discover"))
+    for way in (pickle.loads(pickle.dumps(fitted)), copy.deepcopy(fitted), saved):
+        np.testing.assert_allclose(way.predict(data), expected, rtol=1e-12, atol=0)
+        assert way.terms_ == fitted.terms_
+        assert way.provenance_ == fitted.provenance_
+        assert way.equation_ == fitted.equation_
+        assert set(way.result_.details) == set(fitted.result_.details)
+        assert way.score(data) == pytest.approx(fitted.score(data), rel=1e-12)
+    assert not hasattr(saved, "runs_")  # a file holds no data
+    fresh = clone(saved)
+    assert not hasattr(fresh, "fluid_")
+    assert repr(fresh.get_params()) == repr(fitted.get_params())
+    assert len(repr(fitted)) < 1000
+
+
+def test_a_file_holds_no_pickle(sindy, network, tmp_path):
+    for fitted in (sindy, network):
+        with zipfile.ZipFile(fitted.save(tmp_path / "law.discover")) as file:
+            for name in file.namelist():
+                if name.endswith(".npy"):
+                    np.load(io.BytesIO(file.read(name)), allow_pickle=False)
+            header = json.loads(file.read("estimator.json"))
+    assert header["version"] == 1
+    assert header["fitted"]["provenance_"]["fields"]["data"] == "melt"
+
+
+def damaged(path, change):
+    with zipfile.ZipFile(path) as file:
+        parts = {name: file.read(name) for name in file.namelist()}
+    change(parts)
+    with zipfile.ZipFile(path, "w") as file:
+        for name, content in parts.items():
+            file.writestr(name, content)
+
+
+def header_with(**changes):
+    def change(parts):
+        content = json.loads(parts["estimator.json"]) | changes
+        parts["estimator.json"] = json.dumps(content).encode()
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda parts: parts.pop("estimator.json"), "no whole estimator"),
+        (lambda parts: parts.update({"estimator.json": b"{"}), "is damaged"),
+        (lambda parts: parts.update({"estimator.json": b"[1]"}), "no whole estimator"),
+        (lambda parts: parts.pop("array0.npy"), "is damaged"),
+        (lambda parts: parts.update({"array0.npy": b"nonsense"}), "is damaged"),
+        (header_with(version=2), "reads the form 1"),
+        (header_with(format="other"), "no whole estimator"),
+        (header_with(learner="magic"), "of the kind 'magic'"),
+        (header_with(fitted={}), "is damaged"),
+        (header_with(parameters={"gremlins": 1}), "is damaged"),
+        (header_with(parameters={"base": {"kind": "os.system", "fields": {}}}), "is damaged"),
+    ],
+)
+def test_a_file_that_is_no_estimator_is_refused_with_a_reason(sindy, tmp_path, change, message):
+    path = sindy.save(tmp_path / "law.discover")
+    damaged(path, change)
+    with pytest.raises(dc.InputError, match=message):
+        dc.load(path)
+
+
+def test_files_of_other_kinds_are_refused(sindy, tmp_path):
+    with pytest.raises(dc.InputError, match="No such file"):
+        dc.load(tmp_path / "gone.discover")
+    with pytest.raises(dc.InputError, match="cannot be read"):
+        dc.load(tmp_path)
+    whole = sindy.save(tmp_path / "law.discover").read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    for content in (b"", b"time_s\n", pickle.dumps({}), whole[: len(whole) // 2], bytes(flipped)):
+        (tmp_path / "other").write_bytes(content)
+        with pytest.raises(dc.InputError, match=r"no whole estimator|is damaged"):
+            dc.load(tmp_path / "other")
+
+
+def test_what_a_file_cannot_hold_is_said_and_the_old_file_stays(sindy, tmp_path):
+    path = sindy.save(tmp_path / "law.discover")
+    before = path.read_bytes()
+    other = copy.copy(sindy).set_params(optimizer=object())
+    with pytest.raises(dc.InputError, match="'optimizer' is a object"):
+        other.save(path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["law.discover"]
+
+
+FRESH = """
+import pickle, sys
+fitted = pickle.load(open(sys.argv[1], "rb"))  # names nothing of discover
+import jax
+last = float(fitted.predict(fitted.runs_)[-1])
+print(jax.config.jax_enable_x64, fitted.fluid_.modulus.dtype, repr(last))
+"""
+
+
+def test_a_process_that_only_unpickles_computes_in_double_precision(sindy, tmp_path, monkeypatch):
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir))
+    (tmp_path / "fitted.pickle").write_bytes(pickle.dumps(sindy))
+    told = subprocess.run(
+        [sys.executable, "-c", FRESH, str(tmp_path / "fitted.pickle")],
+        capture_output=True, text=True, timeout=300, check=True,
+    ).stdout.split()  # fmt: skip
+    assert told[:2] == ["True", "float64"]
+    # single precision would be off by 1e-7
+    assert float(told[2]) == pytest.approx(sindy.predict(sindy.runs_)[-1], rel=1e-12)
+
+
+def test_cross_validation_in_two_processes_equals_that_in_one(data, base, monkeypatch):
+    # workers find the programs that this process has compiled
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir))
+    folds = [([0, 1], [2]), ([1, 2], [0])]
+    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, base=base)
+    serial, parallel = (
+        cross_validate(made, data, cv=folds, n_jobs=jobs, return_estimator=True) for jobs in (1, 2)
+    )
+    np.testing.assert_allclose(parallel["test_score"], serial["test_score"], rtol=1e-12)
+    for one, other in zip(serial["estimator"], parallel["estimator"], strict=True):
+        assert other.fluid_.modulus.dtype == np.float64
+        np.testing.assert_allclose(other.coefficients_, one.coefficients_, rtol=1e-12)

@@ -1,0 +1,103 @@
+"""``import discover`` is light, and everything it names is there."""
+
+import ast
+import importlib
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import discover as dc
+
+HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "equinox")
+
+
+def python(code, *arguments):
+    """What a fresh process prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_importing_loads_nothing_heavy():
+    code = f"import discover, sys; print([m for m in {HEAVY} if m in sys.modules])"
+    assert python(code).strip() == "[]"
+    # negative control: a name that is used loads what it needs
+    code = f"import discover, sys; discover.Fluid; print([m for m in {HEAVY} if m in sys.modules])"
+    assert "jax" in python(code)
+
+
+def test_importing_takes_less_time_than_importing_numpy():
+    code = (
+        "import time; a = time.perf_counter(); import discover; b = time.perf_counter(); "
+        "import numpy; print(b - a, time.perf_counter() - b)"
+    )
+    ours, theirs = map(float, min(python(code) for _ in range(3)).split())
+    assert ours < max(theirs, 0.3)
+
+
+def test_everything_named_is_there_and_listed():
+    for name in dc.__all__:
+        assert getattr(dc, name) is not None, name
+        assert name in dir(dc)
+    assert dc.load_dataset.__module__ == "discover.dataset.load"
+    with pytest.raises(AttributeError, match="no attribute 'gremlins'"):
+        dc.gremlins  # noqa: B018
+    assert not hasattr(dc, "gremlins")
+
+
+def test_type_checkers_see_what_runs():
+    tree = ast.parse(inspect.getsource(dc))
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    seen = {
+        alias.asname: (node.module, alias.name)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert sorted(seen) == sorted(dc.__all__)
+    for name, (module, inner) in seen.items():
+        there = getattr(importlib.import_module(module), inner)
+        # the packages that answer calls are their own functions
+        assert getattr(dc, name) is there or getattr(dc, name)().equals(there()), name
+
+
+SINGLE = """
+import jax, jax.numpy as jnp
+first = jnp.ones(3)
+import discover as dc
+try:
+    dc.Fluid
+except dc.InputError as error:
+    print("refused:", error)
+jax.config.update("jax_enable_x64", True)
+print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype)
+with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.disable_x64():
+    try:
+        dc.TensorSINDy().fit([])
+    except dc.InputError as error:
+        print("refused:", error)
+"""
+
+
+def test_arrays_of_single_precision_made_before_are_an_error_with_a_way_on():
+    first, dtype, second = python(SINGLE).strip().splitlines()
+    assert "1 array of single precision" in first
+    assert "jax.config.update('jax_enable_x64', True)" in first
+    assert dtype == "float64"
+    assert "single precision here" in second
+
+
+def test_the_user_may_start_jax_before_and_choose_another_cache(tmp_path):
+    # negative control of the error: JAX that ran without leaving an array in single precision
+    code = """
+import sys, jax, jax.numpy as jnp
+jnp.ones(3).sum().block_until_ready(); jnp.arange(3)
+jax.config.update("jax_compilation_cache_dir", sys.argv[1])
+import discover as dc
+print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
+"""
+    assert python(code, str(tmp_path)).split() == ["float64", str(tmp_path)]

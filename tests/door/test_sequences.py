@@ -1,0 +1,101 @@
+"""A data set is a sequence of runs, for Python and for scikit-learn."""
+
+import numpy as np
+import pytest
+from independent_folder import MODULUS, RATES, TIME, write_folder
+from sklearn.model_selection import KFold
+from sklearn.utils import indexable
+
+import discover as dc
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return dc.load_dataset(write_folder(tmp_path_factory.mktemp("door") / "melt"))
+
+
+def test_a_run_is_chosen_by_number_or_name_and_several_are_a_data_set(data):
+    assert len(data) == 3
+    assert data[0] is data["slow.csv"] is data[np.int64(-3)]
+    assert [run.name for run in data] == list(RATES)
+    for chosen in (data[1:], data[[1, 2]], data[np.array([1, 2])], data[["medium.csv", "fast.csv"]],
+                   data[np.array([False, True, True])]):  # fmt: skip
+        assert isinstance(chosen, dc.ShearDataset)
+        assert chosen.names == ("medium.csv", "fast.csv")
+        assert chosen.linear_sweep is data.linear_sweep
+    assert len(data[[]]) == 0
+
+
+def test_what_chooses_no_run_is_an_error(data):
+    with pytest.raises(IndexError, match="3 runs; there is no number 3"):
+        data[3]
+    with pytest.raises(dc.InputError, match=r"no run 'gone\.csv'"):
+        data["gone.csv"]
+    for wrong in (1.5, [True, False], [[0]], None):
+        with pytest.raises(dc.InputError, match="by its name or number"):
+            data[wrong]
+
+
+def test_scikit_learn_divides_a_data_set(data):
+    (same,) = indexable(data)
+    assert same is data
+    folds = [data[test].names for _, test in KFold(3).split(data)]
+    assert folds == [(name,) for name in RATES]
+
+
+def test_a_split_divides_by_name_and_keeps_the_sweep(data):
+    train, test = data.split(held_out=["fast.csv"])
+    assert train.names == ("slow.csv", "medium.csv")
+    assert test.names == ("fast.csv",)
+    assert test.linear_sweep is data.linear_sweep
+    assert data.split(["fast.csv"], fit=["slow.csv"])[0].names == ("slow.csv",)
+
+
+@pytest.mark.parametrize(
+    ("held_out", "fit", "message"),
+    [
+        ("fast.csv", None, r"Write \['fast.csv'\]"),
+        (["gone.csv"], None, "no run 'gone.csv'"),
+        (list(RATES), None, "No run is left to fit"),
+        ([], None, "No run is left to hold out"),
+        (["fast.csv"], ["fast.csv"], "both in fit and in held_out"),
+    ],
+)
+def test_a_split_that_divides_nothing_is_an_error(data, held_out, fit, message):
+    with pytest.raises(dc.InputError, match=message):
+        data.split(held_out, fit)
+
+
+def test_representations_are_short_and_tables_long(data):
+    for thing in (data, data[0], data.linear_sweep):
+        assert len(repr(thing)) < 120
+        assert "\n" not in repr(thing)
+    table = data.to_dataframe()
+    assert list(table.columns) == ["run", "time_s", "shear_rate_1_s", "stress_Pa"]
+    assert len(table) == 120
+    np.testing.assert_array_equal(
+        table[table["run"] == "fast.csv"]["stress_Pa"], data["fast.csv"].shear_stress
+    )
+    assert list(data.linear_sweep.to_dataframe()) == ["omega_rad_s", "Gp_Pa", "Gpp_Pa"]
+
+
+def test_modes_come_from_the_sweep(data):
+    fluid = dc.Fluid.from_sweep(data.linear_sweep)
+    assert fluid.n_modes == 1
+    np.testing.assert_allclose(fluid.modulus, [MODULUS], rtol=1e-6)
+    np.testing.assert_allclose(fluid.relaxation_time, [TIME], rtol=1e-6)
+    law = dc.make_law("giesekus", {"alpha": 0.3})
+    assert dc.Fluid.from_sweep(data.linear_sweep, law, most_modes=2).law is law
+    with pytest.raises(dc.InputError, match=r"no lve\.csv"):
+        dc.Fluid.from_sweep(None)
+
+
+def test_synthetic_data_know_their_linear_response():
+    data = dc.synthetic_dataset("fene_p", {"L2": 10.0}, n_samples=11)
+    assert data.linear_sweep is not None
+    omega = data.linear_sweep.angular_frequency
+    # FENE-P at rest: A = I + ε, f = 1 + tr ε/L² + ..., traceless in shear: a Maxwell mode
+    np.testing.assert_allclose(
+        data.linear_sweep.storage_modulus, omega**2 / (1 + omega**2), rtol=1e-10
+    )
+    np.testing.assert_allclose(data.linear_sweep.loss_modulus, omega / (1 + omega**2), rtol=1e-10)
