@@ -129,16 +129,22 @@ def _word(text: str) -> Unit | None:
     word = _SPELLINGS.get(text, text)
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 3 else (word,):
-        try:
-            unit = _registry().Unit(name)
-            size = _registry().Quantity(1.0, unit).to_base_units()
-        except Exception:  # pint raises errors of many kinds for what is no unit
+        parsed = _registry().parse_unit_name(name)
+        if not parsed or _is_short_plural(name):
             continue
+        unit = _registry().Unit(parsed[0][0] + parsed[0][1])
+        size = _registry().Quantity(1.0, unit).to_base_units()
         found = dict(size.dimensionality)
         if set(found) <= set(_DIMENSIONS) and (found or str(unit).endswith(_NUMBERS)):
             kg, m, s = (int(found.get(key, 0)) for key in _DIMENSIONS)
             return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
     return None
+
+
+def _is_short_plural(name: str) -> bool:
+    """Return whether a name is a symbol with an s, as Pas, which is no plural of Pa."""
+    parse, symbol = _registry().parse_unit_name, name.removesuffix("s")
+    return len(name) <= 4 and symbol != name and parse(name) == parse(symbol)
 
 
 @cache
