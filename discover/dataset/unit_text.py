@@ -144,7 +144,7 @@ def _word(text: str) -> Unit | None:
 def _is_short_plural(name: str) -> bool:
     """Return whether a name is a symbol with an s, as Pas, which is no plural of Pa."""
     parse, symbol = _registry().parse_unit_name, name.removesuffix("s")
-    return len(name) <= 4 and symbol != name and parse(name) == parse(symbol)
+    return len(name) <= 4 and symbol != name and parse(name)[:1] == parse(symbol)[:1]
 
 
 @cache
