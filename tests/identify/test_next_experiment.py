@@ -130,12 +130,22 @@ def test_a_band_holds_the_law_and_widens_with_its_uncertainty_and_its_rivals():
     assert narrow.runaways == 0.0
 
 
-def test_draws_that_run_away_are_counted_and_left_out():
+def test_where_many_draws_run_away_there_is_no_band_and_it_is_said():
     times = [np.linspace(0.0, 1.0, 5)]
     predicted = np.ones((3, 1, 5, 3))
     predicted[2] = np.nan
     band = bands_of_predictions(predicted, [3], times)[0]
     assert band.runaways == pytest.approx(1 / 3)
+    assert not np.any(np.isfinite(band.low))
+    assert "run away" in band.reason
+
+
+def test_one_draw_of_fifty_that_runs_away_is_counted_and_left_out():
+    times = [np.linspace(0.0, 1.0, 5)]
+    predicted = np.ones((50, 1, 5, 3))
+    predicted[49] = np.nan
+    band = bands_of_predictions(predicted, [50], times)[0]
+    assert band.runaways == pytest.approx(1 / 50)
     assert np.all(np.isfinite(band.low))
 
 
