@@ -136,7 +136,7 @@ def _word(text: str) -> Unit | None:
         size = _registry().Quantity(1.0, unit).to_base_units()
         found = dict(size.dimensionality)
         if set(found) <= set(_DIMENSIONS) and (found or str(unit).endswith(_NUMBERS)):
-            kg, m, s = (int(found.get(key, 0)) for key in _DIMENSIONS)
+            kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
             return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
     return None
 

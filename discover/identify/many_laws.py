@@ -90,6 +90,7 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
     names, inner = list(contender.terms), list(contender.inner)
     centre = np.array([*contender.terms.values(), *contender.inner.values()])
     if contender.drawn is None:
+        assert contender.covariance is not None  # one of the two is there
         drawn = rng.multivariate_normal(centre, contender.covariance, size=n_draws, method="eigh")
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]

@@ -127,9 +127,9 @@ def choose_member(
     fits = misfits <= max(FITS * least, resolved)
     if not np.isfinite(least) or not members[0].varies:
         return 0, np.where(np.arange(len(members)) == 0, True, fits)
-    near = np.flatnonzero(misfits <= SIMILAR * least)
+    near = [int(i) for i in np.flatnonzero(misfits <= SIMILAR * least)]
     chosen = min(near, key=lambda i: (len(members[i].tensors), misfits[i]))
-    return int(chosen), fits
+    return chosen, fits
 
 
 def member_misfits(

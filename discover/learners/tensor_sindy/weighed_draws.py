@@ -192,7 +192,9 @@ def _log_mixture(
 ) -> Float[np.ndarray, " draws"]:
     """Return the logarithm of the density that made all draws, up to a constant."""
     squares = np.sum(unit**2, axis=1)[:, None]
-    return logsumexp(-0.5 * squares / widths**2 - unit.shape[1] * np.log(widths), axis=1)
+    return np.asarray(
+        logsumexp(-0.5 * squares / widths**2 - unit.shape[1] * np.log(widths), axis=1)
+    )
 
 
 def _resampled(
