@@ -1,7 +1,9 @@
 """Samples of a record that stand alone: a knock, a spark, a lost bit."""
 
+from collections.abc import Callable
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import median_filter
 
 _WIDEST = 2  # samples side by side that may be off together
@@ -34,20 +36,12 @@ def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     record
         Measured values of one run, in order.
     """
-    left = np.arange(len(record))
-    for _ in range(_PASSES):
-        values = np.asarray(record, dtype=float)[left]
-        if len(values) < 2 * _BESIDE + _WIDEST:
-            break
-        found = np.zeros(len(values), dtype=bool)
-        for width in range(1, _WIDEST + 1):
-            found |= _apart(values, width)
-        if not np.any(found):
-            break
-        left = left[~found]
-    off = np.ones(len(record), dtype=bool)
-    off[left] = False
-    return off
+    values = np.asarray(record, dtype=float)
+
+    def apart(left):
+        return np.any([_apart(values[left], width) for width in range(1, _WIDEST + 1)], axis=0)
+
+    return _set_aside(np.arange(len(values)), len(values), apart)
 
 
 def stray(
@@ -64,15 +58,26 @@ def stray(
     residual, record
         Prediction minus measurement, and the measurement, of one run, in order.
     """
+    missed, values = np.asarray(residual, dtype=float), np.asarray(record, dtype=float)
     left = np.flatnonzero(~isolated(record))
+    return _set_aside(left, len(values), lambda left: _missed_alone(missed[left], values[left]))
+
+
+def _set_aside(
+    left: Int[np.ndarray, " m"], n: int, find: Callable[[np.ndarray], np.ndarray]
+) -> Bool[np.ndarray, " _"]:
+    """Return which of n samples are not left once what `find` finds among them is taken out.
+
+    Asked again of what is then left, for one outlier may hide another.
+    """
     for _ in range(_PASSES):
         if len(left) < 2 * _BESIDE + _WIDEST:
             break
-        found = _missed_alone(np.asarray(residual, float)[left], np.asarray(record, float)[left])
+        found = find(left)
         if not np.any(found):
             break
         left = left[~found]
-    off = np.ones(len(record), dtype=bool)
+    off = np.ones(n, dtype=bool)
     off[left] = False
     return off
 
