@@ -323,7 +323,7 @@ def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
         "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
         "reason": rival.reason,
         "errors": rival.errors_to_chosen,
-        "separated": f"{SYMBOLS[place['quantity']]} in "
+        "separated": f"{SYMBOLS.get(place['quantity'], place['quantity'])} in "
         f"{titles.get(place['protocol'], place['protocol'])}"
         if place
         else "nothing that was tried",

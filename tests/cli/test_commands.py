@@ -166,7 +166,7 @@ BAD_STUDIES = {
     "nan_noise": (STUDY.replace("0.01", "nan"), "noise"),
     "no_folder": ('[data]\nfolder = "nowhere"\n', "'nowhere'"),
     "unknown_run": (STUDY.replace("[compare]", 'held_out = ["x"]\n[compare]'), "'x'"),
-    "no_sweep_data": (STUDY + '\n[model]\nmodes = "lve"\n', "lve.csv"),
+    "no_sweep_data": ('[data]\nfolder = "swept"\n[model]\nmodes = "lve"\n', "lve.csv"),
     "known_relaxation": (
         STUDY + '\n[model]\nlaw = "giesekus"\nparameters = {alpha = 0.1}\nknown_relaxation = false',
         "known_relaxation",
@@ -178,6 +178,7 @@ BAD_STUDIES = {
 @pytest.mark.parametrize("case", BAD_STUDIES)
 def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, case):
     text, word = BAD_STUDIES[case]
+    data_folder(tmp_path / "swept")  # a folder of runs without a sweep; one study names it
     (tmp_path / "bad.toml").write_text(text)
     result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
