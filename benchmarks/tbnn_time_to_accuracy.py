@@ -157,6 +157,7 @@ def main() -> None:
     from discover.learners.tbnn_ude import TBNNUDE
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.precision import enable_x64
+    from discover.programs import forget_programs
     from discover.simulate import synthetic_dataset
 
     enable_x64()
@@ -180,6 +181,7 @@ def main() -> None:
             return model.fit(data.runs).law_
 
         print(case, flush=True)
+        forget_programs()
         jax.clear_caches()  # or a case would find the programs of the one before
         clocked("default, compiling included", lambda: fitted("default"))
         clocked("default", lambda: fitted("default"))

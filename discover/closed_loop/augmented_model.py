@@ -33,6 +33,7 @@ from discover.effects import (
     StateEffect,
 )
 from discover.laws import LAWS, AbstractConstitutiveLaw
+from discover.programs import compiled
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -85,7 +86,7 @@ class _Program:
         self._series = [e for e in kinematic if isinstance(e, SeriesElement)]
         self._signal = [e for e in effects if isinstance(e, SignalEffect)]
         over_runs = jax.vmap(self._predict_run, in_axes=(None, None, None, 0))
-        self.predict = eqx.filter_jit(over_runs)
+        self.predict = compiled(over_runs, made_from=structure)
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 

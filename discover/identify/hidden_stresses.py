@@ -9,7 +9,6 @@ about such a combination: σ12 cannot object.
 from dataclasses import dataclass
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from jaxtyping import Float
 
 from discover.identify.histories import Histories, random_histories
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.programs import compiled
 
 _ZERO = 1e-10
 """Relative singular value that counts as zero; exact ones come out at rounding error."""
@@ -111,7 +111,7 @@ def _readable(rows: np.ndarray) -> np.ndarray:
     return np.array(basis).reshape(-1, 3)
 
 
-@eqx.filter_jit
+@compiled
 def _arrivals(law, protocols, times):
     """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0), (runs, steps, 3), by classical Runge–Kutta steps."""
 

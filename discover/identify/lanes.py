@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +12,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.grid import IntegrationGrid
 from tensor_library.kinematics import planar_extension, uniaxial_extension
@@ -112,7 +112,7 @@ def _law(library, base, coefficients, inner) -> LibraryExpansion:
     return LibraryExpansion(coefficients, inner, library, base.linear_relaxation, base)
 
 
-@eqx.filter_jit
+@compiled
 def _shear(library, base, coefficients, inner, protocols, grids):
     # Classical Runge–Kutta steps: to compare laws of one relaxation time needs no more, and a plain
     # scan compiles in a fraction of the time of a solver made for spectra.
@@ -173,7 +173,7 @@ def extensional_stresses(
     return np.concatenate(parts)
 
 
-@eqx.filter_jit
+@compiled
 def _extend(library, base, coefficients, inner, rates, step, n_times):
     def one(c, i, gradient: Float[Array, "3 3"]):
         law = _law(library, base, c, i)

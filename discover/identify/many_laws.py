@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from discover.identify.lanes import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
+from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_on_grid
@@ -128,7 +129,7 @@ def predict_laws(
     return np.asarray(_predict(fluids, stack_protocols(protocols), grids))
 
 
-@eqx.filter_jit
+@compiled
 def _predict(
     fluids: Fluid, protocols: ShearProtocol, grids: IntegrationGrid
 ) -> Float[Array, "laws flows n 3"]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,6 +24,7 @@ from discover.identify.steady_states import (
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
+from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.grid import IntegrationGrid
 
@@ -296,7 +296,7 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     return rates.size if good.all() else int(np.argmin(good))
 
 
-@eqx.filter_jit
+@compiled
 def _linearised_at_rest(law: AbstractConstitutiveLaw):
     """Return dσ/dt at rest, and its derivatives with respect to stress and to shear rate."""
     rest, still = jnp.zeros(4), jnp.asarray(0.0)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.laws.multimode import Fluid
+from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol, oscillatory_shear, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_batch, solve_states_on_grid
@@ -66,7 +66,7 @@ def trajectories(fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid)
     )
 
 
-@eqx.filter_jit
+@compiled
 def _along(fluid, protocols, grids):
     def one(protocol, grid):
         states = solve_states_on_grid(fluid, protocol, grid)

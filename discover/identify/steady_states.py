@@ -1,12 +1,12 @@
 """Steady states of a law, followed from rest as the rate of deformation grows."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.programs import compiled
 from tensor_library.algebra import to_shear
 from tensor_library.kinematics import uniaxial_extension
 
@@ -14,7 +14,7 @@ _NEWTON_STEPS = 25
 _CONVERGED = 1e-9
 
 
-@eqx.filter_jit
+@compiled
 def steady_shear(
     law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
 ) -> tuple[Float[Array, "n 4"], Float[Array, "n 4 4"], Float[Array, " n"]]:
@@ -37,7 +37,7 @@ def steady_shear(
     return _follow(law.stress_rate, jnp.zeros(4), rates)
 
 
-@eqx.filter_jit
+@compiled
 def steady_uniaxial_extension(
     law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
 ) -> tuple[Float[Array, "n 2"], Float[Array, "n 2 2"], Float[Array, " n"]]:

@@ -17,6 +17,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
+from discover.programs import compiled
 from discover.protocols.paper import (
     TEST_DURATION,
     TRAINING_DURATION,
@@ -210,7 +211,7 @@ class _Lesson(eqx.Module):
         return difference, jnp.sqrt(kappa) * jnp.sqrt(jnp.abs(parameters))
 
 
-@eqx.filter_jit
+@compiled
 def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
     solution = optx.least_squares(
         lambda f, args: args[0].residual(f, args[1]),

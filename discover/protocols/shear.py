@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from scipy.interpolate import PchipInterpolator
 
 from discover.errors import InputError
+from discover.programs import compiled
 
 
 class ShearProtocol(eqx.Module):
@@ -233,6 +234,6 @@ def _at_many(function, protocol, times):
     return np.asarray(_mapped(function, padded, times))[:n]
 
 
-@eqx.filter_jit
+@compiled
 def _mapped(function, protocol: ShearProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
     return jax.vmap(lambda time: function(protocol, time))(times)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
+from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.grid import IntegrationGrid
@@ -72,12 +72,12 @@ def _decay(fluid: Fluid) -> Float[Array, "k 1"]:
     return jax.lax.stop_gradient(fluid.decay_rate())[:, None]
 
 
-@eqx.filter_jit
+@compiled
 def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
     controller = diffrax.ClipStepSizeController(
         diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times, jump_ts=jumps
     )
-    return diffrax.diffeqsolve(
+    solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
         solver,
         0.0,
@@ -90,6 +90,7 @@ def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
         max_steps=MAX_STEPS,
         throw=False,
     )
+    return solution.ys, solution.result == diffrax.RESULTS.successful
 
 
 def simulate(
@@ -131,7 +132,7 @@ def simulate(
     solver = ExponentialRungeKutta4(_decay(fluid)) if stiff else diffrax.Tsit5()
     knots = np.asarray(protocol.table_times)
     jumps = np.unique(knots[1:][np.diff(knots) <= 0.0])
-    solution = _solve_adaptively(
+    components, successful = _solve_adaptively(
         fluid,
         protocol,
         jnp.asarray(_padded(times)),
@@ -140,8 +141,8 @@ def simulate(
         rtol,
         atol,
     )
-    components = np.asarray(solution.ys)[: times.size]
-    if solution.result != diffrax.RESULTS.successful or not np.all(np.isfinite(components)):
+    components = np.asarray(components)[: times.size]
+    if not successful or not np.all(np.isfinite(components)):
         raise SimulationError(
             f"The law could not be integrated to t = {end:g}: its stress runs away, or it needs "
             f"more than {MAX_STEPS} steps. Check its parameters and the shear rate."
@@ -215,7 +216,7 @@ def _solve_on_grid(fluid, protocol, grid, observe, adjoint):
     return jnp.asarray(solution.ys)[grid.sample_index]
 
 
-@eqx.filter_jit
+@compiled
 def solve_batch(
     fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid
 ) -> Float[Array, "runs n 4"]:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +12,7 @@ from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
+from discover.programs import compiled
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
 from discover.protocols.shear import ShearProtocol, shear_rates
 from discover.simulate.solve import ShearStress, simulate
@@ -134,7 +134,7 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
     return LinearSweep(omega, np.real(modulus), np.imag(modulus))
 
 
-@eqx.filter_jit
+@compiled
 def _at_rest(law):
     """Return the derivatives of the stress rate to stress and shear rate, (4, 4) and (4,)."""
     return jax.jacfwd(law.stress_rate, argnums=(0, 1))(jnp.zeros(4), jnp.zeros(()))

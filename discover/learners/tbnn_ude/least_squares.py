@@ -19,6 +19,7 @@ from discover.learners.tbnn_ude.variational import (
     trajectories,
 )
 from discover.learners.tbnn_ude.weights import Rebuild
+from discover.programs import compiled
 
 # Normal equations halve the digits, which is harmless here: the damping keeps them well
 # conditioned, and they cost a sixth of an orthogonal factorisation.
@@ -107,7 +108,7 @@ def linearise(
     return _with_prior(weights, objective, states, jacobian)
 
 
-@eqx.filter_jit
+@compiled
 def _with_prior(weights, objective, states, jacobian):
     scale = data_scale(objective.problem)
     misses = scale * objective.problem.misses(states)
@@ -162,14 +163,14 @@ class Stopping:
         return not misfit < _FAR_BEHIND * self.pace[min(self.steps, len(self.pace)) - 1]
 
 
-@eqx.filter_jit
+@compiled
 def first_state(linearised: Linearised):
     """Return the solver's state before the first step."""
     rows, aux = eqx.filter_eval_shape(linearised, linearised.weights)
     return _SOLVER.init(linearised, linearised.weights, None, {}, rows, aux, frozenset())
 
 
-@eqx.filter_jit
+@compiled
 def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
     """Return the best weights and the solver's state after one more step.
 
@@ -191,7 +192,7 @@ def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array
     return relative_misses(trajectories(law, problem), problem)
 
 
-@eqx.filter_jit
+@compiled
 def relative_misses(
     states: Float[Array, "runs n k 4"], problem: TrainingProblem
 ) -> Float[Array, "runs n"]:

@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import trajectories
+from discover.programs import compiled
 from tensor_library.algebra import inner
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
@@ -53,7 +54,7 @@ class Cloud(eqx.Module):
         return _coefficients(law, self.stress, self.rate)
 
 
-@eqx.filter_jit
+@compiled
 def _coefficients(law, stress, rate):
     return jax.vmap(law.coefficients)(stress, rate)
 
@@ -63,7 +64,7 @@ def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
     return cloud_of(trajectories(law, problem), problem)
 
 
-@eqx.filter_jit
+@compiled
 def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
     """Return states evenly spread over the samples, from the stresses of every mode there."""
 
@@ -88,7 +89,7 @@ class PriorWeights(eqx.Module):
     variation: Float[Array, "8"]
 
 
-@eqx.filter_jit
+@compiled
 def parts(law: TensorBasisNetwork, cloud: Cloud) -> tuple[Float[Array, "m 8"], Float[Array, "m 8"]]:
     """Return the size of every term, and of its departure from a constant coefficient."""
     coefficients = cloud.coefficients(law)
@@ -106,7 +107,7 @@ def prior_residual(
     return jnp.concatenate([row.ravel() for row in rows])
 
 
-@eqx.filter_jit
+@compiled
 def reweighted(
     law: TensorBasisNetwork,
     cloud: Cloud,

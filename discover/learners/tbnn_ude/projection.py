@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
+from discover.programs import compiled
 from tensor_library.library import TermLibrary
 
 ENOUGH = 1e-3
@@ -123,7 +123,7 @@ def project(
     return Projection(chosen, _solve(matrix[:, support], target), np.array(kept), misfit)
 
 
-@eqx.filter_jit
+@compiled
 def _extra_term(law, stress, rate):
     return jax.vmap(law.extra_term)(stress, rate)
 

@@ -33,6 +33,7 @@ from discover.learners.tbnn_ude.prior import Cloud, cloud_of, parts, reweighted
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
+from discover.programs import compiled
 from tensor_library.invariants import scalar_invariants
 
 Progress = Callable[[int, int, float], None]
@@ -106,7 +107,7 @@ class Trained:
     passed_over: tuple[int, ...] = ()
 
 
-@eqx.filter_jit
+@compiled
 def initial_law(
     key: PRNGKeyArray,
     width: int,
@@ -128,7 +129,7 @@ def initial_law(
     )
 
 
-@eqx.filter_jit
+@compiled
 def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     """Return the root mean square of every invariant, or one where it vanishes."""
     invariants = jax.vmap(scalar_invariants)(cloud.stress, cloud.rate)
@@ -136,7 +137,7 @@ def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     return jnp.where(size > 1e-12, size, 1.0)
 
 
-@eqx.filter_jit
+@compiled
 def constant_scale(cloud: Cloud) -> Float[Array, "8"]:
     """Return the unit of each constant: one over the root mean square of its tensor."""
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))

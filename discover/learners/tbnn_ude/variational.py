@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +17,7 @@ from jaxtyping import Array, Float, Int
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
+from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 
 
@@ -57,7 +57,7 @@ def _joined(first, last, common: int):
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b[common:]]), first, last)
 
 
-@eqx.filter_jit
+@compiled
 def states_and_jacobian(
     weights: Float[Array, " p"],
     rebuild: Rebuild,

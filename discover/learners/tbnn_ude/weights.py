@@ -10,6 +10,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
+from discover.programs import compiled
 
 
 def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
@@ -130,12 +131,12 @@ class Rebuild(eqx.Module):
         return eqx.combine(unravel(held.at[self.positions].set(moved)), static)
 
 
-@eqx.filter_jit
+@compiled
 def _start(rebuild):
     return weights_of(rebuild.template)[rebuild.positions] / rebuild.scale
 
 
-@eqx.filter_jit
+@compiled
 def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork:
     """Return the law with these numbers, by one compiled program."""
     return rebuild(weights)

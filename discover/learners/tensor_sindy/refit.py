@@ -15,6 +15,7 @@ from jaxtyping import Array, Bool, Float
 
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.sensitivities import observe
+from discover.programs import compiled
 
 # One support to a program, and programs side by side in threads: a batch of supports by `vmap`
 # takes as many steps as its slowest member, two to three times the work (`benchmarks/refits.py`).
@@ -123,7 +124,7 @@ def _residual_jvp(primals, tangents):
     return (residual, everywhere), (jacobian @ tangents[0], jnp.zeros_like(everywhere))
 
 
-@eqx.filter_jit
+@compiled
 def _descend(
     problem: TrajectoryProblem,
     layout: _Layout,

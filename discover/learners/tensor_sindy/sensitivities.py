@@ -14,13 +14,13 @@ Which terms are active is an index array, not a program: no support needs a comp
 from functools import partial
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.learners.tensor_sindy.active_terms import evaluate_active
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
+from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from tensor_library.kinematics import rate_of_deformation
 
@@ -119,7 +119,7 @@ def observe(
     return observed[..., 0], observed[..., 1:]
 
 
-@eqx.filter_jit
+@compiled
 def predict_many(
     problem: TrajectoryProblem,
     active: Int[Array, " q"],
@@ -174,7 +174,7 @@ def predict_many(
     return jax.lax.map(law, (coefficients, inner), batch_size=_LAWS_AT_ONCE)
 
 
-@eqx.filter_jit
+@compiled
 def linearise(
     problem: TrajectoryProblem,
     coefficients: Float[Array, " n"],

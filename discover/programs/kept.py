@@ -1,0 +1,148 @@
+"""Functions compiled once and found again by the next process, without tracing.
+
+To trace a solver takes longer than to run it, and JAX keeps only what comes after tracing. So each
+function is exported [`jax.export`] under a digest of what it was made from.
+"""
+
+import functools
+import logging
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, ParamSpec, TypeVar
+
+import equinox as eqx
+import jax
+import jax.export
+import numpy as np
+
+from discover.programs.fingerprint import NotTold, fingerprint
+from discover.programs.store import load_program, program_folder, save_program
+from discover.programs.structure import put_together, take_apart
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_LOGGER = logging.getLogger(__name__)
+
+# JAX promises for these calls only that the same version knows them; the stamp names the version
+_UNPROMISED = [jax.export.DisabledSafetyCheck.custom_call("lapack_dormqr_ffi")]
+
+_ALL: weakref.WeakSet = weakref.WeakSet()
+
+
+def compiled(function: Callable[P, R], made_from: Any = None) -> "Compiled[P, R]":
+    """Compile a function as `equinox.filter_jit` does, and keep its program for the next start.
+
+    Arrays are traced, everything else is part of the program. Inside of a transformation, without a
+    cache folder, or with arguments that cannot be described exactly (a law from a notebook, say),
+    it is `equinox.filter_jit` and no more.
+
+    Parameters
+    ----------
+    function
+        Pure, as any function to be compiled. What it encloses becomes part of the program.
+    made_from
+        What tells a function made inside of another from others made there, in place of everything
+        that it encloses.
+    """
+    return Compiled(function, made_from)
+
+
+def forget_programs() -> None:
+    """Let this process start anew, as after ``jax.clear_caches()``; files stay."""
+    for one in _ALL:
+        one.forget()
+
+
+class Compiled(Generic[P, R]):
+    """A function with its programs, one for each kind of arguments. See `compiled`."""
+
+    def __init__(self, function: Callable[P, R], made_from: Any = None):
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._made_from = made_from
+        self._traced = eqx.filter_jit(function)
+        self._programs: dict[Any, Callable[[Sequence[Any]], Any]] = {}
+        self._lock = threading.RLock()
+        _ALL.add(self)
+
+    def forget(self) -> None:
+        """Drop what this process holds."""
+        self._programs.clear()
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Return what the function returns."""
+        leaves, tree = jax.tree.flatten((args, kwargs))
+        arrays = [leaf for leaf in leaves if isinstance(leaf, (jax.Array, np.ndarray, np.generic))]
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in arrays):
+            return self._traced(*args, **kwargs)
+        rest = tuple(None if eqx.is_array(leaf) else leaf for leaf in leaves)
+        try:
+            key = (
+                tree,
+                rest,
+                tuple((a.shape, a.dtype, _weak(a)) for a in arrays),
+                program_folder(),
+            )
+            program = self._programs.get(key)
+        except TypeError:  # of something without a hash: left to equinox, which says so
+            return self._traced(*args, **kwargs)
+        if program is None:
+            with self._lock:
+                program = self._programs.get(key) or self._made(args, kwargs, arrays, key[-1])
+                self._programs[key] = program
+        return program(args, kwargs, arrays)
+
+    def _made(self, args, kwargs, arrays, folder):
+        """Return the program for such arguments: found, or exported and kept, or traced."""
+
+        def traced(args, kwargs, arrays):
+            return self._traced(*args, **kwargs)
+
+        if folder is None:
+            return traced
+        try:
+            file = folder / (self._identity() + fingerprint((args, kwargs), False)).hex()
+            kept = load_program(file)
+            if kept is None:
+                kept = self._export(args, kwargs, arrays)
+                save_program(file, *kept)
+            nesting, data = kept
+            exported = jax.export.deserialize(bytearray(data))
+        except (NotTold, NotImplementedError, ValueError, TypeError) as reason:
+            _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)
+            return traced
+        call = jax.jit(exported.call)
+
+        def found(args, kwargs, arrays):
+            return put_together(nesting, iter(call(*arrays)))
+
+        return found
+
+    def _identity(self) -> bytes:
+        name = f"{self._function.__module__}:{self._function.__qualname__}"
+        if "<locals>" not in name:
+            return fingerprint(name, True)
+        made_from = self._function if self._made_from is None else self._made_from
+        return fingerprint((name, made_from), True)
+
+    def _export(self, args, kwargs, arrays) -> tuple[Any, bytes]:
+        leaves, tree = jax.tree.flatten((args, kwargs))
+        nesting: list[Any] = []
+
+        def flat(*arrays):
+            numbers = iter(arrays)
+            filled = [next(numbers) if eqx.is_array(leaf) else leaf for leaf in leaves]
+            args, kwargs = jax.tree.unflatten(tree, filled)
+            results: list[Any] = []
+            nesting[:] = [take_apart(self._function(*args, **kwargs), results)]
+            return results
+
+        shapes = [jax.ShapeDtypeStruct(a.shape, a.dtype, weak_type=_weak(a)) for a in arrays]
+        exported = jax.export.export(jax.jit(flat), disabled_checks=_UNPROMISED)(*shapes)
+        return nesting[0], bytes(exported.serialize())
+
+
+def _weak(array: Any) -> bool:
+    return bool(getattr(array, "weak_type", False))

@@ -1,0 +1,187 @@
+"""Programs that a later start finds: the same answers, and never another program's."""
+
+import os
+import subprocess
+import sys
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.laws import Fluid, make_law
+from discover.programs import compiled, forget_programs
+from discover.programs.fingerprint import NotTold, fingerprint
+from discover.programs.store import load_program, program_folder, save_program
+from discover.programs.structure import put_together, take_apart
+from discover.protocols.shear import oscillatory_shear
+from discover.simulate.solve import simulate
+from tensor_library.library import build_library
+
+GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
+ONE_START = """
+import logging, sys, numpy as np
+from discover.compilation_cache import enable_compilation_cache
+from discover.precision import enable_x64
+enable_x64(); enable_compilation_cache(sys.argv[1])
+import jax
+traced = []
+jax.monitoring.register_event_duration_secs_listener(
+    lambda name, seconds, **_: traced.append(seconds) if "jaxpr_trace" in name else None)
+from discover.laws import Fluid, make_law
+from discover.protocols.shear import oscillatory_shear
+from discover.simulate.solve import simulate
+fluid = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
+t = np.linspace(0.0, 2.0, 21)
+print(simulate(fluid, oscillatory_shear(2.0, 1.0), t).components.tobytes().hex(), sum(traced))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A store of this test's own."""
+    before = jax.config.jax_compilation_cache_dir
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    yield tmp_path
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def programs(folder):
+    return sorted(path for path in folder.glob("programs/*/*") if not path.name.startswith("."))
+
+
+def test_a_second_start_gives_the_same_bits_without_tracing_the_solver(tmp_path):
+    command = [sys.executable, "-c", ONE_START, str(tmp_path)]
+    first, second = (
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(2)
+    )
+    assert first[0] == second[0]
+    # to trace an adaptive solver takes seconds, to call an exported program milliseconds
+    assert float(second[1]) < 0.3 * float(first[1])
+
+
+def test_without_a_cache_folder_the_answer_is_the_same(folder):
+    t, flow = np.linspace(0.0, 2.0, 21), oscillatory_shear(2.0, 1.0)
+    kept = simulate(GIESEKUS, flow, t).components
+    assert programs(folder)
+    jax.config.update("jax_compilation_cache_dir", None)
+    assert program_folder() is None
+    np.testing.assert_array_equal(simulate(GIESEKUS, flow, t).components, kept)
+
+
+def test_a_program_that_was_cut_short_or_altered_is_made_anew(folder):
+    double = compiled(_double)
+    np.testing.assert_array_equal(double(np.arange(3.0)), [0.0, 2.0, 4.0])
+    (file,) = programs(folder)
+    whole = file.read_bytes()
+    for damaged in (whole[:-7], whole[:40], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
+        file.write_bytes(damaged)
+        assert load_program(file) is None
+        double.forget()
+        np.testing.assert_array_equal(double(np.arange(3.0)), [0.0, 2.0, 4.0])
+        assert load_program(file) is not None
+
+
+def test_a_folder_that_cannot_be_written_to_costs_nothing_but_time(folder):
+    save_program(folder / "absent" / "file", ["array"], b"")
+    assert not (folder / "absent").exists()
+
+
+def test_programs_of_other_code_are_removed_but_for_the_latest(folder):
+    for age in range(6):
+        old = folder / "programs" / f"stamp{age}"
+        old.mkdir(parents=True)
+        os.utime(old, (age, age))
+    assert program_folder() is not None
+    assert len(list((folder / "programs").iterdir())) == 3
+
+
+def _double(x):
+    return 2.0 * x
+
+
+def _times(factor):
+    return lambda x: factor * x
+
+
+def test_what_a_function_encloses_is_part_of_its_program():
+    two, three = _times(2.0), _times(3.0)
+    two.__module__ = three.__module__ = "discover.tested"
+    assert fingerprint(two, True) == fingerprint(_named(_times(2.0)), True)
+    assert fingerprint(two, True) != fingerprint(three, True)
+    array = _named(_times(np.arange(1000.0)))
+    other = np.arange(1000.0)
+    other[500] += 1e-12  # repr would not show it
+    assert fingerprint(array, True) != fingerprint(_named(_times(other)), True)
+
+
+def _named(function):
+    function.__module__ = "discover.tested"
+    return function
+
+
+def test_arguments_are_told_by_kind_and_static_fields_by_value():
+    first, second = (Fluid.dimensionless(make_law("giesekus", {"alpha": a})) for a in (0.1, 0.2))
+    assert fingerprint(first, False) == fingerprint(second, False)
+    assert fingerprint(first, True) != fingerprint(second, True)
+    other = Fluid.dimensionless(make_law("ptt_linear", {"epsilon": 0.1}))
+    assert fingerprint(first, False) != fingerprint(other, False)
+    small, large = build_library(degree=0), build_library(degree=1)
+    assert fingerprint(small, False) != fingerprint(large, False)
+    assert fingerprint({"a": 1, "b": 2}, False) == fingerprint({"b": 2, "a": 1}, False)
+    assert fingerprint(0.0, False) != fingerprint(-0.0, False)
+    assert fingerprint(1, False) != fingerprint(1.0, False) != fingerprint(True, False)
+    assert fingerprint((jnp.tanh,), False) != fingerprint((jnp.sin,), False)
+
+
+def test_code_that_no_version_names_is_refused_and_still_computed(folder):
+    class Own(eqx.Module):
+        size: float
+
+        def __call__(self, x):
+            return self.size * x
+
+    itself = []
+    itself.append(itself)
+    for unknown in (Own(2.0), lambda x: x, partial(_double), itself, object(), jax.random.key(0)):
+        with pytest.raises(NotTold):
+            fingerprint(unknown, False)
+    apply = compiled(lambda law, x: law(x))
+    np.testing.assert_array_equal(apply(Own(2.0), np.arange(3.0)), [0.0, 2.0, 4.0])
+    np.testing.assert_array_equal(apply(Own(3.0), np.arange(3.0)), [0.0, 3.0, 6.0])
+    assert not programs(folder)
+
+
+def test_a_program_inside_of_a_transformation_is_differentiated():
+    square = compiled(_square)
+    assert float(jax.grad(square)(3.0 * jnp.ones(()))) == 6.0
+    np.testing.assert_array_equal(jax.vmap(square)(jnp.arange(3.0)), [0.0, 1.0, 4.0])
+
+
+def _square(x):
+    return x * x
+
+
+def test_shapes_and_types_have_programs_of_their_own(folder):
+    double = compiled(_double)
+    for x in (np.arange(2.0), np.arange(3.0), np.arange(3), np.float64(1.0)):
+        result = double(x)
+        np.testing.assert_array_equal(result, 2.0 * x)
+        assert result.dtype == (2.0 * jnp.asarray(x)).dtype
+    assert len(programs(folder)) == 4
+    forget_programs()
+    np.testing.assert_array_equal(double(np.arange(3.0)), [0.0, 2.0, 4.0])
+
+
+def test_results_are_put_together_as_they_were():
+    leaves = []
+    value = (GIESEKUS, [np.ones(2), None], {"a": 1.5, "b": jnp.zeros(())})
+    nesting = take_apart(value, leaves)
+    again = put_together(nesting, iter(leaves))
+    assert jax.tree.structure(again) == jax.tree.structure(value)
+    assert eqx.tree_equal(again, value)
+    with pytest.raises(NotTold):
+        take_apart(object(), [])
