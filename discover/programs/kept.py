@@ -15,6 +15,7 @@ import equinox as eqx
 import jax
 import jax.export
 import numpy as np
+from jax.core import Tracer
 
 from discover.programs.fingerprint import NotTold, fingerprint
 from discover.programs.store import load_program, program_folder, save_program
@@ -60,10 +61,10 @@ class Compiled(Generic[P, R]):
 
     def __init__(self, function: Callable[P, R], made_from: Any = None):
         functools.update_wrapper(self, function)
-        self._function = function
+        self._function: Any = function
         self._made_from = made_from
-        self._traced = eqx.filter_jit(function)
-        self._programs: dict[Any, Callable[[Sequence[Any]], Any]] = {}
+        self._traced: Any = eqx.filter_jit(function)
+        self._programs: dict[Any, Callable[[Any, Any, Sequence[Any]], R]] = {}
         self._lock = threading.RLock()
         _ALL.add(self)
 
@@ -75,7 +76,7 @@ class Compiled(Generic[P, R]):
         """Return what the function returns."""
         leaves, tree = jax.tree.flatten((args, kwargs))
         arrays = [leaf for leaf in leaves if isinstance(leaf, (jax.Array, np.ndarray, np.generic))]
-        if any(isinstance(leaf, jax.core.Tracer) for leaf in arrays):
+        if any(isinstance(leaf, Tracer) for leaf in arrays):
             return self._traced(*args, **kwargs)
         rest = tuple(None if eqx.is_array(leaf) else leaf for leaf in leaves)
         try:

@@ -42,7 +42,7 @@ print(simulate(fluid, oscillatory_shear(2.0, 1.0), t).components.tobytes().hex()
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A store of this test's own."""
-    before = jax.config.jax_compilation_cache_dir
+    before = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
     jax.config.update("jax_compilation_cache_dir", str(tmp_path))
     yield tmp_path
     jax.config.update("jax_compilation_cache_dir", before)
