@@ -19,6 +19,8 @@ from discover.cli.interruption import obeying_interrupts
 from discover.last_words import last_words
 
 interruption._PATIENCE = float(sys.argv[1])
+# a shell's & has it ignored in all that it starts, the tests among them
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 def words():
     time.sleep(float(sys.argv[2]))
