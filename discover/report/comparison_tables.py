@@ -76,8 +76,13 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
                 mine = {name: _half(width) for name, width in widths.items()}
             else:
                 mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+            law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [
-                {"value": value, "half_width": None if value is None else mine.get(name)}
+                {
+                    "value": value,
+                    "half_width": None if value is None else mine.get(name),
+                    "runs_away": law[flow.key] is None and name in flow.reference,
+                }
                 for name, value in comparison.errors(who, flow).items()
             ]
         rows.append(

@@ -66,7 +66,27 @@ def _found(comparison: Comparison) -> str:
         )
     elif network is not None and "tbnn_ude" in explanation.by:
         parts.append("put into words, the neural network found no term")
-    return sentence(parts)
+    return sentence([*parts, *_where_usable(comparison)])
+
+
+_LIMITS = {
+    "conformation tensor positive definite": "whose conformation tensor loses positive "
+    "definiteness in {where}",
+    "integrates beyond training": "whose stress runs away in {where}",
+}
+
+
+def _where_usable(comparison: Comparison) -> list[str]:
+    """Return which laws that explain the data are good for nothing beyond them, and why."""
+    parts = []
+    for name in comparison.explanation.by:
+        checks = (comparison.physics.get(name) or {}).get("checks", ())
+        failed = {c["name"]: c for c in checks if c["passed"] is False}
+        why = [text.format(**failed[check]) for check, text in _LIMITS.items() if check in failed]
+        if why:
+            law = _law_of(name)
+            parts.append(f"{law}, {' and '.join(why)}, is for the fitted range only")
+    return parts
 
 
 def _law_of(learner: str) -> str:
@@ -100,19 +120,7 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
 def _how_sure(comparison: Comparison) -> str:
     if comparison.verdict == "no_signal":
         return "Nothing is determined by these data: neither a law nor N1 nor N2."
-    parts = []
-    judged = comparison.judged
-    for name in comparison.outcomes:
-        errors = {flow.name: comparison.errors(name, flow) for flow in judged}
-        said = [
-            f"{symbol} by {percent(value)}"
-            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
-            if (value := worst(errors, quantity.split()[0])) is not None
-        ]
-        if said:
-            flows = "flows" if len(judged) > 1 else "the flow"
-            missed = f"{LEARNERS[name].lower()} misses {', '.join(said)} at most"
-            parts.append(f"{missed} in {flows} that no fit saw")
+    parts = [part for name in comparison.outcomes for part in _unseen(comparison, name)]
     if not parts:
         parts.append("nothing was held out, so no prediction was put to the test")
     parts += _determined(comparison)
@@ -124,6 +132,29 @@ def _how_sure(comparison: Comparison) -> str:
                 f"soundness ({', '.join(failed)})"
             )
     return sentence(parts)
+
+
+def _unseen(comparison: Comparison, name: str) -> list[str]:
+    """Return what becomes of a law in flows that no fit saw, inside the fitted range and beyond."""
+    predictions = comparison.outcomes[name].predictions
+    inside = [flow for flow in comparison.judged if comparison.placement(flow).inside]
+    beyond = [flow for flow in comparison.judged if not comparison.placement(flow).inside]
+    parts, runaway = [], []
+    for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
+        runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
+        errors = {flow.name: comparison.errors(name, flow) for flow in flows}
+        said = [
+            f"{symbol} by {percent(value)}"
+            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            if (value := worst(errors, quantity.split()[0])) is not None
+        ]
+        if said:
+            parts.append(f"{', '.join(said)} {where}")
+    law = LEARNERS[name].lower()
+    told = [f"{law} misses, in flows that no fit saw, at most {' and '.join(parts)}"]
+    return (told if parts else []) + (
+        [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
+    )
 
 
 def _determined(comparison: Comparison) -> list[str]:

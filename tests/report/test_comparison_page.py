@@ -15,6 +15,7 @@ from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.learners.result import RecoveredTerm
 from discover.protocols.shear import oscillatory_shear
 from discover.report.comparison_report import write_comparison
+from discover.report.comparison_tables import error_rows
 from discover.report.comparison_verdict import comparison_verdict
 from discover.report.parts import Missing, attempt
 from discover.report.verdicts import QUESTIONS
@@ -233,6 +234,39 @@ def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):
     # negative control of the check
     assert unconditional("N1 is determined by σ12.") != []
     assert unconditional("The data rule out every other law at 5 %.") != []
+
+
+def test_errors_inside_and_beyond_the_range_are_told_apart_and_so_is_a_runaway():
+    # shear start-ups of a melt: the fast one could not be integrated, and was passed over
+    inside = flow("b", "held_out")
+    faster = replace(inside, name="fast", shear_rate=3.0 * inside.shear_rate)
+    flows = [flow("a", "training"), inside, faster]
+    comparison = made_up(flows=flows, before=dict.fromkeys(f.key for f in flows))
+    wrong = {q: 1.5 * np.sin(TIMES) for q in ("sigma12", "N1", "N2")}
+    outcomes = {
+        name: replace(one, predictions={**one.predictions, faster.key: prediction})
+        for (name, one), prediction in zip(comparison.outcomes.items(), (None, wrong), strict=True)
+    }
+    comparison = replace(comparison, outcomes=outcomes)
+    sure = comparison_verdict(comparison)[1].lower()
+    assert "σ12 by 0 % inside the fitted range and σ12 by 50 % beyond the fitted range" in sure
+    assert "sparse regression's stress runs away in γ̇ = cos(t), beyond the fitted range" in sure
+    assert "neural network's stress runs away" not in sure
+    cells = error_rows(comparison)[1]["cells"]
+    assert [cell["runs_away"] for cell in cells] == [True, False, False] * 2 + [False] * 3
+
+
+@pytest.mark.parametrize("passed", [False, True, None])
+def test_a_law_for_the_fitted_range_only_says_so_in_the_first_sentence(passed):
+    checks = [
+        {"name": "conformation tensor positive definite", "passed": passed, "where": "run a"},
+        {"name": "integrates beyond training", "passed": passed, "where": "run b"},
+    ]
+    comparison = made_up(network=None)
+    sparse = replace(comparison.outcomes["tensor_sindy"], physics={"checks": checks})
+    found = comparison_verdict(replace(comparison, outcomes={"tensor_sindy": sparse}))[0]
+    limited = "loses positive definiteness in run a and whose stress runs away in run b" in found
+    assert limited == ("is for the fitted range only" in found) == (passed is False)
 
 
 def test_a_sum_stands_in_brackets_behind_its_coefficient():

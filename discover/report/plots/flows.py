@@ -106,7 +106,7 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
         return picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: a kind of flow that training, all oscillatory, did not contain.",
+            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
         )
 
 
@@ -147,6 +147,13 @@ def training_picture(comparison: Comparison) -> Picture:
 def _seen(comparison: Comparison, flow: Flow) -> str:
     if flow.name in {f.name for f in comparison.flows_of("training")}:
         return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
+    return "no learner saw this flow."
+
+
+def _new_kind(comparison: Comparison) -> str:
+    """Return how a start-up differs from the flows fitted."""
+    if all(flow.oscillatory for flow in comparison.flows_of("training")):
+        return "a kind of flow that training, all oscillatory, did not contain."
     return "no learner saw this flow."
 
 
