@@ -68,6 +68,10 @@ class Compiled(Generic[P, R]):
         self._lock = threading.RLock()
         _ALL.add(self)
 
+    def __reduce__(self) -> str:
+        # by name, as a function: another process makes programs of its own
+        return self._function.__qualname__
+
     def forget(self) -> None:
         """Drop what this process holds."""
         self._programs.clear()

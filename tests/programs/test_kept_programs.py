@@ -1,6 +1,7 @@
 """Programs that a later start finds: the same answers, and never another program's."""
 
 import os
+import pickle
 import subprocess
 import sys
 from functools import partial
@@ -17,7 +18,7 @@ from discover.programs.fingerprint import NotTold, fingerprint
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 from discover.protocols.shear import oscillatory_shear
-from discover.simulate.solve import simulate
+from discover.simulate.solve import simulate, solve_batch
 from tensor_library.library import build_library
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
@@ -163,6 +164,10 @@ def test_a_program_inside_of_a_transformation_is_differentiated():
 
 def _square(x):
     return x * x
+
+
+def test_it_is_pickled_by_its_name_as_a_function_is():
+    assert pickle.loads(pickle.dumps(solve_batch)) is solve_batch
 
 
 def test_shapes_and_types_have_programs_of_their_own(folder):
