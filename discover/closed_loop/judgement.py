@@ -108,7 +108,8 @@ def judge(
         pattern = _speak_against(leftover, fit, held, plain)
     if held is not None and pattern:
         limit = held.resolution.limit(fit.theta, active, missed_held_out)
-        pattern = missed_held_out > STRUCTURE * limit
+        # what arithmetic did to the fitted runs, constants carry over
+        pattern = missed_held_out > STRUCTURE * max(limit, resolution)
     carries_over &= not pattern
     nothing = plain and left.verdict == "no_signal"
     structured = not (known and explained and carries_over)

@@ -2,7 +2,8 @@
 
 A constant that is a little off leaves a smooth misfit there, by which nothing is missing. So the
 constants may move, each as far as the fit leaves it open, and two things are asked: whether they
-have to move further than that, and whether a pattern is left then.
+have to move further than that, and whether a pattern is left then. But a misfit that stands out of
+the noise is no prediction, whatever the constants would excuse.
 """
 
 from collections.abc import Sequence
@@ -76,10 +77,11 @@ class Unseen:
 def speak_against(unseen: Unseen, residuals: Rows, records: Rows, expectation: Expectation) -> bool:
     """Return whether runs that no fit saw say that something is missing.
 
-    They do if a pattern is left after the constants moved, in them or in them and the fitted runs
-    together; or if the constants have to move too far. The last two are independent signs of the
-    same   [Fisher 1932, Statistical Methods for Research Workers, ch. 4]. What a noise that is
-    given allows, or the error of the linear data, is none; nor is what is in runs of a few samples.
+    They do if their pattern is larger than their noise; or if one is left after the constants
+    moved, in them or in them and the fitted runs together; or if the constants have to move too
+    far, of which a pattern that is left is an independent sign   [Fisher 1932, Statistical Methods
+    for Research Workers, ch. 4]. What a noise that is given allows, or the error of the linear
+    data, is none; nor is what is in runs of a few samples.
 
     Parameters
     ----------
@@ -93,6 +95,11 @@ def speak_against(unseen: Unseen, residuals: Rows, records: Rows, expectation: E
     """
     if not tells_noise(_weights(unseen.records)) or _allowed(unseen, expectation):
         return False
+    fast, slow = _parts(unseen)
+    if slow > fast and (
+        what_is_left(unseen.residuals, unseen.records, expectation).verdict == "unexplained"
+    ):
+        return True
     moved, agreement = unseen.moved()
     alone = what_is_left(moved, unseen.records, expectation)
     signs = [agreement] if alone.probability is None else [agreement, alone.probability]
@@ -105,16 +112,24 @@ def speak_against(unseen: Unseen, residuals: Rows, records: Rows, expectation: E
 
 def _allowed(unseen: Unseen, expectation: Expectation) -> bool:
     """Return whether these runs are missed by no more than is known to be wrong with them."""
-    sizes, slow = [], []
-    for row, record in zip(unseen.residuals, unseen.records, strict=True):
-        scale = float(np.sqrt(np.mean(np.square(record)))) or 1.0
-        power = float(np.mean(np.square(row))) / scale**2
-        sizes.append(np.sqrt(power))
-        slow.append(np.sqrt(max(power - (fast_part(row) / scale) ** 2, 0.0)))
-    if np.mean(slow) <= STRUCTURE * expectation.linear_error:
+    fast, slow = _parts(unseen)
+    if slow <= STRUCTURE * expectation.linear_error:
         return True
     given = expectation.noise
-    return given is not None and bool(np.mean(sizes) <= np.hypot(given, expectation.linear_error))
+    if given is None:
+        return False
+    return bool(np.hypot(fast, slow) <= STRUCTURE * np.hypot(given, expectation.linear_error))
+
+
+def _parts(unseen: Unseen) -> tuple[float, float]:
+    """Return the relative size of what changes from sample to sample, and of the rest."""
+    sizes = []
+    for row, record in zip(unseen.residuals, unseen.records, strict=True):
+        scale = float(np.sqrt(np.mean(np.square(record)))) or 1.0
+        power, fast = float(np.mean(np.square(row))), fast_part(row)
+        sizes.append([fast / scale, np.sqrt(max(power - fast**2, 0.0)) / scale])
+    fast, slow = np.sqrt(np.mean(np.square(sizes), axis=0))
+    return float(fast), float(slow)
 
 
 def _weights(records: Rows) -> np.ndarray:

@@ -34,7 +34,7 @@ def against(one, expectation=None):
     return speak_against(one, [], [], expectation or Expectation())
 
 
-@pytest.mark.parametrize("uncertainty", [1e-4, 1e-3, 2e-2])
+@pytest.mark.parametrize("uncertainty", [1e-4, 1e-3, 3e-3])
 def test_a_constant_within_its_interval_is_no_missing_effect(responses, uncertainty):
     for seed in range(15):
         assert not against(unseen(responses, uncertainty, (-1) ** seed * 1.5, seed=seed))
@@ -42,6 +42,12 @@ def test_a_constant_within_its_interval_is_no_missing_effect(responses, uncertai
 
 def test_a_constant_far_outside_its_interval_is_one(responses):
     assert against(unseen(responses, 5e-3, 8.0))
+
+
+def test_what_stands_out_of_the_noise_is_no_prediction_though_a_constant_would_excuse_it(responses):
+    one = unseen(responses, 5e-2, 1.5)
+    assert one.moved()[1] > 0.01
+    assert against(one)
 
 
 def test_what_no_constant_makes_up_for_is_one(responses):
