@@ -104,8 +104,8 @@ def _residual(outcome: LearnerOutcome, flow: Flow) -> np.ndarray | None:
 def _columns(outcome: LearnerOutcome, flow: Flow, band: PredictionBand | None) -> np.ndarray:
     """Return changes of σ12 by one standard deviation each, shape (directions, n); (0, n): none."""
     if outcome.learner == "tensor_sindy":
-        none = band is None or band.directions is None
-        return np.zeros((0, len(flow.times))) if none else band.directions
+        directions = None if band is None else band.directions
+        return np.zeros((0, len(flow.times))) if directions is None else directions
     limits = outcome.bands.get(flow.key)
     if limits is None:
         return np.zeros((0, len(flow.times)))

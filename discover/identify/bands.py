@@ -111,7 +111,7 @@ def prediction_bands(
 def bands_of_predictions(
     predicted: Float[np.ndarray, "laws flows n 3"],
     group_sizes: Sequence[int],
-    times: Sequence[Float[np.ndarray, " m"]],
+    times: Sequence[Float[np.ndarray, " _"]],
     without_band: str = "",
 ) -> list[PredictionBand]:
     """Return the band of every flow from predictions in groups, the chosen law's first.

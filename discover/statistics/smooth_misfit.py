@@ -67,7 +67,7 @@ def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
     for rows in stacks:
         n = rows.shape[-1]
         inverse, normalised = _spectra(n)
-        power = dct(rows, type=2, norm="ortho") ** 2
+        power = np.square(np.asarray(dct(rows, type=2, norm="ortho")))
         level = np.maximum(power @ inverse / n, 1e-300)
         likelihood = (-0.5 * n * np.log(level) - normalised).reshape(
             -1, len(_CORRELATIONS), len(_HALF_SWINGS), len(_SHARES)
