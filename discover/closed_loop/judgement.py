@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from discover.closed_loop.held_out import HeldOut
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.result import RunRecord, Verdict
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import (
@@ -18,32 +17,11 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
+from discover.statistics.unseen import CARRIED, speak_against
 from discover.statistics.whiteness import SIGNIFICANCE
-
-CARRIED = 3.0
-"""A model that misses the held-out runs by more than so many times what it misses the fitted ones
-does not carry over to them. The fitted error is an optimistic guess of the other, by the freedom of
-a few constants; three times leaves room for that, and for flows that weigh them otherwise."""
-
 
 Silence = Literal["records", "fluid"]
 """What holds no signal: the records themselves, or what a fit leaves to the fluid of them."""
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Runs that no fit saw: what the final model leaves of them, and what arithmetic leaves.
-
-    Attributes
-    ----------
-    residual
-        Weighted residuals, padded, shape (runs, n).
-    resolution
-        Of these runs.
-    """
-
-    residual: Float[np.ndarray, "runs n"]
-    resolution: Resolution
 
 
 @dataclass(frozen=True)
@@ -87,6 +65,7 @@ def judge(
     records: Sequence[RunRecord],
     held: HeldOut | None,
     silence: Silence | None = None,
+    not_from_rest: Sequence[str] = (),
 ) -> Judgement:
     """Return the verdict on a final model.
 
@@ -102,6 +81,9 @@ def judge(
         Runs held out, if any.
     silence
         What is silent, if anything is.
+    not_from_rest
+        Fitted runs that are taken as starting from rest and cannot have started so. What came
+        before them looks like an effect, so no effect that explains them is believed.
     """
     expectation, weight = leftover.expectation, leftover.weight
     left = leftover.left(fit.residual)
@@ -116,15 +98,23 @@ def judge(
     carries_over = held is None or missed_held_out <= CARRIED * max(error, expected, resolution)
     if held is not None and not carries_over:
         # held-out runs may be noisier than the fitted ones, or rounded more coarsely
-        own = summarise(held.residual, np.asarray(held.resolution.batch.weight)).noise
+        own = summarise(held.residual, held.weight).noise
         limit = held.resolution.limit(fit.theta, active, missed_held_out)
         carries_over = missed_held_out <= CARRIED * max(held.resolution.mean(own), limit)
         # and a few samples, off by chance, decide nothing
-        carries_over |= tells_noise(weight) and not tells_noise(
-            np.asarray(held.resolution.batch.weight)
-        )
+        carries_over |= tells_noise(weight) and not tells_noise(held.weight)
+    pattern = False
+    if held is not None and explained and carries_over and leftover.noise_known:
+        pattern = _speak_against(leftover, fit, held, plain)
+    if held is not None and pattern:
+        limit = held.resolution.limit(fit.theta, active, missed_held_out)
+        # what arithmetic did to the fitted runs, constants carry over
+        pattern = missed_held_out > STRUCTURE * max(limit, resolution)
+    carries_over &= not pattern
     nothing = plain and left.verdict == "no_signal"
     structured = not (known and explained and carries_over)
+    mistaken = bool(active and not structured and not_from_rest)
+    structured |= mistaken
     verdict: Verdict = "unexplained" if structured else "no_effect_needed"
     if active and not structured:
         verdict = "effects_added"
@@ -163,6 +153,19 @@ def judge(
         text = f"{missed}, as {causes} ({_percent(expected)})."
         if left.probability is not None and left.probability <= SIGNIFICANCE and plain:
             text += " It has a pattern that noise has not, but one no larger than that."
+    elif mistaken:
+        text = (
+            f"{missed}, as {causes} ({_percent(expected)}), but {' and '.join(not_from_rest)} "
+            "cannot have started from rest, as is assumed: what came before looks like an effect. "
+            "Say what it was (rate_before), or give the record from rest on."
+        )
+    elif pattern:
+        text = (
+            f"{missed}, as {causes} ({_percent(expected)}), but the runs held out by "
+            f"{_percent(missed_held_out)}, and what is left of them has a pattern that neither "
+            "noise nor an uncertain constant leaves. Some effect is still missing, or has another "
+            "form."
+        )
     elif explained:
         text = (
             f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "
@@ -187,6 +190,18 @@ def judge(
     # what does not explain the fitted runs has nothing to carry over
     carries_over = carries_over or not explained
     return Judgement(verdict, structured, left, resolution, known, carries_over, short, worst, text)
+
+
+def _speak_against(leftover: Leftover, fit: Fit, held: HeldOut, together: bool) -> bool:
+    """Return whether runs that no fit saw say that something is missing.
+
+    The fitted ones have a voice too where noise explains them, and not arithmetic alone.
+    """
+    weight = leftover.weight if together else leftover.weight[:0]
+    seen = [w > 0 for w in weight]
+    rows = [r[s] / w[s] for r, w, s in zip(fit.residual, weight, seen, strict=False)]
+    records = [r[s] for r, s in zip(leftover.records, seen, strict=False)]
+    return speak_against(held.unseen, rows, records, leftover.expectation)
 
 
 def _error(records: Sequence[RunRecord]) -> float:

@@ -17,7 +17,8 @@ from discover.closed_loop.before_after import (
 )
 from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
-from discover.closed_loop.judgement import HeldOut, Judgement, Silence, judge
+from discover.closed_loop.held_out import held_out as predict_held_out
+from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.leftover import Leftover
@@ -27,6 +28,7 @@ from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.closed_loop.silence import fluid_is_silent, records_are_silent
 from discover.dataset import ShearDataset, ShearRun
+from discover.dataset.check_start import doubts_of_start
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.effects import (
@@ -174,12 +176,15 @@ def run_loop(
     after = errors_of(records, len(thetas) - 1)
     held = None
     if held_batch is not None:
-        left = model.residuals([thetas[-1]], held_batch)[0]
-        held = HeldOut(left, Resolution(model, held_batch, held_runs))
+        unseen = Resolution(model, held_batch, held_runs)
+        held = predict_held_out(model, batch, current, thetas[-1], unseen)
+    # as they were recorded: a window of strain may have cut their start off
+    whole = dataset.select([run.name for run in fitted_runs]).runs
+    mistaken = [run.name for run in whole if any(doubts_of_start(run))]
     silence: Silence | None = "records" if silent else None
     if not silent and fluid_is_silent(model, batch, current, active):
         silence = "fluid"
-    judgement = judge(leftover, current, active, records, held, silence)
+    judgement = judge(leftover, current, active, records, held, silence, mistaken)
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
     return LoopResult(
         verdict=judgement.verdict,

@@ -85,19 +85,20 @@ class Resolution:
 def rounding(values: Float[np.ndarray, " n"]) -> float:
     """Return half a unit in the last place of numbers, root-mean-square; 0 if they hold them all.
 
-    A file gives its numbers with so many digits, or with so many decimals; both are looked for, and
-    the coarser of those that the numbers fit is taken.
+    A file gives its numbers with so many digits, or with so many decimals, and a converter in steps
+    of its own; all are looked for, and the coarsest of those that the numbers fit is taken.
 
     Parameters
     ----------
     values
         In any unit. Of fewer than five that differ nothing is said.
     """
+    step = _step_of_converter(values)
     values = np.abs(values[values != 0.0])
     if len(np.unique(values)) < _FEWEST_VALUES:
         return 0.0
     own, largest = np.floor(np.log10(values)), np.floor(np.log10(np.max(values)))
-    found = [0.0]
+    found = [0.5 * step]
     for exponents in (own, np.full_like(own, largest)):
         for digits in range(1, _MOST_DIGITS + 1):
             unit = 10.0 ** (exponents - digits + 1)
@@ -105,3 +106,12 @@ def rounding(values: Float[np.ndarray, " n"]) -> float:
                 found.append(float(np.sqrt(np.mean((0.5 * unit) ** 2))))
                 break
     return max(found)
+
+
+def _step_of_converter(values: Float[np.ndarray, " n"]) -> float:
+    """Return the step of which all numbers are multiples, of which most occur again; 0 if none."""
+    levels = np.unique(values)
+    if not _FEWEST_VALUES <= len(levels) <= len(values) // 2:
+        return 0.0
+    gaps = np.diff(levels) / np.min(np.diff(levels))
+    return float(np.min(np.diff(levels))) if np.allclose(gaps, np.round(gaps), atol=1e-3) else 0.0

@@ -12,8 +12,8 @@ from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
 from discover.effects import ConstitutiveEffect
 from discover.statistics import holds_signal
+from discover.statistics.dead_records import CHANCE
 from discover.statistics.residual import judging, summarise
-from discover.statistics.whiteness import SIGNIFICANCE
 
 _OFF = 1e-30  # factor on the moduli of a fluid that is switched off
 
@@ -55,4 +55,4 @@ def fluid_is_silent(
     if not np.isfinite(lost) or left <= 0.0:
         return False
     samples = summarise(fit.residual[rows], weight[rows]).effective_samples
-    return bool(samples * np.log(lost / left) < chi2.isf(SIGNIFICANCE, fluid))
+    return bool(samples * np.log(lost / left) < chi2.isf(CHANCE, fluid))

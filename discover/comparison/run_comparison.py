@@ -27,6 +27,7 @@ from discover.comparison.training import (
     train,
 )
 from discover.comparison.truth import TrueTerm, true_terms
+from discover.comparison.unseen_runs import hold_against_unseen
 from discover.dataset.run import ShearDataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -117,23 +118,30 @@ def compare(
         assert options.sweep is not None
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
     normal = options.use_normal_stresses
-    explanation = explain(outcomes, flows, expectation_of(study, model), normal)
-    outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
+    expectation = expectation_of(study, model)
+    explanation = explain(outcomes, flows, expectation, normal)
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen = outcomes.get("tensor_sindy")
     rivals, structure, following = [], None, NextMeasurement()
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    judged = judged or [flow for flow in flows if flow.kind == "training"]
+    fitted = [flow for flow in flows if flow.kind == "training"]
+    judged = judged or fitted
     if chosen is not None and explanation.verdict != "no_signal":
         library = study_library(study) if library is None else library
         met = chosen.details.get("rivals", ())
         rivals = find_rivals(chosen.terms, met, model, flows, library, chosen.predictions)
         structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
     if chosen is not None and explanation.in_library:
+        # where a quantity is said to be determined, its band says how well
+        banded = judged if judged is fitted else [*judged, *fitted]
         # bands and experiments take it that the law, or a rival, is the fluid's
         following = next_measurement(
-            chosen, rivals, model.fluid, judged, following_options, learner_seed
+            chosen, rivals, model.fluid, banded, following_options, learner_seed
         )
+    explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
+    if not explanation.in_library:
+        following = NextMeasurement()
+    outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     classical = []
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, flows, rivals, structure, bands, normal)

@@ -17,6 +17,8 @@ _NOTICEABLE = 0.2
 _TRANSIENT = 0.05
 # What thickening and another loading add to linear theory is less
 _LINEAR_FACTOR = 2.0
+# Of the largest strain, so much may be there before the first sample and not of the rate
+_NOT_MADE = 0.05
 _HARMONICS = (1, 2, 3, 5, 7)
 
 
@@ -29,7 +31,8 @@ def doubts_of_start(
     viscosity at once, that of elasticity with the strain. A record is doubted if its first stress
     is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
     or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
-    already like the later ones; or (3) a linear sweep does not allow so much.
+    already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
+    that was recorded with it says that the rate had been another before.
 
     Parameters
     ----------
@@ -50,6 +53,8 @@ def doubts_of_start(
         why = "its first cycle is like the later ones, as where the oscillation had gone on before"
     elif sweep is not None and spectrum is not None and _more_than_linear(run, sweep, spectrum):
         why = "the linear sweep allows less than half of that so early"
+    elif _strained_before(run):
+        why = "the strain recorded there is not what its rate had made by then"
     else:
         return
     yield Finding(
@@ -73,6 +78,14 @@ def _only_falls(run: ShearRun) -> bool:
     viscosity = max(float(rate @ run.shear_stress) / power, 0.0) if power > 0.0 else 0.0
     left = run.shear_stress - viscosity * rate
     return bool(left @ left > 0.5 * (run.shear_stress @ run.shear_stress))
+
+
+def _strained_before(run: ShearRun) -> bool:
+    if run.strain is None or run.rate_is_measured:
+        return False
+    made = run.shear_rate[0] * run.time[0]
+    whole = float(np.max(np.abs(run.strain)))
+    return bool(abs(run.strain[0] - made) > _NOT_MADE * whole)
 
 
 def _steady_alternation(run: ShearRun) -> bool:

@@ -36,6 +36,9 @@ class PredictionBand:
         Fraction of the draws that could not be integrated.
     reason
         Why there is no band, that is why the limits are nan; empty where there is one.
+    directions
+        Changes of the chosen law's σ12 in Pa whose squares add up to its variance, shape
+        (draws, n); None without a band.
     """
 
     times: Float[np.ndarray, " n"]
@@ -46,6 +49,7 @@ class PredictionBand:
     rivals_high: Float[np.ndarray, "n 3"]
     runaways: float
     reason: str = ""
+    directions: Float[np.ndarray, "draws n"] | None = None
 
     def widths(self, with_rivals: bool = True) -> dict[str, float]:
         """Return the root-mean-square width of each band over that of the chosen prediction.
@@ -107,7 +111,7 @@ def prediction_bands(
 def bands_of_predictions(
     predicted: Float[np.ndarray, "laws flows n 3"],
     group_sizes: Sequence[int],
-    times: Sequence[Float[np.ndarray, " m"]],
+    times: Sequence[Float[np.ndarray, " _"]],
     without_band: str = "",
 ) -> list[PredictionBand]:
     """Return the band of every flow from predictions in groups, the chosen law's first.
@@ -149,6 +153,8 @@ def bands_of_predictions(
             continue
         if reason:
             low, high = [np.full((n, 3), np.nan)], [np.full((n, 3), np.nan)]
+        drawn = predicted[1 : edges[1], flow, :n, 0][finite[1 : edges[1], flow]]
+        directions = (drawn - predicted[0, flow, :n, 0]) / np.sqrt(max(len(drawn), 1))
         bands.append(
             PredictionBand(
                 times=sampling,
@@ -159,6 +165,7 @@ def bands_of_predictions(
                 rivals_high=np.max(high, axis=0),
                 runaways=1.0 - float(np.mean(finite[:, flow])),
                 reason=reason,
+                directions=None if reason or not len(drawn) else directions,
             )
         )
     return bands

@@ -8,7 +8,10 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from discover.statistics.independent_samples import independent_samples
-from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
+from discover.statistics.whiteness import FEWEST_TESTED, noise_probability
+
+CHANCE = 1e-3
+"""Noise is taken for a signal this often. A signal that is claimed is searched for laws."""
 
 _OTHER_RATE = 1.1  # flows whose rates differ by less than this factor are one flow
 
@@ -43,7 +46,7 @@ def holds_signal(
         weight[i, : len(row)] = 1.0
         record[i, : len(row)] = row
     probability = noise_probability(residual, weight, record)
-    if probability is not None and probability <= SIGNIFICANCE:
+    if probability is not None and probability <= CHANCE:
         return True
     if _means_differ(rows):
         return True
@@ -63,7 +66,7 @@ def _means_differ(rows: Sequence[np.ndarray]) -> bool:
     excess = float(np.sum((1.0 - trust / np.sum(trust)) ** 2 / np.maximum(counts - 1.0, 1.0)))
     spread = float(np.sum(trust * (means - middle) ** 2)) / (k - 1)
     ratio = spread / (1.0 + 2.0 * (k - 2) / (k**2 - 1) * excess)
-    return bool(fisher.sf(ratio, k - 1, (k**2 - 1) / (3.0 * excess)) < SIGNIFICANCE)
+    return bool(fisher.sf(ratio, k - 1, (k**2 - 1) / (3.0 * excess)) < CHANCE)
 
 
 def _mean_is_there(rows: Sequence[np.ndarray]) -> bool:
@@ -73,7 +76,7 @@ def _mean_is_there(rows: Sequence[np.ndarray]) -> bool:
     trust = 1.0 / errors**2
     distance = abs(float(np.sum(trust * means))) / np.sqrt(float(np.sum(trust)))
     freedom = max(float(np.sum(counts - 1.0)), 1.0)
-    return bool(2.0 * student.sf(distance, freedom) < SIGNIFICANCE)
+    return bool(2.0 * student.sf(distance, freedom) < CHANCE)
 
 
 def _means(rows: Sequence[np.ndarray]):

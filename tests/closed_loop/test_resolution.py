@@ -133,3 +133,11 @@ def test_a_misfit_is_put_down_to_arithmetic_only_where_that_leaves_as_much():
     assert 0.02 * 0.08**2 / 12 < limits[1] < 0.08**2 / 12
     far = Resolution(model, make_batch(sampled), sampled).limit(model.zero(), (), 0.1)
     assert far == pytest.approx(COMPUTED)
+
+
+def test_steps_of_a_converter_round_as_digits_do():
+    values = 2.7 * np.round(100.0 * np.sin(TIMES) ** 2 / 2.7)
+    assert rounding(values) == pytest.approx(1.35)
+    noise = np.random.default_rng(0).standard_normal(100)
+    assert rounding(values + 1e-3 * noise) == 0.0
+    assert rounding(np.repeat(noise[:20], 5)) == 0.0

@@ -4,6 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import JohnsonSegalman
+from independent import start_up as flow_of
 
 from discover.closed_loop.run_batch import data_scales
 from discover.dataset import ShearRun
@@ -261,3 +263,14 @@ def test_an_effect_written_out_in_library_terms_is_what_it_adds(effect):
     np.testing.assert_allclose(
         total, effect.extra_term(jnp.array(values), STRESS, RATE), atol=1e-14
     )
+
+
+@pytest.mark.parametrize("xi", [0.2, 0.7])
+def test_of_two_slips_that_shear_cannot_tell_apart_one_is_possible(xi):
+    flow, times = flow_of(2.0), np.geomspace(0.05, 10.0, 60)
+    one, other = (JohnsonSegalman(x, 100.0).respond(flow, times) for x in (xi, 2.0 - xi))
+    np.testing.assert_allclose(one.sigma12, other.sigma12, atol=1e-6 * np.max(one.sigma12))
+    np.testing.assert_allclose(one.N1, other.N1, atol=1e-6 * np.max(one.N1))
+    assert np.max(np.abs(one.N2 - other.N2)) > 0.1 * np.max(one.N1)
+    slip = make_effect("non_affine_motion").parameters[0]
+    assert (slip.low, slip.high) == (0.0, 1.0)

@@ -23,10 +23,11 @@ EFFECT = NonAffineMotion(
             "xi",
             r"\xi",
             low=0.0,
-            high=2.0,
+            high=1.0,
             first_trial=0.01,
             range_source="Johnson & Segalman 1977: from the upper (0) to the lower (2) convected "
-            "derivative",
+            "derivative; shear stress and N1 see ξ(2 − ξ) alone, so ξ and 2 − ξ are one, of which "
+            "the one that agrees with small measured −N2/N1 = ξ/2 is named",
         ),
     ),
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",

@@ -1,0 +1,85 @@
+"""Runs that no fit saw, and what a model leaves of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.least_squares import Fit, jacobians
+from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.run_batch import RunBatch
+from discover.statistics import least_squares_covariance
+from discover.statistics.unseen import Unseen
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Runs that no fit saw: what the final model leaves of them, and what arithmetic leaves.
+
+    Attributes
+    ----------
+    residual
+        Weighted residuals, padded, shape (runs, n).
+    resolution
+        Of these runs.
+    unseen
+        The residuals in Pa, with what uncertain constants may change in them.
+    """
+
+    residual: Float[np.ndarray, "runs n"]
+    resolution: Resolution
+    unseen: Unseen
+
+    @property
+    def weight(self) -> Float[np.ndarray, "runs n"]:
+        """Weights of the runs, zero at padding."""
+        return np.asarray(self.resolution.batch.weight)
+
+
+def held_out(
+    model: AugmentedModel, batch: RunBatch, fit: Fit, theta: np.ndarray, resolution: Resolution
+) -> HeldOut:
+    """Return what a final model leaves of runs that no fit saw.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    theta
+        The parameters that predict.
+    resolution
+        Of the runs held out.
+    """
+    residual = model.residuals([theta], resolution.batch)
+    derivative = np.zeros((0, *residual[0].shape))
+    root, correlation = np.zeros((0, 0)), np.ones(1)
+    if fit.free:
+        derivative = jacobians(model, resolution.batch, [theta], residual, [fit.free])[0]
+        root, correlation = _uncertainty(batch, fit)
+    columns = np.tensordot(root, derivative, axes=(0, 0))
+    weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.stress)
+    kept = [w > 0 for w in weight]
+    unseen = Unseen(
+        [row[seen] / w[seen] for row, w, seen in zip(residual[0], weight, kept, strict=True)],
+        [record[seen] for record, seen in zip(records, kept, strict=True)],
+        [columns[:, i, seen] / weight[i, seen] for i, seen in enumerate(kept)],
+        correlation,
+    )
+    return HeldOut(residual[0], resolution, unseen)
+
+
+def _uncertainty(batch: RunBatch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return a root of the constants' covariance, shape (free, free), and the noise's correlation.
+
+    A column is a combination of the constants that varies by one standard deviation.
+    """
+    n_runs, n = fit.residual.shape
+    rows = np.arange(n_runs * n).reshape(n_runs, n)
+    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
+    design = fit.jacobian.reshape(len(fit.free), -1).T
+    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
+    if not np.all(np.isfinite(covariance)):
+        return np.zeros_like(covariance), noise.correlation
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0)), noise.correlation

@@ -1,0 +1,85 @@
+"""A law that held-out runs refute explains nothing: data from code that is not under test."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from independent import Giesekus, RoliePoly, start_up
+from independent.noise import white
+
+from discover.comparison.explanation import explain
+from discover.comparison.flows import Flow
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.unseen_runs import hold_against_unseen
+from discover.identify.bands import bands_of_predictions
+from discover.protocols import start_up as protocol
+from discover.statistics.residual import Expectation
+
+TIMES = np.geomspace(0.05, 10.0, 80)
+RATES = {"slow": 0.5, "fast": 2.0, "held": 4.0}
+EMPTY = (np.zeros(0), np.zeros(0))
+ALPHAS = 0.3 + 1e-3 * np.random.default_rng(0).standard_normal(20)
+
+
+def stress(material, rate):
+    return material.respond(start_up(rate), TIMES).sigma12
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """σ12 of fluids with an uncertain α, the one that made the data first, by run."""
+    return {
+        name: np.array([stress(Giesekus(a, 100.0), rate) for a in (0.3, *ALPHAS)])
+        for name, rate in RATES.items()
+    }
+
+
+def judged(drawn, held=None, exact=False):
+    """Return what is said of α = 0.3 where the held-out run is `held`, by default its own."""
+    generator = np.random.default_rng(1)
+    flows, predictions, bands = [], {}, {}
+    for name, rate in RATES.items():
+        kind = "held_out" if name == "held" else "training"
+        truth = held if kind == "held_out" and held is not None else drawn[name][0]
+        record = white(truth, 0.01, generator)
+        measured = record if kind == "training" else None
+        rates = np.full(len(TIMES), rate)
+        reference = {"sigma12": record}
+        flow = Flow(name, kind, protocol(rate), TIMES, rates, reference, measured)
+        flows.append(replace(flow, is_truth=exact))
+        predictions[flow.key] = {"sigma12": drawn[name][0]}
+        three = np.repeat(drawn[name][:, None, :, None], 3, axis=3)
+        bands[flow.key] = bands_of_predictions(three, [len(three)], [TIMES])[0]
+    outcome = LearnerOutcome("tensor_sindy", (), 1.0, EMPTY, predictions=predictions)
+    outcomes = {"tensor_sindy": outcome}
+    found = explain(outcomes, flows, Expectation())
+    assert found.verdict == "explained"
+    return hold_against_unseen(found, outcomes, flows, bands, Expectation())
+
+
+def test_a_law_that_holds_in_a_run_held_out_explains(drawn):
+    assert judged(drawn).verdict == "explained"
+
+
+def test_a_constant_that_is_a_little_off_is_no_refutation(drawn):
+    for row in drawn["held"][1:6]:
+        assert judged(drawn, row).verdict == "explained"
+
+
+def test_another_law_in_a_run_held_out_refutes_the_one_found(drawn):
+    other = stress(RoliePoly(1.0, 0.1, 100.0), RATES["held"])
+    found = judged(drawn, 0.9 * drawn["held"][0] + 0.1 * other)
+    assert found.verdict == "unexplained"
+    assert "runs held out are missed by" in found.lack_of_fit["tensor_sindy"].reason
+
+
+def test_a_law_that_runs_away_in_a_run_held_out_is_refuted(drawn):
+    gone = {**drawn, "held": np.full_like(drawn["held"], np.nan)}
+    found = judged(gone, drawn["held"][0])
+    assert found.verdict == "unexplained"
+    assert "runs away in held" in found.lack_of_fit["tensor_sindy"].reason
+
+
+def test_flows_of_which_the_truth_is_computed_do_not_judge(drawn):
+    other = stress(RoliePoly(1.0, 0.1, 100.0), RATES["held"])
+    assert judged(drawn, other, exact=True).verdict == "explained"

@@ -1,0 +1,73 @@
+"""Runs that no fit saw: a constant that is a little off is excused, a law that is wrong is not."""
+
+import numpy as np
+import pytest
+from independent import Giesekus, RoliePoly, start_up
+from independent.noise import white
+
+from discover.statistics.residual import Expectation
+from discover.statistics.unseen import Unseen, speak_against
+
+TIMES = np.geomspace(0.05, 10.0, 80)
+ALPHA, STEP = 0.3, 1e-3
+
+
+@pytest.fixture(scope="module")
+def responses():
+    """σ12 of Giesekus fluids near one another, and of another fluid, in a fast start-up."""
+    flow = start_up(3.0)
+    made = {a: Giesekus(a, 100.0).respond(flow, TIMES).sigma12 for a in (ALPHA, ALPHA + STEP)}
+    made["other"] = RoliePoly(1.0, 0.1, 100.0).respond(flow, TIMES).sigma12
+    return made
+
+
+def unseen(responses, uncertainty, off, extra=0.0, seed=0):
+    """Return what a fitted α leaves that is off by so many of its standard deviations."""
+    slope = (responses[ALPHA + STEP] - responses[ALPHA]) / STEP
+    exact = responses[ALPHA] + extra
+    record = white(exact, 0.01, np.random.default_rng(seed))
+    predicted = responses[ALPHA] + off * uncertainty * slope
+    return Unseen([predicted - record], [record], [(uncertainty * slope)[None]], np.ones(1))
+
+
+def against(one, expectation=None):
+    return speak_against(one, [], [], expectation or Expectation())
+
+
+@pytest.mark.parametrize("uncertainty", [1e-4, 1e-3, 3e-3])
+def test_a_constant_within_its_interval_is_no_missing_effect(responses, uncertainty):
+    for seed in range(15):
+        assert not against(unseen(responses, uncertainty, (-1) ** seed * 1.5, seed=seed))
+
+
+def test_a_constant_far_outside_its_interval_is_one(responses):
+    assert against(unseen(responses, 5e-3, 8.0))
+
+
+def test_what_stands_out_of_the_noise_is_no_prediction_though_a_constant_would_excuse_it(responses):
+    one = unseen(responses, 5e-2, 1.5)
+    assert one.moved()[1] > 0.01
+    assert against(one)
+
+
+def test_what_no_constant_makes_up_for_is_one(responses):
+    # a fortieth of the way to another fluid, about as large as the noise
+    extra = 0.025 * (responses["other"] - responses[ALPHA])
+    assert np.sqrt(np.mean(extra**2) / np.mean(responses[ALPHA] ** 2)) < 0.03
+    found = [against(unseen(responses, 1e-3, 0.0, extra, seed)) for seed in range(10)]
+    assert np.mean(found) >= 0.9
+
+
+def test_what_is_known_of_noise_and_of_the_linear_data_is_allowed(responses):
+    one = unseen(responses, 1e-3, 0.0, 0.025 * (responses["other"] - responses[ALPHA]))
+    assert against(one)
+    assert not against(one, Expectation(linear_error=0.03))
+    assert not against(one, Expectation(noise=0.05))
+
+
+def test_a_few_samples_decide_nothing(responses):
+    one = unseen(responses, 5e-3, 8.0)
+    few = Unseen(
+        [one.residuals[0][:6]], [one.records[0][:6]], [one.columns[0][:, :6]], one.correlation
+    )
+    assert not against(few)
