@@ -108,7 +108,7 @@ class _Walk:
         return [*head, np.ascontiguousarray(value).tobytes()] if content else head
 
     def _function(self, value: types.FunctionType) -> Iterable[bytes]:
-        _require_known(value.__module__)
+        require_known(value.__module__)
         cells = [cell.cell_contents for cell in value.__closure__ or ()]
         parts = [value.__code__, value.__defaults__, value.__kwdefaults__, cells]
         return [b"function", f"{value.__module__}:{value.__qualname__}".encode(),
@@ -153,13 +153,14 @@ def _hash(parts: Iterable[bytes]) -> bytes:
     return total.digest()
 
 
-def _require_known(module: str | None) -> None:
+def require_known(module: str | None) -> None:
+    """Refuse code of which no version says when it changes."""
     if (module or "").partition(".")[0] not in _VERSIONED:
         raise NotTold(f"code of {module}")
 
 
 def _name(kind: type) -> bytes:
-    _require_known(kind.__module__)
+    require_known(kind.__module__)
     if "<locals>" in kind.__qualname__:
         raise NotTold(f"the local class {kind.__qualname__}")
     return f"{kind.__module__}:{kind.__qualname__}".encode()

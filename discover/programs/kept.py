@@ -6,6 +6,7 @@ function is exported [`jax.export`] under a digest of what it was made from.
 
 import functools
 import logging
+import sys
 import threading
 import weakref
 from collections.abc import Callable, Sequence
@@ -17,7 +18,7 @@ import jax.export
 import numpy as np
 from jax.core import Tracer
 
-from discover.programs.fingerprint import NotTold, fingerprint
+from discover.programs.fingerprint import NotTold, fingerprint, require_known
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 
@@ -118,7 +119,12 @@ class Compiled(Generic[P, R]):
         except (NotTold, NotImplementedError, ValueError, TypeError) as reason:
             _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)
             return traced
-        call = jax.jit(exported.call)
+
+        def run(*arrays):
+            return exported.call(*arrays)
+
+        run.__name__ = self._function.__name__  # by which JAX files it
+        call = jax.jit(run)
 
         def found(args, kwargs, arrays):
             return put_together(nesting, iter(call(*arrays)))
@@ -126,11 +132,19 @@ class Compiled(Generic[P, R]):
         return found
 
     def _identity(self) -> bytes:
-        name = f"{self._function.__module__}:{self._function.__qualname__}"
-        if "<locals>" not in name:
-            return fingerprint(name, True)
+        """Return a digest of the function, which its name is only where it is found by it.
+
+        One made by another, such as ``jax.vmap(method)``, may bear the name of what it was made of.
+        """
+        module, name = self._function.__module__, self._function.__qualname__
+        found: Any = sys.modules.get(module)
+        for part in name.split("."):
+            found = getattr(found, part, None)
+        if found is self and self._made_from is None:
+            require_known(module)
+            return fingerprint((module, name), True)
         made_from = self._function if self._made_from is None else self._made_from
-        return fingerprint((name, made_from), True)
+        return fingerprint((module, name, made_from), True)
 
     def _export(self, args, kwargs, arrays) -> tuple[Any, bytes]:
         leaves, tree = jax.tree.flatten((args, kwargs))

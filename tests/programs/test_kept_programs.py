@@ -12,12 +12,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.run_batch import make_batch
+from discover.dataset import ShearRun
+from discover.effects import make_effect
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
 from discover.programs.fingerprint import NotTold, fingerprint
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
-from discover.protocols.shear import oscillatory_shear
+from discover.protocols.shear import oscillatory_shear, start_up
 from discover.simulate.solve import simulate, solve_batch
 from tensor_library.library import build_library
 
@@ -74,7 +79,7 @@ def test_without_a_cache_folder_the_answer_is_the_same(folder):
 
 
 def test_a_program_that_was_cut_short_or_altered_is_made_anew(folder):
-    double = compiled(_double)
+    double = compiled(_double, made_from="this test")
     np.testing.assert_array_equal(double(np.arange(3.0)), [0.0, 2.0, 4.0])
     (file,) = programs(folder)
     whole = file.read_bytes()
@@ -124,6 +129,21 @@ def _named(function):
     return function
 
 
+def test_models_that_share_every_shape_have_programs_of_their_own(folder):
+    # jax.vmap of a method bears the method's name, whatever its object holds
+    declared = DeclaredModel.maxwell(100.0, 1.0)
+    times = np.linspace(0.1, 2.0, 30)
+    run = ShearRun("a", times, start_up(2.0), np.full(30, 2.0), 100.0 * (1.0 - np.exp(-times)))
+    sizes = {}
+    for name in ("giesekus_mobility", "tool_compliance", "stress_offset", "tr(sigma)*sigma"):
+        model = AugmentedModel(declared, [make_effect(name)])
+        theta = model.zero()
+        theta[model.positions(name)] = 1e-3
+        sizes[name] = float(np.sum(model.residuals([theta], make_batch([run])) ** 2))
+    assert len(set(sizes.values())) == len(sizes)
+    assert len([path for path in programs(folder) if path.stat().st_size]) >= len(sizes)
+
+
 def test_arguments_are_told_by_kind_and_static_fields_by_value():
     first, second = (Fluid.dimensionless(make_law("giesekus", {"alpha": a})) for a in (0.1, 0.2))
     assert fingerprint(first, False) == fingerprint(second, False)
@@ -171,7 +191,7 @@ def test_it_is_pickled_by_its_name_as_a_function_is():
 
 
 def test_shapes_and_types_have_programs_of_their_own(folder):
-    double = compiled(_double)
+    double = compiled(_double, made_from="this test")
     for x in (np.arange(2.0), np.arange(3.0), np.arange(3), np.float64(1.0)):
         result = double(x)
         np.testing.assert_array_equal(result, 2.0 * x)
