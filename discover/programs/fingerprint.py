@@ -79,7 +79,7 @@ class _Walk:
             return [b"dtype", value.str.encode()]
         if isinstance(value, type):
             return [b"class", _name(value)]
-        if callable(value) and (named := _found_by_name(value)) is not None:
+        if callable(value) and (named := found_by_name(value)) is not None:
             return [b"named", named]
         if isinstance(value, types.FunctionType):
             return self._function(value)
@@ -108,7 +108,7 @@ class _Walk:
         return [*head, np.ascontiguousarray(value).tobytes()] if content else head
 
     def _function(self, value: types.FunctionType) -> Iterable[bytes]:
-        require_known(value.__module__)
+        _require_known(value.__module__)
         cells = [cell.cell_contents for cell in value.__closure__ or ()]
         parts = [value.__code__, value.__defaults__, value.__kwdefaults__, cells]
         return [b"function", f"{value.__module__}:{value.__qualname__}".encode(),
@@ -153,20 +153,20 @@ def _hash(parts: Iterable[bytes]) -> bytes:
     return total.digest()
 
 
-def require_known(module: str | None) -> None:
+def _require_known(module: str | None) -> None:
     """Refuse code of which no version says when it changes."""
     if (module or "").partition(".")[0] not in _VERSIONED:
         raise NotTold(f"code of {module}")
 
 
 def _name(kind: type) -> bytes:
-    require_known(kind.__module__)
+    _require_known(kind.__module__)
     if "<locals>" in kind.__qualname__:
         raise NotTold(f"the local class {kind.__qualname__}")
     return f"{kind.__module__}:{kind.__qualname__}".encode()
 
 
-def _found_by_name(value: Any) -> bytes | None:
+def found_by_name(value: Any) -> bytes | None:
     """Return the name by which a known package holds this very object; None if none does."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if not isinstance(module, str) or not isinstance(name, str):

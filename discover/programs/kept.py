@@ -6,7 +6,6 @@ function is exported [`jax.export`] under a digest of what it was made from.
 
 import functools
 import logging
-import sys
 import threading
 import weakref
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ import jax.export
 import numpy as np
 from jax.core import Tracer
 
-from discover.programs.fingerprint import NotTold, fingerprint, require_known
+from discover.programs.fingerprint import NotTold, fingerprint, found_by_name
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 
@@ -136,15 +135,11 @@ class Compiled(Generic[P, R]):
 
         One made by another, such as ``jax.vmap(method)``, may bear the name of what it was made of.
         """
-        module, name = self._function.__module__, self._function.__qualname__
-        found: Any = sys.modules.get(module)
-        for part in name.split("."):
-            found = getattr(found, part, None)
-        if found is self and self._made_from is None:
-            require_known(module)
-            return fingerprint((module, name), True)
+        name = f"{self._function.__module__}:{self._function.__qualname__}"
+        if self._made_from is None and found_by_name(self) is not None:
+            return fingerprint(name, True)
         made_from = self._function if self._made_from is None else self._made_from
-        return fingerprint((module, name, made_from), True)
+        return fingerprint((name, made_from), True)
 
     def _export(self, args, kwargs, arrays) -> tuple[Any, bytes]:
         leaves, tree = jax.tree.flatten((args, kwargs))

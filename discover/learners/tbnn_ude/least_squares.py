@@ -163,14 +163,14 @@ class Stopping:
         return not misfit < _FAR_BEHIND * self.pace[min(self.steps, len(self.pace)) - 1]
 
 
-@compiled
+@eqx.filter_jit
 def first_state(linearised: Linearised):
     """Return the solver's state before the first step."""
     rows, aux = eqx.filter_eval_shape(linearised, linearised.weights)
     return _SOLVER.init(linearised, linearised.weights, None, {}, rows, aux, frozenset())
 
 
-@compiled
+@eqx.filter_jit
 def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
     """Return the best weights and the solver's state after one more step.
 

@@ -107,7 +107,7 @@ class Trained:
     passed_over: tuple[int, ...] = ()
 
 
-@compiled
+@eqx.filter_jit
 def initial_law(
     key: PRNGKeyArray,
     width: int,

@@ -18,7 +18,6 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.programs import compiled
 
 Progress = Callable[[int, int, float], None]
 
@@ -94,7 +93,7 @@ def paper_loss(
     )
 
 
-@compiled
+@eqx.filter_jit
 def _iterate(network, state, law, problem, active, penalty, rate):
     optimiser = optax.adam(rate, 0.9, 0.999)
     static = eqx.filter(network, eqx.is_inexact_array, inverse=True)

@@ -136,7 +136,7 @@ def _start(rebuild):
     return weights_of(rebuild.template)[rebuild.positions] / rebuild.scale
 
 
-@compiled
+@eqx.filter_jit
 def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork:
     """Return the law with these numbers, by one compiled program."""
     return rebuild(weights)
