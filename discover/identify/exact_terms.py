@@ -6,7 +6,7 @@ points of a large set is zero, but for a probability of degree over size of the 
 1980, J. ACM 27, 701]).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -80,36 +80,34 @@ def exact_terms(
         "gammadot": (zero, zero, zero, rate, rate),
     }
 
-    def trace(name: str) -> Any:
-        value = _word(name.removeprefix("tr(").removesuffix(")"), tensors)
-        return value[0] + value[1] + value[2]
-
-    invariants = _lazily(trace)
-    bases = _lazily(lambda name: _sum([_word(word, tensors) for word in name.split("+")]))
+    # only what the terms need: a product of series is dear
+    used = {
+        name
+        for term in terms
+        for name, power in zip(INVARIANT_NAMES, term.powers, strict=True)
+        if power
+    }
+    invariants = {
+        name: sum(_word(name.removeprefix("tr(").removesuffix(")"), tensors)[:3], zero)
+        for name in used
+    }
+    bases = {
+        name: _sum([_word(word, tensors) for word in name.split("+")])
+        for name in {TENSOR_NAMES[term.tensor] for term in terms}
+    }
     values: list[Components] = []
     for term in terms:
         scalar = one
         for name, power in zip(INVARIANT_NAMES, term.powers, strict=True):
             for _ in range(power):
-                scalar = scalar * invariants(name)
+                scalar = scalar * invariants[name]
         if term.closed_form is not None:
             if form_values is None:
                 raise ValueError(f"The term {term.name} is not a polynomial; give form_values.")
             scalar = scalar * form_values[term.closed_form]
-        b11, b22, b33, b12, _ = bases(TENSOR_NAMES[term.tensor])
+        b11, b22, b33, b12, _ = bases[TENSOR_NAMES[term.tensor]]
         values.append((scalar * b11, scalar * b22, scalar * b33, scalar * b12))
     return values
-
-
-def _lazily(function: Callable[[str], Any]) -> Callable[[str], Any]:
-    known: dict[str, Any] = {}
-
-    def look_up(name: str) -> Any:
-        if name not in known:
-            known[name] = function(name)
-        return known[name]
-
-    return look_up
 
 
 def _sum(words: list[tuple[Any, ...]]) -> tuple[Any, ...]:
