@@ -152,8 +152,6 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
 
-    import jax
-
     from discover.learners.tbnn_ude import TBNNUDE
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.precision import enable_x64
@@ -181,8 +179,7 @@ def main() -> None:
             return model.fit(data.runs).law_
 
         print(case, flush=True)
-        forget_programs()
-        jax.clear_caches()  # or a case would find the programs of the one before
+        forget_programs()  # or a case would find those of the one before
         clocked("default, compiling included", lambda: fitted("default"))
         clocked("default", lambda: fitted("default"))
         clocked(

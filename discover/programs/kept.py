@@ -5,6 +5,7 @@ function is exported [`jax.export`] under a digest of what it was made from.
 """
 
 import functools
+import itertools
 import logging
 import threading
 import weakref
@@ -18,6 +19,7 @@ import numpy as np
 from jax.core import Tracer
 
 from discover.programs.fingerprint import NotTold, fingerprint, found_by_name
+from discover.programs.room import drop_all, is_crowded
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 
@@ -30,6 +32,9 @@ _LOGGER = logging.getLogger(__name__)
 _UNPROMISED = [jax.export.DisabledSafetyCheck.custom_call("lapack_dormqr_ffi")]
 
 _ALL: weakref.WeakSet = weakref.WeakSet()
+
+_made_so_far = itertools.count(1)
+_LOOK_EVERY = 50  # programs: to count what is mapped takes some 10 ms
 
 
 def compiled(function: Callable[P, R], made_from: Any = None) -> "Compiled[P, R]":
@@ -51,9 +56,10 @@ def compiled(function: Callable[P, R], made_from: Any = None) -> "Compiled[P, R]
 
 
 def forget_programs() -> None:
-    """Let this process start anew, as after ``jax.clear_caches()``; files stay."""
-    for one in _ALL:
+    """Let this process start anew, without a program; files stay."""
+    for one in list(_ALL):
         one.forget()
+    drop_all()
 
 
 class Compiled(Generic[P, R]):
@@ -105,6 +111,9 @@ class Compiled(Generic[P, R]):
         def traced(args, kwargs, arrays):
             return self._traced(*args, **kwargs)
 
+        if next(_made_so_far) % _LOOK_EVERY == 0 and is_crowded():
+            _LOGGER.debug("programs are dropped to make room for others")
+            forget_programs()
         if folder is None:
             return traced
         try:
