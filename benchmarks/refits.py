@@ -18,7 +18,7 @@ import numpy as np
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 
-LANES = 8
+JOBS_AT_ONCE = 8
 
 
 def recorded(library, data) -> list[tuple]:
@@ -48,9 +48,9 @@ def batches(call):
     keeps = [everything] * len(supports) if keeps is None else keeps
     jobs = list(zip(supports, starts, keeps, strict=True))
     nothing = ((), starts[0], everything)
-    for first in range(0, len(jobs), LANES):
-        some = jobs[first : first + LANES]
-        padded = [*some, *[nothing] * (LANES - len(some))]
+    for first in range(0, len(jobs), JOBS_AT_ONCE):
+        some = jobs[first : first + JOBS_AT_ONCE]
+        padded = [*some, *[nothing] * (JOBS_AT_ONCE - len(some))]
         laid_out = [_lay_out(problem, s, begin, scale, slots, keep) for s, begin, keep in padded]
         layouts, begins = jax.tree.map(lambda *leaves: jnp.stack(leaves), *laid_out)
         yield layouts, begins, len(some)

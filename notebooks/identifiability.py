@@ -93,10 +93,10 @@ find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 # The experiment expected to separate the laws that remain, at the noise at hand; then we run it.
 
 # %%
+from discover.identify.experiment_outcome import judge_laws
 from discover.identify.experiments import candidate_experiments
 from discover.identify.many_laws import Contender
 from discover.identify.next_experiment import propose_experiments
-from discover.identify.weigh import weigh
 
 maxwell = Fluid.dimensionless(UpperConvectedMaxwell())
 covariance = np.array(model.uncertainty_.covariance)
@@ -122,7 +122,7 @@ noise = {
 }
 rng = np.random.default_rng(0)
 measured = {q: exact[q] + noise[q] * rng.normal(size=exact[q].size) for q in best.observed}
-table_of(weigh(laws, maxwell, best.experiment, measured, noise))
+table_of(judge_laws(laws, maxwell, best.experiment, measured, noise))
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")

@@ -16,7 +16,7 @@ from uuid import uuid4
 from discover.batch.progress import now_and_then
 from discover.batch.status import StudyStatus
 from discover.errors import InputError
-from discover.last_words import last_words
+from discover.stop_callbacks import on_stop
 
 if TYPE_CHECKING:  # dask is optional
     from distributed import LocalCluster
@@ -120,7 +120,7 @@ def _local_client(workers: int) -> Iterator[Any]:
             process.kill()
 
     # looking at every thread's stack a hundred times a second is paid for by the work
-    with last_words(kill_workers), dask.config.set({"distributed.worker.profile.enabled": False}):
+    with on_stop(kill_workers), dask.config.set({"distributed.worker.profile.enabled": False}):
         # the cluster's threads start every worker, so what they cannot hear no worker hears
         with _deaf_to_interrupts():
             cluster = _start(workers, others)

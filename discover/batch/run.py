@@ -12,7 +12,7 @@ from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, Progress, nothing_to_note, run_close_loop, run_compare
 from discover.errors import InputError, plain_os_error
-from discover.last_words import last_words
+from discover.stop_callbacks import on_stop
 from discover.study.atomic import make_folder
 from discover.study.read import read_study
 
@@ -71,7 +71,7 @@ def run_batch(
         so_far.end(position, status)
 
     try:
-        with last_words(summary.write_ended):
+        with on_stop(summary.write_ended):
             if workers == 1 and scheduler is None:
                 for i, job in enumerate(jobs):
                     end(i, run_one(*job, progress=partial(so_far.say, i)))

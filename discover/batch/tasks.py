@@ -108,7 +108,7 @@ def run_compare(
     from discover.report.comparison_report import write_comparison
     from discover.report.comparison_verdict import comparison_verdict
 
-    comparison = compare(study, seed, progress, folder, settle=fit_declared)
+    comparison = compare(study, seed, progress, folder, fit_constants=fit_declared)
     write_comparison(comparison, folder, study.model.known_relaxation, study.text)
     return _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
 

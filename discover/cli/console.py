@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import typer
 
-from discover.last_words import last_words
+from discover.stop_callbacks import on_stop
 
 Report = Callable[[str, float], None]
 
@@ -50,7 +50,7 @@ def progress_bar(quiet: bool) -> Iterator[Report]:
         TextColumn("{task.fields[left]}"),
         TextColumn("{task.description}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar, last_words(bar.stop):
+    with Progress(*columns, console=console, transient=True) as bar, on_stop(bar.stop):
         task = bar.add_task("starting", total=1.0, left="")
 
         def report(label: str, fraction: float) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from discover.cli.console import say_error
-from discover.last_words import say_last_words
+from discover.stop_callbacks import run_stop_callbacks
 
 INTERRUPTED = (
     "interrupted. What was finished is kept; to go on from there, run the same command again."
@@ -51,7 +51,7 @@ def obeying_interrupts() -> Iterator[None]:
         while heard := ear.recv(1):
             if heard[0] == signal.SIGINT:
                 # the main thread may have stopped where it holds what these want
-                words = threading.Thread(target=say_last_words, daemon=True)
+                words = threading.Thread(target=run_stop_callbacks, daemon=True)
                 words.start()
                 words.join(_PATIENCE)
                 _leave()

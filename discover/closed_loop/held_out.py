@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit, jacobians
-from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.run_batch import RunBatch
 from discover.statistics import least_squares_covariance
 from discover.statistics.unseen import Unseen
@@ -28,7 +28,7 @@ class HeldOut:
     """
 
     residual: Float[np.ndarray, "runs n"]
-    resolution: Resolution
+    resolution: NumericalResolution
     unseen: Unseen
 
     @property
@@ -38,7 +38,11 @@ class HeldOut:
 
 
 def held_out(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, theta: np.ndarray, resolution: Resolution
+    model: AugmentedModel,
+    batch: RunBatch,
+    fit: Fit,
+    theta: np.ndarray,
+    resolution: NumericalResolution,
 ) -> HeldOut:
     """Return what a final model leaves of runs that no fit saw.
 

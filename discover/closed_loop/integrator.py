@@ -121,7 +121,7 @@ def integrate(
         return change + stress if linear_relaxation else change
 
     def step(carry, inputs):
-        stress, levels, missing, given_way = carry
+        stress, levels, missing, compliance_rate = carry
         (first_rate, middle_rate, last_rate), h, parts = inputs
         w = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
         half, full, a21, a31, a32, a41, a43, b1, b23, b4 = w
@@ -135,16 +135,18 @@ def integrate(
         slow_middle = _combined("time_factor", states, [p[0] for p in predicted])
         slow_last = _combined("time_factor", states, [p[1] for p in predicted])
 
-        n1 = remainder(stress, first_rate + given_way, slow_first)
+        n1 = remainder(stress, first_rate + compliance_rate, slow_first)
         if series is not None:
             scale_last = _combined("modulus_factor", states, [p[1] for p in predicted])
-            n1, given_way = _give_way(
-                series, modes, scale_last, stress, shear_before, missing, given_way, n1, w,
+            n1, compliance_rate = _compliance_rate(
+                series, modes, scale_last, stress, shear_before, missing, compliance_rate, n1, w,
                 first_rate, last_rate, h, times[-1],
             )  # fmt: skip
-        n2 = remainder(half * stress + a21 * n1, middle_rate + given_way, slow_middle)
-        n3 = remainder(half * stress + a31 * n1 + a32 * n2, middle_rate + given_way, slow_middle)
-        n4 = remainder(full * stress + a41 * n1 + a43 * n3, last_rate + given_way, slow_last)
+        n2 = remainder(half * stress + a21 * n1, middle_rate + compliance_rate, slow_middle)
+        n3 = remainder(
+            half * stress + a31 * n1 + a32 * n2, middle_rate + compliance_rate, slow_middle
+        )
+        n4 = remainder(full * stress + a41 * n1 + a43 * n3, last_rate + compliance_rate, slow_last)
         after = full * stress + b1 * n1 + b23 * (n2 + n3) + b4 * n4
 
         # the states once more, now with the mean of the stress at both ends
@@ -153,17 +155,17 @@ def integrate(
             guess = _combined("modulus_factor", states, [p[1] for p in predicted]) * shear_after
             middle_stress = 0.5 * (shear_before + guess)
             levels = tuple(
-                _relax(e, v, s, middle_rate + given_way, middle_stress, h)
+                _relax(e, v, s, middle_rate + compliance_rate, middle_stress, h)
                 for (e, v), s in zip(states.items(), levels, strict=True)
             )
             shear_after = _combined("modulus_factor", states, levels) * shear_after
         if series is not None:
             torque = 0.5 * (
                 shear_before + shear_after
-                + series.viscosity * (first_rate + last_rate + 2.0 * given_way)
+                + series.viscosity * (first_rate + last_rate + 2.0 * compliance_rate)
             )  # fmt: skip
-            missing = missing + given_way * h + series.slip * h * torque
-        return (after, levels, missing, given_way), (shear_after, given_way)
+            missing = missing + compliance_rate * h + series.slip * h * torque
+        return (after, levels, missing, compliance_rate), (shear_after, compliance_rate)
 
     zero = jnp.zeros(())
     start = (
@@ -173,16 +175,16 @@ def integrate(
         zero,
     )
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
-    _, (stress, given_way) = jax.lax.scan(step, start, (rates, width, tuple(weights)))
+    _, (stress, compliance_rate) = jax.lax.scan(step, start, (rates, width, tuple(weights)))
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides
-        inside = 0.5 * (given_way[1:] + given_way[:-1])
-        felt = felt + jnp.concatenate([given_way[:1], inside, given_way[-1:]])
+        inside = 0.5 * (compliance_rate[1:] + compliance_rate[:-1])
+        felt = felt + jnp.concatenate([compliance_rate[:1], inside, compliance_rate[-1:]])
     return jnp.concatenate([jnp.zeros(1), stress]), felt
 
 
-def _give_way(
+def _compliance_rate(
     series, modes, scale, stress, before, missing, earlier, n1, w, first_rate, last_rate, h, end
 ):
     """Return the slope with it, and the rate that the series elements take in this step.

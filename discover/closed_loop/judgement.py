@@ -8,8 +8,8 @@ import numpy as np
 
 from discover.closed_loop.held_out import HeldOut
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.leftover import Leftover
 from discover.closed_loop.result import RunRecord, Verdict
+from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import (
     FEWEST_FAST,
@@ -17,7 +17,7 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
-from discover.statistics.unseen import CARRIED, speak_against
+from discover.statistics.unseen import CARRIED, refutes
 from discover.statistics.whiteness import SIGNIFICANCE
 
 Silence = Literal["records", "fluid"]
@@ -59,7 +59,7 @@ class Judgement:
 
 
 def judge(
-    leftover: Leftover,
+    tolerated: ToleratedMisfit,
     fit: Fit,
     active: Sequence[str],
     records: Sequence[RunRecord],
@@ -71,7 +71,7 @@ def judge(
 
     Parameters
     ----------
-    leftover
+    tolerated
         What a complete model may leave of the fitted runs.
     fit, active
         The final fit and the effects in it.
@@ -85,14 +85,14 @@ def judge(
         Fitted runs that are taken as starting from rest and cannot have started so. What came
         before them looks like an effect, so no effect that explains them is believed.
     """
-    expectation, weight = leftover.expectation, leftover.weight
-    left = leftover.left(fit.residual)
-    error, expected, given = left.misfit, left.expected, leftover.noise_known
+    expectation, weight = tolerated.expectation, tolerated.weight
+    left = tolerated.left(fit.residual)
+    error, expected, given = left.misfit, left.expected, tolerated.noise_known
     plain = not given or left.verdict != "unexplained"
-    explained = plain or leftover.explained(fit, active)
+    explained = plain or tolerated.explained(fit, active)
     # steps are computed on only where noise alone does not explain what is left
     asked = float("inf") if plain else error
-    resolution = leftover.resolution.limit(fit.theta, active, asked)
+    resolution = tolerated.resolution.limit(fit.theta, active, asked)
     known = given or error <= STRUCTURE * resolution
     missed_held_out = _error([record for record in records if record.held_out])
     carries_over = held is None or missed_held_out <= CARRIED * max(error, expected, resolution)
@@ -104,8 +104,8 @@ def judge(
         # and a few samples, off by chance, decide nothing
         carries_over |= tells_noise(weight) and not tells_noise(held.weight)
     pattern = False
-    if held is not None and explained and carries_over and leftover.noise_known:
-        pattern = _speak_against(leftover, fit, held, plain)
+    if held is not None and explained and carries_over and tolerated.noise_known:
+        pattern = _refuted_by(tolerated, fit, held, plain)
     if held is not None and pattern:
         limit = held.resolution.limit(fit.theta, active, missed_held_out)
         # what arithmetic did to the fitted runs, constants carry over
@@ -192,16 +192,16 @@ def judge(
     return Judgement(verdict, structured, left, resolution, known, carries_over, short, worst, text)
 
 
-def _speak_against(leftover: Leftover, fit: Fit, held: HeldOut, together: bool) -> bool:
+def _refuted_by(tolerated: ToleratedMisfit, fit: Fit, held: HeldOut, together: bool) -> bool:
     """Return whether runs that no fit saw say that something is missing.
 
     The fitted ones have a voice too where noise explains them, and not arithmetic alone.
     """
-    weight = leftover.weight if together else leftover.weight[:0]
+    weight = tolerated.weight if together else tolerated.weight[:0]
     seen = [w > 0 for w in weight]
     rows = [r[s] / w[s] for r, w, s in zip(fit.residual, weight, seen, strict=False)]
-    records = [r[s] for r, s in zip(leftover.records, seen, strict=False)]
-    return speak_against(held.unseen, rows, records, leftover.expectation)
+    records = [r[s] for r, s in zip(tolerated.records, seen, strict=False)]
+    return refutes(held.unseen, rows, records, tolerated.expectation)
 
 
 def _error(records: Sequence[RunRecord]) -> float:

@@ -19,14 +19,14 @@ from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredMode
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
-from discover.closed_loop.kept_search import Keeper, Store
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import LoopResult, Stage, StageParameter
 from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
+from discover.closed_loop.search_checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.silence import fluid_is_silent, records_are_silent
+from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import ShearDataset, ShearRun
 from discover.dataset.check_start import doubts_of_start
 from discover.dataset.run import same_samples
@@ -137,8 +137,8 @@ def run_loop(
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    leftover = Leftover(
-        Expectation(noise, declared.linear_error), Resolution(model, batch, fitted_runs)
+    tolerated = ToleratedMisfit(
+        Expectation(noise, declared.linear_error), NumericalResolution(model, batch, fitted_runs)
     )
     search = Search(
         model,
@@ -146,8 +146,8 @@ def run_loop(
         held_batch,
         len(candidates),
         _admission(fitted_runs, held_runs),
-        leftover,
-        Keeper(store, name),
+        tolerated,
+        SearchCheckpoint(store, name),
     )
     silent = records_are_silent(fitted_runs)
     if silent:
@@ -176,7 +176,7 @@ def run_loop(
     after = errors_of(records, len(thetas) - 1)
     held = None
     if held_batch is not None:
-        unseen = Resolution(model, held_batch, held_runs)
+        unseen = NumericalResolution(model, held_batch, held_runs)
         held = predict_held_out(model, batch, current, thetas[-1], unseen)
     # as they were recorded: a window of strain may have cut their start off
     whole = dataset.select([run.name for run in fitted_runs]).runs
@@ -184,7 +184,7 @@ def run_loop(
     silence: Silence | None = "records" if silent else None
     if not silent and fluid_is_silent(model, batch, current, active):
         silence = "fluid"
-    judgement = judge(leftover, current, active, records, held, silence, mistaken)
+    judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
     return LoopResult(
         verdict=judgement.verdict,
@@ -354,7 +354,7 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
     linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
     if linear.active and linear.explained:
         search.adopt(linear)
-        search.keeper.save(search)
+        search.checkpoint.save(search)
 
 
 def _with_refusals(judgement: Judgement, search: Search) -> str:

@@ -20,7 +20,6 @@ from discover.closed_loop.augment import (
     taken_out,
 )
 from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.kept_search import Keeper
 from discover.closed_loop.least_squares import (
     NO_PRIOR,
     Fit,
@@ -29,11 +28,12 @@ from discover.closed_loop.least_squares import (
     jacobians,
     left_out_errors,
 )
-from discover.closed_loop.leftover import Leftover
 from discover.closed_loop.mode_dependence import names_not_needed
+from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.physical_range import at_an_end, undetermined
-from discover.closed_loop.resolution import Resolution
 from discover.closed_loop.run_batch import RunBatch, make_batch
+from discover.closed_loop.search_checkpoint import SearchCheckpoint
+from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import ShearRun
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
@@ -66,9 +66,9 @@ class Search:
         Number of candidates, the price of choosing among which every effect must pay.
     admitted
         Which effects are candidates.
-    leftover
+    tolerated
         What a complete model may leave of the data.
-    keeper
+    checkpoint
         Keeps the search after each stage; by default nothing is kept.
 
     Attributes
@@ -107,14 +107,14 @@ class Search:
         held_batch: RunBatch | None,
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
-        leftover: Leftover,
-        keeper: Keeper | None = None,
+        tolerated: ToleratedMisfit,
+        checkpoint: SearchCheckpoint | None = None,
     ):
-        self.keeper = keeper or Keeper(None, "")
+        self.checkpoint = checkpoint or SearchCheckpoint(None, "")
         self.rounds = 0
         self.model, self.batch, self.held_batch = model, batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
-        self.leftover = leftover
+        self.tolerated = tolerated
         self.active: list[str] = []
         self.settled: tuple[str, ...] = ()
         self.rankings: list[tuple[CandidateScore, ...]] = []
@@ -158,7 +158,7 @@ class Search:
     @property
     def explained(self) -> bool:
         """Whether what is left is what a complete model may leave."""
-        return self.leftover.explained(self.fit, self.active)
+        return self.tolerated.explained(self.fit, self.active)
 
     def restricted(
         self, runs: Sequence[ShearRun], admitted: Callable[[AbstractEffect], bool], name: str
@@ -171,13 +171,13 @@ class Search:
             None,
             self.n_candidates,
             admitted,
-            self.leftover.on(Resolution(self.model, batch, runs)),
-            Keeper(self.keeper.store, f"{self.keeper.name}_{name}"),
+            self.tolerated.on(NumericalResolution(self.model, batch, runs)),
+            SearchCheckpoint(self.checkpoint.store, f"{self.checkpoint.name}_{name}"),
         )
 
     def resume(self) -> bool:
         """Go on from the last stage that was kept, and return whether there was one."""
-        return self.keeper.restore(self)
+        return self.checkpoint.restore(self)
 
     def start(self) -> None:
         """Fit the declared model; an unknown relaxation time from several starts.
@@ -219,7 +219,7 @@ class Search:
                 break
             self.rounds = 0
             say(f"no finding: {self.not_named[refused]}")
-            self.keeper.save(self)
+            self.checkpoint.save(self)
         if look_ahead:
             self._hold_against_modes(say)
         for name in self.active:
@@ -286,12 +286,12 @@ class Search:
                     say("no further candidate earns its place")
                     break
                 say(f"{name}: error {self.error:.4f}, runs left out {self.left_out:.4f}")
-                self.keeper.save(self)
+                self.checkpoint.save(self)
             self.rounds += 1
             if not self.reexamine():
                 break
             say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
-            self.keeper.save(self)
+            self.checkpoint.save(self)
         dropped = self._drop_undecided()
         if dropped:
             # not kept: a search that goes on from before drops the same again
@@ -411,7 +411,7 @@ class Search:
         best = simplest(able, self.model)
         if (best.candidate.evidence or 0.0) < (current.evidence or 0.0):
             best = own_choice
-        explained = self.leftover.explained(best.fit, [*others, best.candidate.effect])
+        explained = self.tolerated.explained(best.fit, [*others, best.candidate.effect])
         gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
         if name in self.settled and not (explained and gain > self.support[name]):
             return False
@@ -459,7 +459,7 @@ class Search:
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         # what cannot be told from noise gives no reason to add anything
-        if chosen is None or self.leftover.random(self.fit, self.active):
+        if chosen is None or self.tolerated.random(self.fit, self.active):
             return None
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases

@@ -45,7 +45,7 @@ def compare(
     seed: int | None = None,
     progress: Progress = silent,
     store: RunFolder | None = None,
-    settle: Callable[[DeclaredModel, ShearDataset], DeclaredModel] | None = None,
+    fit_constants: Callable[[DeclaredModel, ShearDataset], DeclaredModel] | None = None,
     *,
     data: StudyData | None = None,
     declared: DeclaredModel | None = None,
@@ -64,7 +64,7 @@ def compare(
         Called with what is going on and the fraction done.
     store
         Where finished learners are kept and found again.
-    settle
+    fit_constants
         Fits what the declared law leaves open; without it, open parameters are an error.
     data, declared
         Data and known part that are at hand, in place of the study's.
@@ -84,7 +84,7 @@ def compare(
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
-    model = declared if settle is None else settle(declared, data.fit)
+    model = declared if fit_constants is None else fit_constants(declared, data.fit)
     require_numbers(model)
     following_options = options.next
     grid = itertools.product(

@@ -11,7 +11,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.identify.bands import PredictionBand
 from discover.statistics import LackOfFit, noise_model
 from discover.statistics.residual import STRUCTURE, Expectation
-from discover.statistics.unseen import CARRIED, Unseen, speak_against
+from discover.statistics.unseen import CARRIED, Unseen, refutes
 
 _HALF_BAND = 1.96  # standard deviations
 
@@ -80,7 +80,7 @@ def _refuted(
     known = [np.asarray(flow.measured, dtype=float) for flow in training]
     against = Unseen(residuals, records, columns, noise_model(fitted).correlation)
     told = all(len(column) for column in columns)  # how uncertain the constants are
-    if told and speak_against(against, fitted, known, expectation):
+    if told and refutes(against, fitted, known, expectation):
         return (
             f"runs held out are missed by {100 * missed:.2g} %, more than noise and uncertain "
             "constants leave"

@@ -5,7 +5,7 @@ from discover.identify.exact_series import Agreement, compare_series, stress_ser
 from discover.identify.fitted_twins import fit_twins
 from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.identify.histories import Difference, differences, random_histories
-from discover.identify.lanes import LawTerms
+from discover.identify.laws_side_by_side import LawTerms
 from discover.identify.physics import PhysicsCheck, PhysicsReport, check_physics
 from discover.identify.relations import TermRelation, term_relations
 from discover.identify.rivals import FittedRival, RivalTable, find_rivals

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.identify.histories import SAME, random_histories
-from discover.identify.lanes import LawTerms, dense, joint_library, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, dense, joint_library, shear_stresses
 from discover.identify.twins import Twin, find_twins
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell

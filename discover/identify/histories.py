@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.lanes import LawTerms, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, shear_stresses
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.shear import (
     ShearProtocol,

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from discover.identify.evidence import LEVEL, Evidence, compare_residuals
-from discover.identify.lanes import LawTerms
+from discover.identify.laws_side_by_side import LawTerms
 from discover.identify.relations import spell
 from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch

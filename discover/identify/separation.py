@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from discover.identify.histories import observe_differences, random_histories
-from discover.identify.lanes import LawTerms, extensional_stresses, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, extensional_stresses, shear_stresses
 from discover.laws.base import AbstractConstitutiveLaw
 from tensor_library.library import TermLibrary
 

@@ -22,7 +22,7 @@ from discover.dataset.run import ShearRun
 from discover.identify.directions import Direction, weak_directions
 from discover.identify.exact_series import compare_series
 from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
-from discover.identify.lanes import LawTerms, dense, joint_library
+from discover.identify.laws_side_by_side import LawTerms, dense, joint_library
 from discover.identify.relations import TermRelation, spell, term_relations
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion

@@ -27,7 +27,7 @@ from discover.identify.exact_series import (
     solve_for_coefficient,
 )
 from discover.identify.histories import SAME, Difference, differences
-from discover.identify.lanes import LawTerms, joint_library
+from discover.identify.laws_side_by_side import LawTerms, joint_library
 from discover.identify.relations import feels_33, spell, term_relations
 from discover.identify.separation import Separation, separations
 from discover.laws.base import AbstractConstitutiveLaw

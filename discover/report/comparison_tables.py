@@ -17,9 +17,9 @@ from discover.report.wording import (
     RULES,
     interval,
     known,
+    readable,
     selection_sentence,
     significant,
-    spoken,
 )
 
 _COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
@@ -106,7 +106,7 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for fit in comparison.classical:
         constants = ", ".join(
-            f"{spoken(name)} = {significant(value, 3)}" for name, value in fit.parameters.items()
+            f"{readable(name)} = {significant(value, 3)}" for name, value in fit.parameters.items()
         )
         rows.append(
             {
@@ -195,7 +195,7 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
         cells, inner = [], []
         if name in truth and truth[name].inner:
             inner += [
-                f"truth: {spoken(key)} = {significant(value)}"
+                f"truth: {readable(key)} = {significant(value)}"
                 for key, value in truth[name].inner.items()
             ]
         for learner, outcome in comparison.outcomes.items():
@@ -210,12 +210,12 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
             )
             if term is not None:
                 inner += [
-                    f"{LEARNER_TITLES[learner]}: {spoken(key)} = {significant(value)}"
+                    f"{LEARNER_TITLES[learner]}: {readable(key)} = {significant(value)}"
                     + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
                     for key, value in term.inner.items()
                 ]
                 inner += [
-                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {spoken(key)} = "
+                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {readable(key)} = "
                     f"{significant(value)} ({interval((low, high))})"
                     for key, (value, low, high) in term.inner_at_one.items()
                 ]
@@ -274,7 +274,7 @@ def distillations(comparison: Comparison) -> list[dict[str, Any]]:
     """Return what simpler laws learn from the true one."""
 
     def values(parameters: Mapping[str, float]) -> str:
-        return ", ".join(f"{spoken(k)} = {significant(v)}" for k, v in parameters.items())
+        return ", ".join(f"{readable(k)} = {significant(v)}" for k, v in parameters.items())
 
     return [
         {
@@ -292,7 +292,7 @@ def structure(comparison: Comparison) -> dict[str, Any] | None:
     """Return what the training flows could tell of the library; None where not looked at."""
     if comparison.structure is None:
         return None
-    relations = [spoken(relation.text) for relation in comparison.structure.relations]
+    relations = [readable(relation.text) for relation in comparison.structure.relations]
     return {"text": comparison.structure.text, "relations": relations}
 
 

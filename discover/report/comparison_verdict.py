@@ -9,9 +9,9 @@ from discover.report.wording import (
     LEARNERS,
     SYMBOLS,
     percent,
+    readable,
     sentence,
     significant,
-    spoken,
     terms_text,
     worst,
 )
@@ -62,7 +62,7 @@ def _found(comparison: Comparison) -> str:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         parts.append(
             f"put into words, the neural network's largest term is "
-            f"{significant(largest.coefficient)} {spoken(largest.term)}"
+            f"{significant(largest.coefficient)} {readable(largest.term)}"
         )
     elif network is not None and "tbnn_ude" in explanation.by:
         parts.append("put into words, the neural network found no term")
@@ -112,8 +112,8 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     found = {t.term for t in sparse.terms}
     if found == wanted:
         return f"{text}, exactly the terms of the law that made the data"
-    missing = ", ".join(map(spoken, sorted(wanted - found))) or "nothing"
-    extra = ", ".join(map(spoken, sorted(found - wanted))) or "nothing"
+    missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
+    extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
     return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
 
 

@@ -12,7 +12,14 @@ from markupsafe import Markup
 
 from discover import __version__
 from discover.report.palette import style_sheet
-from discover.report.wording import estimate, interval, percent, percent_range, significant, spoken
+from discover.report.wording import (
+    estimate,
+    interval,
+    percent,
+    percent_range,
+    readable,
+    significant,
+)
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -86,7 +93,7 @@ def _environment() -> Environment:
         significant=significant,
         interval=interval,
         estimate=estimate,
-        spoken=spoken,
+        readable=readable,
         safe_svg=Markup,
         as_link=_as_link,
     )

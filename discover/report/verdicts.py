@@ -10,9 +10,9 @@ from discover.report.wording import (
     estimate,
     interval,
     percent,
+    readable,
     sentence,
     significant,
-    spoken,
 )
 from discover.statistics.residual import FEWEST_TESTED
 
@@ -55,7 +55,7 @@ def _loop_found(result: LoopResult) -> str:
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
-            f"{spoken(name.replace('_', ' '))} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+            f"{readable(name.replace('_', ' '))} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
             + f" (95 % {interval(p.ci95)})"
             for name, p in stage.parameters.items()
         )

@@ -85,7 +85,7 @@ _WORDS = {"alpha": "α", "beta": "β", "xi": "ξ"}
 """Letters that are also parts of English words."""
 
 
-def spoken(term: str) -> str:
+def readable(term: str) -> str:
     """Return a term in canonical spelling, or words with such terms, with the field's letters."""
     # a full stop between tensors is a product; elsewhere it ends a sentence or is a decimal point
     text = re.sub(r"(?<=sigma|madot)\.(?=sigma|gammadot)", "·", term)
@@ -108,7 +108,7 @@ def effect_title(name: str) -> str:
     Studies and JSON keep the name itself.
     """
     if "sigma" in name or "gammadot" in name:
-        return spoken(name)
+        return readable(name)
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
@@ -153,7 +153,7 @@ def terms_text(outcome: LearnerOutcome, intervals: bool = True) -> str:
         return "no term at all"
     parts = []
     for term in outcome.terms:
-        text = f"{estimate(term.coefficient, term.ci95)} {_factor(spoken(term.term))}"
+        text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
         if intervals and term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
@@ -194,4 +194,4 @@ def selection_sentence(outcome: LearnerOutcome) -> str:
 
 def chosen_names(support: Sequence[str]) -> list[str]:
     """Return the terms of a support in the field's letters."""
-    return [spoken(name) for name in support] or ["no term"]
+    return [readable(name) for name in support] or ["no term"]

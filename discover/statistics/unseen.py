@@ -74,7 +74,7 @@ class Unseen:
         return [row - step @ column for row, column in zip(rows, columns, strict=True)], agreement
 
 
-def speak_against(unseen: Unseen, residuals: Rows, records: Rows, expectation: Expectation) -> bool:
+def refutes(unseen: Unseen, residuals: Rows, records: Rows, expectation: Expectation) -> bool:
     """Return whether runs that no fit saw say that something is missing.
 
     They do if their pattern is larger than their noise; or if one is left after the constants

@@ -16,7 +16,7 @@ AT_WORK = """
 import hashlib, signal, sys, time
 from discover.cli import interruption
 from discover.cli.interruption import obeying_interrupts
-from discover.last_words import last_words
+from discover.stop_callbacks import on_stop
 
 interruption._PATIENCE = float(sys.argv[1])
 # a shell's & has it ignored in all that it starts, the tests among them
@@ -26,7 +26,7 @@ def words():
     time.sleep(float(sys.argv[2]))
     print("last words")
 
-with obeying_interrupts(), last_words(words):
+with obeying_interrupts(), on_stop(words):
     print("at work", flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
 """
@@ -64,7 +64,7 @@ def test_last_words_that_do_not_end_are_cut_short():
 
 
 def test_who_ignores_the_signal_goes_on_ignoring_it(monkeypatch):
-    monkeypatch.setattr(interruption, "say_last_words", lambda: pytest.fail("nobody pressed"))
+    monkeypatch.setattr(interruption, "run_stop_callbacks", lambda: pytest.fail("nobody pressed"))
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as nohup and a shell's & do
     try:
         with obeying_interrupts():

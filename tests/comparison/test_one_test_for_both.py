@@ -7,11 +7,11 @@ from discover.closed_loop import DeclaredModel
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.judgement import judge
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.leftover import Leftover
-from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import RunRecord
 from discover.closed_loop.run_batch import make_batch
 from discover.closed_loop.silence import records_are_silent
+from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.comparison.explanation import explain
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
@@ -62,7 +62,7 @@ def said_by_comparison(runs, residuals, expectation):
 def said_by_loop(runs, residuals, expectation):
     model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect("stress_offset")])
     batch = make_batch(runs)
-    leftover = Leftover(expectation, Resolution(model, batch, runs))
+    tolerated = ToleratedMisfit(expectation, NumericalResolution(model, batch, runs))
     weighted = np.array(residuals) * np.asarray(batch.weight)
     fit = Fit(model.zero(), (), weighted, np.zeros((0, *weighted.shape)))
     records = [
@@ -73,7 +73,7 @@ def said_by_loop(runs, residuals, expectation):
         for run, left, row in zip(runs, residuals, weighted, strict=True)
     ]  # fmt: skip
     silence = "records" if records_are_silent(runs) else None
-    return judge(leftover, fit, (), records, None, silence)
+    return judge(tolerated, fit, (), records, None, silence)
 
 
 SAID = {"no_effect_needed": "explained", "unexplained": "unexplained", "no_signal": "no_signal"}

@@ -5,10 +5,10 @@ import pytest
 
 from discover.errors import InputError
 from discover.identify.bands import bands_of_predictions, prediction_bands
+from discover.identify.experiment_outcome import judge_laws
 from discover.identify.experiments import candidate_experiments
 from discover.identify.many_laws import Contender, fluid_of, predict_laws
 from discover.identify.next_experiment import DECISIVE, propose_experiments, squared_distance
-from discover.identify.weigh import weigh
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.simulate import simulate
 
@@ -106,13 +106,13 @@ def test_the_rival_falls_when_the_proposed_experiment_is_run(truth, laws, quanti
     noise = {q: NOISE * size[q] for q in quantities}
     rng = np.random.default_rng(1)
     measured = {q: exact[q] + noise[q] * rng.normal(size=exact[q].size) for q in quantities}
-    right, wrong = weigh(laws, MAXWELL, best.experiment, measured, noise)
+    right, wrong = judge_laws(laws, MAXWELL, best.experiment, measured, noise)
     assert not right.refuted
     assert wrong.refuted
     # the negative control: without what was asked for, the twin stands
     if quantities[-1] == "N2":
         del measured["N2"]
-        assert not weigh(laws, MAXWELL, best.experiment, measured, noise)[1].refuted
+        assert not judge_laws(laws, MAXWELL, best.experiment, measured, noise)[1].refuted
 
 
 def test_a_band_holds_the_law_and_widens_with_its_uncertainty_and_its_rivals():

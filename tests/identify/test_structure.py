@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from discover.identify.directions import weak_directions
-from discover.identify.lanes import LawTerms
+from discover.identify.laws_side_by_side import LawTerms
 from discover.identify.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset

@@ -9,7 +9,7 @@ import pytest
 from discover.identify.fitted_twins import fit_twins
 from discover.identify.hidden_stresses import hidden_stresses
 from discover.identify.histories import SAME, differences, random_histories
-from discover.identify.lanes import LawTerms, extensional_stresses
+from discover.identify.laws_side_by_side import LawTerms, extensional_stresses
 from discover.identify.separation import separations
 from discover.identify.twins import find_twins, same_in_every_shear
 from discover.laws import (

@@ -39,8 +39,8 @@ from discover.report.plots.style import SPARSE
 from discover.report.verdicts import QUESTIONS
 from discover.report.wording import (
     percent,
+    readable,
     selection_sentence,
-    spoken,
 )
 from discover.study import RunFolder, parse_study
 from tensor_library.library import build_library
@@ -382,7 +382,7 @@ def test_a_comparison_shows_itself_as_tables(comparison):
 
 
 def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
-    said = spoken("0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.")
+    said = readable("0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.")
     assert said == "0.5 tr(σ·γ̇) I + σ·σ, whatever the law."
 
 

@@ -9,8 +9,8 @@ from discover.report.wording import (
     interval,
     percent,
     percent_range,
+    readable,
     significant,
-    spoken,
 )
 
 
@@ -58,4 +58,4 @@ def test_axes_of_per_cents_have_plain_numbers_and_more_of_them_where_they_are_sh
 
 
 def test_what_looks_like_a_letter_inside_a_word_stays():
-    assert spoken("alpha of the alphabet, xi, maximal") == "α of the alphabet, ξ, maximal"
+    assert readable("alpha of the alphabet, xi, maximal") == "α of the alphabet, ξ, maximal"

@@ -6,7 +6,7 @@ from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
 from discover.statistics.residual import Expectation
-from discover.statistics.unseen import Unseen, speak_against
+from discover.statistics.unseen import Unseen, refutes
 
 TIMES = np.geomspace(0.05, 10.0, 80)
 ALPHA, STEP = 0.3, 1e-3
@@ -31,7 +31,7 @@ def unseen(responses, uncertainty, off, extra=0.0, seed=0):
 
 
 def against(one, expectation=None):
-    return speak_against(one, [], [], expectation or Expectation())
+    return refutes(one, [], [], expectation or Expectation())
 
 
 @pytest.mark.parametrize("uncertainty", [1e-4, 1e-3, 3e-3])

@@ -15,7 +15,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import spoken
+from discover.report.wording import readable
 
 _COLOURS = (NETWORK, GREEN, PURPLE, YELLOW, BEFORE)
 _DASHES = ("--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
@@ -63,4 +63,4 @@ def next_picture(comparison: Comparison) -> Picture | None:
 
 
 def _typeset(law: str) -> str:
-    return spoken(law).replace("-", "−")
+    return readable(law).replace("-", "−")

@@ -18,7 +18,7 @@ from discover.report.plots.style import (
     make_percentage,
     picture,
 )
-from discover.report.wording import spoken
+from discover.report.wording import readable
 
 _MOST_BARS = 8
 _RULE_STYLES = {
@@ -89,14 +89,14 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             bars = axes[0, 2]
             rows = frequencies[::-1]
             bars.barh(
-                [spoken(row["term"]) for row in rows],
+                [readable(row["term"]) for row in rows],
                 [100.0 * row["with_twins"] for row in rows],
                 color=GREEN,
                 alpha=0.35,
                 label="term or a twin",
             )
             bars.barh(
-                [spoken(row["term"]) for row in rows],
+                [readable(row["term"]) for row in rows],
                 [100.0 * row["frequency"] for row in rows],
                 height=0.4,
                 color=GREEN,

@@ -12,7 +12,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import spoken
+from discover.report.wording import readable
 
 
 def loss_picture(comparison: Comparison) -> Picture:
@@ -104,7 +104,7 @@ def sweep_picture(comparison: Comparison) -> Picture | None:
                             label=LEARNER_TITLES[name],
                             **LEARNER_STYLES[name],
                         )
-                panel.set_title(f"{spoken(point.parameter)} = {point.value:g}")
+                panel.set_title(f"{readable(point.parameter)} = {point.value:g}")
                 panel.set_xlabel(rate_label)
             row[0].set_ylabel(f"{LAWS[law].title}\nσ₁₂{stress_unit}")
             for name in mine[0].outcomes:
@@ -120,11 +120,12 @@ def sweep_picture(comparison: Comparison) -> Picture | None:
                         f"{LEARNER_TITLES[name]}",
                     )
             row[-1].set_title("error in this flow (%)")
-            row[-1].set_xlabel(spoken(points[0].parameter))
+            row[-1].set_xlabel(readable(points[0].parameter))
         legend_above(drawing, axes, columns=4)
         return picture(
             drawing,
             "sweep",
-            f"The comparison again over {spoken(points[0].parameter)}, in {points[0].flow.title}: "
-            "late Lissajous curves of σ₁₂, and on the right the relative errors of σ₁₂ and N₁.",
+            f"The comparison again over {readable(points[0].parameter)}, "
+            f"in {points[0].flow.title}: late Lissajous curves of σ₁₂, and on the right the "
+            "relative errors of σ₁₂ and N₁.",
         )

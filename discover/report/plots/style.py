@@ -110,8 +110,8 @@ class Picture:
         text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
         # the page decides the width
         text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
-        spoken = html.escape(self.caption or self.name, quote=True)
-        return text.replace("<svg ", f'<svg role="img" aria-label="{spoken}" ', 1)
+        description = html.escape(self.caption or self.name, quote=True)
+        return text.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1)
 
     @property
     def adaptive(self) -> str:

@@ -29,7 +29,7 @@ class Store(Protocol):
         ...
 
 
-class Keeper:
+class SearchCheckpoint:
     """Keeps one search in a store.
 
     Parameters

@@ -7,11 +7,11 @@ _registered: list[Callable[[], object]] = []
 
 
 @contextmanager
-def last_words(callback: Callable[[], object]) -> Iterator[None]:
+def on_stop(callback: Callable[[], object]) -> Iterator[None]:
     """Have a function called if the program is stopped while the context lasts.
 
-    Whatever decides to stop the program calls `say_last_words`, from a thread of its own. Nothing
-    is called if the context ends by itself.
+    Whatever decides to stop the program calls `run_stop_callbacks`, from a thread of its own.
+    Nothing is called if the context ends by itself.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def last_words(callback: Callable[[], object]) -> Iterator[None]:
         _registered.remove(callback)
 
 
-def say_last_words() -> None:
+def run_stop_callbacks() -> None:
     """Call what is registered, the last first; one that fails does not stop the others."""
     for callback in reversed(_registered):
         with suppress(Exception):

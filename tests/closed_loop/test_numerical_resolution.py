@@ -7,7 +7,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.resolution import COMPUTED, Resolution, rounding
+from discover.closed_loop.numerical_resolution import COMPUTED, NumericalResolution, rounding
 from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
 from discover.errors import InputError
@@ -125,13 +125,13 @@ def test_a_misfit_is_put_down_to_arithmetic_only_where_that_leaves_as_much():
     sampled = maxwell_runs()[1:2]
     smooth = [replace(sampled[0], protocol=oscillatory_shear(1.5, 0.8))]
     limits = [
-        Resolution(model, make_batch(runs), runs).limit(model.zero(), (), 1e-4)
+        NumericalResolution(model, make_batch(runs), runs).limit(model.zero(), (), 1e-4)
         for runs in (smooth, sampled)
     ]
     assert limits[0] < 2.0 * COMPUTED
     # straight lines between samples 0.08 rad apart miss the rate by φ²/12
     assert 0.02 * 0.08**2 / 12 < limits[1] < 0.08**2 / 12
-    far = Resolution(model, make_batch(sampled), sampled).limit(model.zero(), (), 0.1)
+    far = NumericalResolution(model, make_batch(sampled), sampled).limit(model.zero(), (), 0.1)
     assert far == pytest.approx(COMPUTED)
 
 

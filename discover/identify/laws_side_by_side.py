@@ -19,7 +19,7 @@ from tensor_library.kinematics import planar_extension, uniaxial_extension
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
-LANES = 8
+LAWS_AT_ONCE = 8
 """Laws simulated side by side; fewer are padded, so that any number shares one program."""
 
 
@@ -68,10 +68,10 @@ def dense(library: TermLibrary, law: LawTerms) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
-    for first in range(0, len(laws), LANES):
-        some = [dense(library, law) for law in laws[first : first + LANES]]
+    for first in range(0, len(laws), LAWS_AT_ONCE):
+        some = [dense(library, law) for law in laws[first : first + LAWS_AT_ONCE]]
         count = len(some)
-        some += some[-1:] * (LANES - count)
+        some += some[-1:] * (LAWS_AT_ONCE - count)
         coefficients, inner = (jnp.asarray(np.stack(part)) for part in zip(*some, strict=True))
         yield count, coefficients, inner
 

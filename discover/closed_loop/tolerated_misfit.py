@@ -7,14 +7,14 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.resolution import Resolution
+from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left
 from discover.statistics.residual import STRUCTURE, Expectation, tells_noise
 from discover.statistics.whiteness import SIGNIFICANCE
 
 
 @dataclass(frozen=True)
-class Leftover:
+class ToleratedMisfit:
     """What a complete model may leave of some runs: noise, error of the linear data, arithmetic.
 
     Attributes
@@ -26,7 +26,7 @@ class Leftover:
     """
 
     expectation: Expectation
-    resolution: Resolution
+    resolution: NumericalResolution
 
     @property
     def weight(self) -> Float[np.ndarray, "runs n"]:
@@ -38,9 +38,9 @@ class Leftover:
         """Measured stress in Pa, padded."""
         return np.asarray(self.resolution.batch.stress)
 
-    def on(self, resolution: Resolution) -> "Leftover":
+    def on(self, resolution: NumericalResolution) -> "ToleratedMisfit":
         """Return the same expectation of other runs."""
-        return Leftover(self.expectation, resolution)
+        return ToleratedMisfit(self.expectation, resolution)
 
     def unresolved(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves is no more than arithmetic leaves."""

@@ -25,7 +25,7 @@ _MOST_DIGITS = 9  # a difference of the tenth digit is below `COMPUTED` by far
 _FEWEST_VALUES = 5  # that all of fewer end in the same noughts may be chance
 
 
-class Resolution:
+class NumericalResolution:
     """What a model's misfit of some runs may owe to arithmetic.
 
     Parameters

@@ -48,7 +48,7 @@ class Weight:
         return {**asdict(self), "refuted": self.refuted}
 
 
-def weigh(
+def judge_laws(
     laws: Sequence[Contender],
     declared: Fluid,
     experiment: Experiment,
