@@ -172,6 +172,11 @@ def judge(
             f"{_percent(missed_held_out)}: what was found does not carry over to them, most of all "
             f"not to {worst.name}. Some effect is still missing, or has another form."
         )
+    elif silence == "fluid":
+        text = (
+            f"{missed}, more than {causes} ({_percent(expected)}), and as well without the fluid: "
+            "what was found explains nothing, and something else is in the records."
+        )
     elif error > STRUCTURE * expected:
         text = (
             f"{missed}, more than {causes} ({_percent(expected)}); the worst run is {worst.name}. "

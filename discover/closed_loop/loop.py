@@ -202,6 +202,7 @@ def run_loop(
             "resolution": judgement.resolution,
             "noise_known": judgement.noise_known,
             "carries_over": judgement.carries_over,
+            "without_fluid": silence is not None,
             "not_judging": list(judgement.not_judging),
             "linear_error": declared.linear_error,
             "autocorrelation": float(np.mean(summary.autocorrelation)),

@@ -41,17 +41,23 @@ def loop_verdict(result: LoopResult) -> list[str]:
 
 
 def _loop_found(result: LoopResult) -> str:
-    if result.verdict == "no_signal" and not result.stages:
+    names = _several([effect_title(stage.effect) for stage in result.stages], "and")
+    if result.verdict == "no_signal" and not names:
         return (
             f"{_LOOP['no_signal']}: they hold hardly anything but noise, or do not follow what was "
             "imposed."
         )
     if result.verdict == "no_signal":
-        names = _several([effect_title(stage.effect) for stage in result.stages], "and")
         return (
             f"{_LOOP['no_signal']}: {names} would explain them, with a fluid that is as good as "
             "absent."
         )
+    if result.verdict == "unexplained" and names and result.remaining.get("without_fluid"):
+        return (
+            f"No candidate explains the data: what comes nearest ({names}) leaves as much without "
+            "the fluid."
+        )
+    first = "" if result.verdict == "unexplained" else "added "
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
@@ -59,15 +65,17 @@ def _loop_found(result: LoopResult) -> str:
             + f" (95 % {interval(p.ci95)})"
             for name, p in stage.parameters.items()
         )
-        added = "added " if i == 0 else ""
-        parts.append(f"{added}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}")
+        parts.append(
+            f"{first if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
+        )
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
         if not result.remaining.get("noise_known", True):
             verdict = _UNKNOWN_NOISE
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
-        return sentence([*parts, verdict if not parts else verdict[:1].lower() + verdict[1:]])
+        if parts:  # after the verdict: what comes near is no finding
+            parts[0] = f"what comes nearest is, {parts[0]}"
     return sentence([verdict, *parts])
 
 
@@ -120,14 +128,14 @@ def _several(names: Sequence[str], word: str) -> str:
 def _loop_next(result: LoopResult) -> str:
     rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
     faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
-    if result.verdict == "no_signal":
+    if result.verdict == "no_signal" or result.remaining.get("without_fluid"):
         return (
             "See that the sensor is connected and the sample there, and measure where the stress "
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
     doubtful = _most_doubtful(result.stages)
-    if doubtful is not None:
+    if doubtful is not None and result.verdict != "unexplained":
         check = doubtful.check.rstrip(". ")
         if not check[1:2].isdigit():  # N2 keeps its capital
             check = check[:1].lower() + check[1:]

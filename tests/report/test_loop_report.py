@@ -139,10 +139,20 @@ def test_every_verdict_is_three_sentences_that_answer_three_questions():
     assert confirm == "To confirm stress gain: a check."
 
 
-def test_the_verdict_of_an_unexplained_loop_does_not_end_on_what_was_added():
-    text = loop_verdict(replace(loop_result(), verdict="unexplained"))[0]
-    assert text.startswith("Added in the instrument's signal: stress gain, gain = 0.7 (95 % 0.69")
-    assert text.endswith("what is left still has structure that no candidate explains.")
+def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():
+    unexplained = replace(loop_result(), verdict="unexplained")
+    text = loop_verdict(unexplained)[0]
+    assert text.startswith("What is left still has structure that no candidate explains; ")
+    assert "what comes nearest is, in the instrument's signal: stress gain, gain = 0.7" in text
+    assert "dded" not in text
+
+
+def test_what_fits_as_well_without_the_fluid_has_no_constants_in_the_verdict():
+    remaining = {**loop_result().remaining, "without_fluid": True}
+    text = loop_verdict(replace(loop_result(), verdict="unexplained", remaining=remaining))[0]
+    assert text.startswith("No candidate explains the data")
+    assert "(stress gain) leaves as much without the fluid" in text
+    assert "0.7" not in text
 
 
 @pytest.mark.parametrize(
