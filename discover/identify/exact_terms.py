@@ -8,7 +8,7 @@ points of a large set is zero, but for a probability of degree over size of the 
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, no_type_check
 
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.invariants import INVARIANT_NAMES
@@ -28,6 +28,7 @@ Components = tuple[Any, Any, Any, Any]
 """11, 22, 33, 12 of a symmetric tensor in simple shear, over any commutative ring."""
 
 
+@no_type_check
 def _product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
     """Return a·b of block matrices stored as (11, 22, 33, 12, 21)."""
     a11, a22, a33, a12, a21 = first
@@ -41,6 +42,7 @@ def _product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
     )
 
 
+@no_type_check
 def _word(word: str, tensors: Mapping[str, Sequence[Any]]) -> tuple[Any, ...]:
     letters = word.split(".")
     value = tuple(tensors[letters[0]])
@@ -110,6 +112,7 @@ def exact_terms(
     return values
 
 
+@no_type_check
 def _sum(words: list[tuple[Any, ...]]) -> tuple[Any, ...]:
     total = words[0]
     for word in words[1:]:
