@@ -262,6 +262,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 [member.support for member in path],
                 self.n_stability,
                 self.random_state,
+                search.n_independent / problem.n_observations,
             )
         model = search.model_at(fit)
         # the model's rows are divided by √n; a ridge penalty of pysindy's is meant for sums

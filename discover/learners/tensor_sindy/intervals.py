@@ -100,7 +100,7 @@ def parameter_uncertainty(
         Relative misfit below which the integration itself is in doubt.
     """
     residual, chosen, inner = sensitivities_at(problem, fit)
-    covariance, inverse, noise = least_squares_covariance(chosen, residual, _sequences(problem))
+    covariance, inverse, noise = least_squares_covariance(chosen, residual, problem.sequences())
     free = max(noise.effective_samples - chosen.shape[1], 1.0)
     return ParameterUncertainty(
         covariance=covariance,
@@ -124,12 +124,3 @@ def sensitivities_at(
     inner = tuple(i for i, form in enumerate(problem.library.forms) if form.name in used)
     chosen = np.asarray(columns)[:, [*fit.support, *(n + i for i in inner)]]
     return np.asarray(residual), chosen, inner
-
-
-def _sequences(problem: TrajectoryProblem) -> list[np.ndarray]:
-    """Return the rows of each run and observed quantity, in the order of time."""
-    seen = np.asarray(problem.weight) > 0
-    runs, samples, kinds = seen.shape
-    rows = np.arange(seen.size).reshape(runs, samples, kinds)
-    sequences = [rows[i, seen[i, :, k], k] for i in range(runs) for k in range(kinds)]
-    return [sequence for sequence in sequences if sequence.size]

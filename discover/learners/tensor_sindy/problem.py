@@ -70,6 +70,14 @@ class TrajectoryProblem(eqx.Module):
         runs, samples, kinds = self.target.shape
         return np.repeat(np.arange(runs), samples * kinds)
 
+    def sequences(self) -> list[np.ndarray]:
+        """Return the rows of each run and observed quantity, in the order of time."""
+        seen = np.asarray(self.weight) > 0
+        runs, samples, kinds = seen.shape
+        rows = np.arange(seen.size).reshape(runs, samples, kinds)
+        sequences = [rows[i, seen[i, :, k], k] for i in range(runs) for k in range(kinds)]
+        return [sequence for sequence in sequences if sequence.size]
+
 
 def make_problem(
     runs: Iterable[Any],

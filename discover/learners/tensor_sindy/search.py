@@ -1,6 +1,6 @@
 """Search of the support space: proposals of a sparse optimiser, then moves until none helps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,7 +16,8 @@ from discover.learners.tensor_sindy.linear_model import (
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
-from discover.learners.tensor_sindy.selection import extended_bic
+from discover.learners.tensor_sindy.selection import choose_by_bic, extended_bic
+from discover.statistics import noise_model
 
 _HORIZONS = (0.2, 0.5)
 _ROUNDS = 3
@@ -72,6 +73,7 @@ class SupportSearch:
         self.fits: dict[tuple[int, ...], Fit] = {}
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
+        self.n_independent = float(problem.n_observations)
         self._models: dict[tuple[int, ...], LinearModel] = {}
         self._sparse: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
 
@@ -90,11 +92,11 @@ class SupportSearch:
         )
 
     def criterion(self, fit: Fit) -> float:
-        """Return the extended BIC of a fit."""
+        """Return the extended BIC of a fit, on as many observations as are independent."""
         used = {self.problem.library.terms[i].closed_form for i in fit.support} - {None}
         return extended_bic(
             max(fit.misfit, self.floor),
-            self.problem.n_observations,
+            self.n_independent,
             len(fit.support),
             len(used),
             self.n_terms,
@@ -163,7 +165,29 @@ class SupportSearch:
             near = [f.support for f in ranked if f.misfit <= limit]
             chosen += near[: BREADTH if size == 1 else 4]
         self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
+        self._count_independent([self.of_size(size)[0] for size in range(largest + 1)])
         return [self.of_size(size)[0] for size in range(largest + 1)]
+
+    def _count_independent(self, path: Sequence[Fit]) -> None:
+        """Count what the observations are worth, one number for the whole path.
+
+        In correlated noise each further sample tells little, and a criterion that counts it whole
+        takes terms that follow the noise. Counted first by what the densest law leaves, for that
+        of a law that lacks a term is correlated for another reason; but terms that follow the noise
+        take its slow part away, so then by what the chosen law leaves, as long as that is less.
+        """
+        worth = self._independent_in(path[-1])
+        while worth < self.n_independent:
+            self.n_independent = worth
+            chosen = path[choose_by_bic(np.array([self.criterion(fit) for fit in path]))]
+            worth = self._independent_in(chosen)
+
+    def _independent_in(self, fit: Fit) -> float:
+        if fit.misfit <= self.floor:
+            return float(self.problem.n_observations)
+        left = np.asarray(self.problem.target * self.problem.weight).ravel() - fit.predicted
+        rows = self.problem.sequences()
+        return noise_model([left[row] for row in rows], len(fit.support)).effective_samples
 
     def model_at(self, fit: Fit) -> LinearModel:
         """Return the linear model at a fit, made once."""

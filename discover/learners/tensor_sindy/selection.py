@@ -10,7 +10,7 @@ _LEVEL = 0.01
 
 
 def extended_bic(
-    misfit: float, n_observations: int, n_terms: int, n_inner: int, library_size: int
+    misfit: float, n_observations: float | int, n_terms: int, n_inner: int, library_size: int
 ) -> float:
     """Return the extended Bayesian information criterion   [Chen & Chen 2008, Biometrika 95, 759].
 
@@ -23,7 +23,7 @@ def extended_bic(
     misfit
         Relative root-mean-square misfit, floored by the caller where data have no noise.
     n_observations
-        n.
+        n: of observations in correlated noise, how many independent ones they are worth.
     n_terms, n_inner
         Coefficients and inner parameters fitted; k is their sum.
     library_size

@@ -54,6 +54,7 @@ def selection_stability(
     known: Sequence[tuple[int, ...]] = (),
     n_pairs: int = 20,
     seed: int | None = 0,
+    worth: float = 1.0,
 ) -> Stability:
     """Return how often each term is chosen from halves of the data, near a fitted law.
 
@@ -75,6 +76,8 @@ def selection_stability(
         Number of complementary pairs of halves.
     seed
         Of the halves.
+    worth
+        Independent observations for each one made: less than one in correlated noise.
     """
     n = len(problem.library)
     c = fit.dense(n)
@@ -88,7 +91,7 @@ def selection_stability(
     for pair in range(n_pairs):
         half = _half(problem, rng)
         for side, rows in enumerate((half & usable, ~half & usable)):
-            support = _choose(design[rows], target[rows], optimizer, max_terms, floor, known)
+            support = _choose(design[rows], target[rows], optimizer, max_terms, floor, known, worth)
             chosen[2 * pair + side, list(support)] = True
     alike = _alike(design[usable])
     together = np.stack([np.any(chosen[:, group], axis=1) for group in alike], axis=1)
@@ -106,9 +109,9 @@ def _half(problem: TrajectoryProblem, rng: np.random.Generator) -> Bool[np.ndarr
     return half.reshape(-1)
 
 
-def _choose(design, target, optimizer, max_terms, floor, known) -> tuple[int, ...]:
+def _choose(design, target, optimizer, max_terms, floor, known, worth) -> tuple[int, ...]:
     """Return the support that the extended BIC prefers of those the optimiser proposes."""
-    observations, n = design.shape
+    observations, n = worth * len(design), design.shape[1]
     triangular = np.asarray(np.linalg.qr(np.column_stack([design, target]), mode="r"))
     matrix, right = triangular[:, :-1], triangular[:, -1]
     # the weights make the norm over all rows a relative misfit; a half has its share of that
@@ -126,7 +129,7 @@ def _choose(design, target, optimizer, max_terms, floor, known) -> tuple[int, ..
     return best
 
 
-def _bic(misfit: float, observations: int, size: int, n: int, floor: float) -> float:
+def _bic(misfit: float, observations: float, size: int, n: int, floor: float) -> float:
     return extended_bic(max(misfit, floor), observations, size, 0, n)
 
 

@@ -1,0 +1,55 @@
+"""Terms that follow correlated noise are no law: data in closed form, noise by scipy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from shared_flows import LIBRARY
+
+from discover.dataset import ShearRun
+from discover.learners.tensor_sindy import TensorSINDy
+from discover.protocols import start_up
+
+TIMES = np.linspace(0.02, 6.0, 150)
+RATES = (0.5, 1.0, 2.0, 4.0)
+NOISE = 0.03
+
+
+def runs(correlation, seed):
+    """Return start-ups of an upper-convected Maxwell fluid, whose σ12 is γ̇ (1 − e^−t)."""
+    generator = np.random.default_rng([7, seed])
+    made = []
+    for rate in RATES:
+        exact = -rate * np.expm1(-TIMES)
+        innovation = generator.standard_normal(len(TIMES) + 100)
+        noise = lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], innovation)[100:]
+        stress = exact + NOISE * np.sqrt(np.mean(exact**2)) * noise
+        made.append(ShearRun(f"{rate}", TIMES, start_up(rate), np.full_like(TIMES, rate), stress))
+    return made
+
+
+def fitted(correlation, seed):
+    return TensorSINDy(LIBRARY, n_stability=0, n_folds=0).fit(runs(correlation, seed))
+
+
+def test_correlated_noise_seldom_brings_in_a_term():
+    # counting every sample, all four have terms, three to five of them
+    models = [fitted(0.9, seed) for seed in range(4)]
+    assert sum(model.terms_ != () for model in models) <= 1
+    # (1 − 0.9)/(1 + 0.9) of 600 samples are 32; twice as many where a short record hides the rest
+    assert all(15 < model.search_.n_independent < 80 for model in models if not model.terms_)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_every_sample_counts_in_white_noise(seed):
+    model = fitted(0.0, seed)
+    assert model.search_.n_independent == len(RATES) * len(TIMES)
+    assert model.terms_ == ()
+
+
+def test_a_law_that_fits_exactly_is_judged_on_every_sample():
+    noisy = runs(0.0, 0)
+    exact = [replace(run, shear_stress=-run.shear_rate * np.expm1(-TIMES)) for run in noisy]
+    search = TensorSINDy(LIBRARY, n_stability=0, n_folds=0).fit(exact).search_
+    assert search.n_independent == len(RATES) * len(TIMES)
