@@ -1,5 +1,7 @@
 """Values of a study are of the kind that they are written as; nothing is turned into another."""
 
+import subprocess
+import sys
 import time
 import tomllib
 
@@ -40,6 +42,34 @@ def test_a_value_of_another_kind_is_refused_with_its_name(section, values):
 def test_noise_of_synthetic_data_is_no_truth_value():
     with pytest.raises(InputError, match="noise: should be a number; got true"):
         parse_study({"data": {"synthetic": {"law": "giesekus", "noise": True}}})
+
+
+def test_python_refuses_truth_values_and_text_for_numbers_as_studies_do():
+    """In a process of its own: the types that tests check would stop most of these calls."""
+    code = """
+import numpy as np
+import discover as dc
+cases = ({"noise": True}, {"noise": "0.1"}, {"duration": True}, {"seed": True},
+         {"n_samples": None}, {"parameters": {"alpha": True}})
+for case in cases:
+    try:
+        dc.synthetic_dataset("giesekus", **{"parameters": {"alpha": 0.3}, **case})
+    except dc.InputError as error:
+        print(error)
+made = dc.synthetic_dataset(
+    "giesekus", {"alpha": 1}, noise=np.float64(0.01), n_samples=np.int64(20), duration=2
+)
+print(made.noise, len(made.runs[0]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
+    *refused, taken = done.stdout.splitlines()
+    assert [line.split("; got ")[0].count(" must be ") for line in refused] == [1] * 6
+    assert [line.split("; got ")[1].split(".")[0] for line in refused] == [
+        "True", "'0", "True", "True", "None", "True",
+    ]  # fmt: skip
+    assert taken == "0.01 20"
 
 
 def test_whole_numbers_are_numbers_and_truth_values_are_truth_values():
