@@ -114,6 +114,28 @@ def test_nothing_is_said_of_a_rate_that_falls_and_takes_the_stress_along(tmp_pat
     assert about(write(tmp_path, run, linear=False), "start") == []
 
 
+@pytest.mark.parametrize("late", [2.0, 4.0, 20.0])
+def test_a_start_up_whose_rise_was_not_recorded_does_not_show_a_start_from_rest(tmp_path, late):
+    run = giesekus(START_UP[1:] + late, lambda t: 0.3)
+    run["time_s"] = START_UP[1:]
+    (said,) = about(write(tmp_path, run, linear=False), "start")
+    assert "does not show it: its first stress, at 0.01 s, is" in said
+    assert float(said.split(" % of the largest")[0].split()[-1]) > 50.0
+
+
+def test_an_oscillation_sampled_too_late_does_not_show_a_start_from_rest(tmp_path):
+    run = giesekus(CYCLES, lambda t: 8.0 * np.cos(OMEGA * t))
+    run = {name: values[9:] for name, values in run.items()}
+    (said,) = about(write(tmp_path, run, linear=False), "start")
+    assert "nothing before it was recorded" in said
+
+
+@pytest.mark.parametrize("rate", [0.05, 0.3, 2.0])
+def test_the_same_records_with_their_rise_are_not_doubted(tmp_path, rate):
+    runs = [giesekus(START_UP[1:], lambda t: rate), giesekus(START_UP[20:], lambda t: rate)]
+    assert about(write(tmp_path, *runs, linear=False), "start") == []
+
+
 @pytest.mark.parametrize("gain", [0.88, 1.15])
 def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
     runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
