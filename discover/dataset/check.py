@@ -122,13 +122,19 @@ def _clock(index: Table, column: str | None) -> Iterator[Finding]:
 def _before(index: Table) -> Iterator[Finding]:
     for name in index.columns:
         if name.lower().startswith(_BEFORE_WORDS):
+            try:
+                factor = units.heading_factor(name, units.SHEAR_RATE)
+            except InputError as error:
+                yield Finding("warning", "start", INDEX_FILE, str(error))
+                continue
+            unit = "1/s" if factor == 1.0 else f"1/s after multiplying by {factor:.6g}"
             yield Finding(
                 "note",
                 "start",
                 INDEX_FILE,
                 f"{INDEX_FILE} has a column {name}. If each run starts from a steady flow at that "
-                f'rate, write rate_before = "{name}" in the study; without it every run starts '
-                "from rest.",
+                f'rate, write rate_before = "{name}" in the study, which reads it in {unit}; '
+                "without it every run starts from rest.",
             )
 
 

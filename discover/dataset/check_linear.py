@@ -19,10 +19,14 @@ _STRESS_TOLERANCE = 0.15
 # What they leave open where nothing is wrong with either: 1 % of the radius of the filling is 3 %
 # of the torque, 1 K some 3 % of a melt's viscosity, 10 µm some 1 % of a gap
 _SHARED_TOLERANCE = 0.07
-# Of a gain: samples of a run, change of the ratio within it, and runs
+# Less than 1 % of the radius is worth no word; between the two a gain is noted and not doubted
+_NOTED_GAIN = 0.03
+# Of a gain: samples of a run, change of the ratio within it, and runs whose scatter is known
 _FEWEST_RATIOS = 5
 _STEADY_RATIO = 0.05
 _FEWEST_GAINS = 3
+# Where the stress passes through zero its ratio says nothing
+_CLEAR_OF_ZERO = 0.3
 # Below a Weissenberg number of one the Cox–Merz rule holds to some ten per cent for simple fluids;
 # above it laws differ, and it is theirs to say
 _COX_MERZ_FACTOR = 1.3
@@ -122,7 +126,7 @@ def against_linear_theory(
             f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
             "learned. Add faster runs.",
         )
-    yield from _shared_gain(start_ups, sweep, spectrum)
+    yield from _shared_gain(runs, sweep, spectrum)
     for run in start_ups:
         yield from _duration(run, mean_time)
         yield from _small_strain(run, sweep, spectrum)
@@ -148,62 +152,114 @@ def _duration(run: ShearRun, mean_time: float) -> Iterator[Finding]:
         )
 
 
-def _linear_ratios(
+def _linear_stress(
+    times: Float[np.ndarray, " n"], rates: Float[np.ndarray, " n"], spectrum: RelaxationSpectrum
+) -> Float[np.ndarray, " n-1"]:
+    """Return σ(t) = ∫ Σ G_k exp(−(t−s)/λ_k) γ̇(s) ds from rest, the rate linear between samples."""
+    steps = np.diff(times)[:, None] / spectrum.relaxation_time
+    whole = -np.expm1(-steps)
+    # what the end of an interval adds where the rate rises over it from 0 to 1; by its series
+    # where the closed form cancels
+    rising = np.where(steps < 1e-4, 0.5 * steps, 1.0 - whole / np.maximum(steps, 1e-4))
+    made = rates[:-1, None] * whole + np.diff(rates)[:, None] * rising
+    total = np.zeros_like(made)
+    for i, (kept, added) in enumerate(zip(1.0 - whole, made, strict=True)):
+        total[i] = kept * total[i - 1] + added  # of the first, total[-1] is still zero
+    return total @ (spectrum.modulus * spectrum.relaxation_time)
+
+
+def _linear_part(
     run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
-) -> Float[np.ndarray, " n"]:
-    """Return the first stresses over σ(t) = γ̇ Σ G_k λ_k (1 − exp(−t/λ_k)), in their order."""
-    rate = run.shear_rate[0]
-    times = run.time[:, None] / spectrum.relaxation_time
-    linear = rate * (-np.expm1(-times) @ (spectrum.modulus * spectrum.relaxation_time))
-    use = (abs(rate) * run.time < _LINEAR_STRAIN) & (np.abs(linear) > 5 * stress_noise(run))
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return the first stresses and those of linear theory, in their order.
+
+    Used is what comes before the strain from rest exceeds its limit for the first time.
+    """
+    rates, times = np.append(run.shear_rate[0], run.shear_rate), np.append(0.0, run.time)
+    strain = np.abs(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
+    n = int(np.argmax(np.append(strain, np.inf) >= _LINEAR_STRAIN))
+    linear = _linear_stress(times[: n + 1], rates[: n + 1], spectrum)
+    size = np.abs(linear)
+    use = size > 5 * stress_noise(run)
+    use &= size > _CLEAR_OF_ZERO * np.maximum.accumulate(size)
     # times shorter than those of the sweep are extrapolation
-    use &= run.time > 1.0 / np.max(sweep.angular_frequency)
-    return run.shear_stress[use] / linear[use]
+    use &= run.time[:n] > 1.0 / np.max(sweep.angular_frequency)
+    return run.shear_stress[:n][use], linear[use]
+
+
+def _gain(
+    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+) -> tuple[float, float] | None:
+    """Return the logarithm of a run's gain against the sweep and its error; None if it is no gain.
+
+    It is one if its ratio to linear theory does not rise or fall while the run is linear, as it
+    does after a slow start, and if nothing but noise is left with it.
+    """
+    stress, linear = _linear_part(run, sweep, spectrum)
+    if len(stress) < _FEWEST_RATIOS or np.any(stress * linear <= 0):
+        return None
+    ratios = np.log(stress / linear)
+    gain, half = float(np.median(ratios)), len(ratios) // 2
+    drift = abs(float(np.median(ratios[half:]) - np.median(ratios[:half])))
+    left = float(np.sqrt(np.mean((stress - np.exp(gain) * linear) ** 2)))
+    size = float(np.sqrt(np.mean(stress**2)))
+    if drift > _STEADY_RATIO or left > max(_STEADY_RATIO * size, 2.0 * stress_noise(run)):
+        return None
+    # lines between samples lose (ωh)²/12 of a wave; what they miss in the middle is (ωh)²/2
+    bends = float(np.sqrt(np.mean(np.diff(run.shear_rate, 2) ** 2)))
+    coarse = bends / float(np.sqrt(np.mean(run.shear_rate**2))) / 6.0
+    # a median's error is 1.25 times a mean's; the fewest samples hardly show how they scatter
+    known = max(len(ratios) - _FEWEST_RATIOS, 1)
+    of_median = 1.25 * float(np.std(ratios)) / np.sqrt(known)
+    return gain, max(drift, of_median, coarse)
 
 
 def _shared_gain(
-    start_ups: Sequence[ShearRun], sweep: LinearSweep, spectrum: RelaxationSpectrum
+    runs: Sequence[ShearRun], sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> Iterator[Finding]:
-    """Yield by which factor all start-ups differ from the sweep, if it is one for all.
-
-    A run counts if its ratio to linear theory does not rise or fall while it is linear, as it does
-    after a slow start.
-    """
-    gains = []
-    for run in start_ups:
-        ratios = _linear_ratios(run, sweep, spectrum)
-        if len(ratios) < _FEWEST_RATIOS or np.any(ratios <= 0):
-            continue
-        half = len(ratios) // 2
-        if abs(np.log(np.median(ratios[half:]) / np.median(ratios[:half]))) < _STEADY_RATIO:
-            gains.append(float(np.log(np.median(ratios))))
-    if len(gains) < _FEWEST_GAINS:
+    """Yield by which factor all runs differ from the sweep, if it is one for all."""
+    from_rest = [run for run in runs if run.flows and run.rate_before == 0.0]
+    found = [gain for run in from_rest if (gain := _gain(run, sweep, spectrum)) is not None]
+    if not found:
         return
+    gains, errors = np.array(found).T
     shared = float(np.median(gains))
-    scatter = 1.4826 * float(np.median(np.abs(np.array(gains) - shared)))
-    doubt = 3.0 * max(
-        scatter / np.sqrt(len(gains)), spectrum.best_error / np.sqrt(len(sweep.angular_frequency))
-    )
-    if abs(shared) < max(np.log1p(_SHARED_TOLERANCE), doubt) or min(gains) < 0 < max(gains):
+    scatter = 1.4826 * float(np.median(np.abs(gains - shared))) / np.sqrt(len(gains))
+    warned = abs(shared) >= np.log1p(_SHARED_TOLERANCE)
+    if warned and len(gains) >= _FEWEST_GAINS:
+        doubt = max(scatter, spectrum.best_error / np.sqrt(len(sweep.angular_frequency)))
+    else:
+        # so few do not show how they scatter: each answers for itself, and for the sweep's misfit
+        doubt = max(scatter, float(np.max(errors)), spectrum.relative_error)
+    if abs(shared) < 3.0 * doubt or np.min(gains) < 0 < np.max(gains):
         return
+    if not warned and (abs(shared) < np.log1p(_NOTED_GAIN) or len(gains) < _FEWEST_GAINS):
+        return
+    which = {1: "the one run that tells", 2: "both runs that tell"}.get(
+        len(gains), f"all {len(gains)} runs that tell"
+    )
+    why = (
+        "a gain, such as another gap, radius, temperature or filling than in the sweep"
+        if warned
+        else "no more than gap and filling leave open where nothing is wrong"
+    )
     yield Finding(
-        "warning",
+        "warning" if warned else "note",
         "gain",
         "",
-        f"In all {len(gains)} start-ups that tell it, the stress at small strain is "
-        f"{np.exp(shared):.3g} times what {SWEEP_FILE} foretells: a gain that the runs share, such "
-        "as another gap, radius, temperature or filling than in the sweep. Correct it, or let the "
-        'study fit it: [model] modes = "lve" with modulus_Pa = "fit".',
+        f"In {which} it, the stress at small strain is {np.exp(shared):.3g} times what "
+        f"{SWEEP_FILE} foretells: {why}. Correct it, or let the study fit it: [model] modes = "
+        '"lve" with modulus_Pa = "fit".',
     )
 
 
 def _small_strain(
     run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> Iterator[Finding]:
-    ratios = _linear_ratios(run, sweep, spectrum)
-    if len(ratios) < _FEWEST_RATIOS:
+    stress, linear = _linear_part(run, sweep, spectrum)
+    if len(stress) < _FEWEST_RATIOS:
         return
-    ratio = float(np.median(ratios))
+    ratio = float(np.median(stress / linear))
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
         yield Finding(
             "warning",

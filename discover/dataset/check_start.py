@@ -12,6 +12,10 @@ from discover.dataset.run_table import oscillation
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
+# Where a start-up's rise is seen, some samples lie below half of the largest stress: the share to
+# which `check_run` counts them. A solvent's viscosity makes more than half of it in dilute fluids
+# alone
+_RISE_OVER = 0.5
 # Of a stress, this share may be more than a viscosity makes of the rate, or a transient less
 _NOTICEABLE = 0.2
 _TRANSIENT = 0.05
@@ -32,7 +36,8 @@ def doubts_of_start(
     is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
     or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
     already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
-    that was recorded with it says that the rate had been another before.
+    that was recorded with it says that the rate had been another before. Where no sweep says how
+    fast stress grows, a first stress above half of the largest is doubted too.
 
     Parameters
     ----------
@@ -56,6 +61,10 @@ def doubts_of_start(
     elif _strained_before(run):
         why = "the strain recorded there is not what its rate had made by then"
     else:
+        # of an oscillation that was recorded from its start on, the cycles have told
+        late = run.time[0] > 0.0 or oscillation(run) is None
+        if late and first >= _RISE_OVER * size and spectrum is None and not _without_memory(run):
+            yield _rise_not_seen(run, first / size)
         return
     yield Finding(
         "warning",
@@ -66,6 +75,31 @@ def doubts_of_start(
         "a missing effect. Give the record from rest on, or rate_before in the study if a steady "
         "flow came before; otherwise leave the run out.",
     )
+
+
+def _rise_not_seen(run: ShearRun, share: float) -> Finding:
+    return Finding(
+        "warning",
+        "start",
+        run.name,
+        f"{run.name} is taken as starting from rest, but does not show it: its first stress, at "
+        f"{run.time[0]:.3g} s, is {100 * share:.0f} % of the largest, and nothing before it was "
+        "recorded. Sample the start, or give rate_before in the study if a steady flow came "
+        "before; what came before would look like a missing effect. A solvent's viscosity makes "
+        "stress at once: where it is most of the fluid's, nothing is wrong.",
+    )
+
+
+def _without_memory(run: ShearRun) -> bool:
+    """Whether a power law of the rate, where it changes, makes the stress at every sample."""
+    rate, stress = np.abs(run.shear_rate), run.shear_stress * np.sign(run.shear_rate)
+    use = (rate > 0.0) & (stress > 0.0)
+    if np.ptp(run.shear_rate) < _NOTICEABLE * np.max(rate) or np.count_nonzero(use) < 3:
+        return False
+    power = np.polynomial.Polynomial.fit(np.log(rate[use]), np.log(stress[use]), 1)
+    left = stress[use] - np.exp(power(np.log(rate[use])))
+    lost = stress[~use]
+    return bool(left @ left + lost @ lost < _TRANSIENT**2 * (stress @ stress))
 
 
 def _only_falls(run: ShearRun) -> bool:

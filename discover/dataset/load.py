@@ -125,8 +125,8 @@ def load_dataset(
     rate_window
         Samples in the moving window when the rate is derived from strain.
     rate_before
-        Column of ``runs.csv`` with the shear rate in 1/s of the steady flow before each run; by
-        default every run starts from rest.
+        Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
+        the unit at the end of its name; by default every run starts from rest.
     sequence
         Column of ``runs.csv`` that orders the runs where they were made one after another on one
         sample, such as start times; by default every run has a sample of its own.
@@ -142,6 +142,7 @@ def load_dataset(
     before = np.zeros(len(index))
     if rate_before is not None:
         before = read_column(index, "rate_before", rate_before)
+        before = before * units.heading_factor(rate_before, units.SHEAR_RATE)
     aside = [reason_to_set_aside(index, row, rate_before is not None) for row in range(len(index))]
     used = [row for row, reason in enumerate(aside) if reason is None]
     if not used and aside:

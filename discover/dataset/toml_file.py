@@ -9,10 +9,19 @@ from discover.dataset.table import read_bytes
 from discover.errors import InputError
 
 _DEEPEST_KEY = 16
-_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-# the library's time grows with the square of the parts, and with their square again in its errors
-_DEEP_KEY = re.compile(
-    rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_DEEPEST_KEY},}}+[ \t]*+[=\]]"
+_PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\[^\n])*+"?|'[^'\n]*+'?)"""
+_LINK = rf"[ \t]*+\.[ \t]*+{_PART}"
+# No value has more than one dot outside strings, so whatever has many is a key. Every token is
+# taken whole, closed or not, so that the time is linear in the text.
+_TOKEN = re.compile(
+    rf"""
+    \#[^\n]*+
+    | \"{{3}} (?: [^"\\] | \\. | "{{1,2}}(?!") )*+ (?:"{{3,5}})?
+    | '{{3}} (?: [^'] | '{{1,2}}(?!') )*+ (?:'{{3,5}})?
+    | (?P<deep> {_PART} (?:{_LINK}){{{_DEEPEST_KEY},}}+ )
+    | {_PART} (?:{_LINK})*+
+    """,
+    re.VERBOSE | re.DOTALL,
 )
 
 LARGEST_FILE = 1_000_000
@@ -46,7 +55,8 @@ def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]
         raise InputError(
             f"{path} is not UTF-8 text, so it is not a {kind}. Save it as UTF-8."
         ) from None
-    deep = _DEEP_KEY.search(text)
+    # the library's time grows with the square of the parts, whether they make a key or not
+    deep = next((token for token in _TOKEN.finditer(text) if token["deep"]), None)
     if deep is not None:
         line = text[: deep.start()].count("\n") + 1
         raise InputError(

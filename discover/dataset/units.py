@@ -76,9 +76,47 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
     return cycles * unit.factor / wanted.factor
 
 
+def heading_factor(column: str, quantity: Quantity) -> float:
+    """Return the factor to SI of a column whose name is the user's; one where it names no unit.
+
+    Parameters
+    ----------
+    column
+        Its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
+    quantity
+        What it holds.
+
+    Raises
+    ------
+    InputError
+        If the name ends in a unit of something else.
+    """
+    words = column.split("_")
+    endings = ["_".join(words[i:]) for i in range(1, len(words))]
+    if quantity.column.removeprefix(f"{quantity.stem}_") in endings:
+        return 1.0
+    for ending in endings:
+        unit = read_heading(ending)
+        factor = None if unit is None else factor_to(unit, quantity)
+        if factor is not None:
+            return factor
+        if unit is not None:
+            raise InputError(
+                f"The column {column} has the unit {ending.replace('_', '/')}, which is not a unit "
+                f"of {quantity.stem}. End its name with one of {quantity.unit}, as in {column[:40]}"
+                f"_{quantity.column.removeprefix(quantity.stem + '_')}."
+            )
+    return 1.0
+
+
 def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
     """Say in words how a column becomes SI; empty if it is in SI units already."""
     if factor == 1.0:
+        if "rad" in quantity.unit and "rad" not in column:
+            return (
+                f"{column} is read as {quantity.stem} in {quantity.unit}; if it counts cycles, "
+                f"name it {quantity.stem}_Hz"
+            )
         return ""
     return f"{column} is read as {quantity.stem}, times {factor:.6g}" + (
         f" to {quantity.unit}" if quantity.unit else ""

@@ -209,7 +209,8 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
             )
         value = parameters[key]
         if (
-            not isinstance(value, int | float)
+            isinstance(value, bool)  # an int to Python
+            or not isinstance(value, int | float)
             or not math.isfinite(value)
             or not low <= value <= high
         ):

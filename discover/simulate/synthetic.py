@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -74,12 +75,16 @@ def synthetic_dataset(
         protocols = protocol
     else:
         raise InputError(f"Unknown synthetic protocol {protocol!r}; write 'paper'.")
-    if not (np.isfinite(noise) and 0.0 <= noise <= 10.0):
-        raise InputError(f"noise must be a fraction from 0 to 10; got {noise}. 0.01 means 1 %.")
-    if not 2 <= n_samples <= 1_000_000:
-        raise InputError(f"n_samples must be from 2 to a million; got {n_samples}.")
-    if not (np.isfinite(duration) and duration > 0):
-        raise InputError(f"duration must be a positive number of relaxation times; got {duration}.")
+    if not (_is_number(noise) and 0.0 <= noise <= 10.0):
+        raise InputError(f"noise must be a fraction from 0 to 10; got {noise!r}. 0.01 means 1 %.")
+    if not (_is_number(n_samples) and 2 <= n_samples <= 1_000_000):
+        raise InputError(f"n_samples must be from 2 to a million; got {n_samples!r}.")
+    if not (_is_number(duration) and duration > 0):
+        raise InputError(
+            f"duration must be a positive number of relaxation times; got {duration!r}."
+        )
+    if isinstance(seed, bool):
+        raise InputError(f"seed must be a whole number; got {seed!r}. Write 0 or 1.")
     fluid = Fluid.dimensionless(make_law(law, parameters))
     times = np.linspace(0.0, duration, n_samples)
     generator = np.random.default_rng(seed)
@@ -106,6 +111,12 @@ def synthetic_dataset(
         exact=exact,
         noise=float(noise),
     )
+
+
+def _is_number(value: Any) -> bool:
+    # a truth value is an int to Python, and none to the reader of a study
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    return number and bool(np.isfinite(value))
 
 
 def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = None) -> LinearSweep:

@@ -75,15 +75,17 @@ def lock_folder(folder: str | Path) -> FolderLock:
 
 
 def _open(path: Path) -> int:
-    """Open the lock file; a pipe or link that somebody put in its place is refused."""
+    """Open the lock file; whatever else somebody put in its place is refused, and not written."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
     try:
         descriptor = os.open(path, flags, 0o644)
     except OSError as error:
-        if not (path.is_symlink() or path.is_dir()):
+        if not os.path.lexists(path) or (path.is_file() and not path.is_symlink()):
             raise
         raise InputError(_no_lock(path)) from error
-    if stat.S_ISREG(os.fstat(descriptor).st_mode):
+    found = os.fstat(descriptor)
+    # a file of two names is somebody's other file too
+    if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
         return descriptor
     os.close(descriptor)
     raise InputError(_no_lock(path))
@@ -91,7 +93,8 @@ def _open(path: Path) -> int:
 
 def _no_lock(path: Path) -> str:
     return (
-        f"{path} is no plain file, so the folder cannot be locked. Remove it, or use another --out."
+        f"{path} is no plain file with one name, so the folder cannot be locked. Remove it, or use "
+        "another --out."
     )
 
 

@@ -145,6 +145,30 @@ def test_a_package_that_lies_about_its_sizes_is_not_unpacked_whole(package, tmp_
     assert most < 20_000_000
 
 
+def test_a_package_of_very_many_files_is_refused_before_they_are_listed(package, tmp_path):
+    other = tmp_path / "other.whl"
+    with zipfile.ZipFile(other, "w") as archive:
+        for i in range(20_001):
+            archive.writestr(f"a{i}", b"")
+    raw = bytearray(other.read_bytes())
+    end = raw.rindex(b"PK\x05\x06")
+    raw[end + 8 : end + 12] = b"\x01\x00\x01\x00"  # the number of files that it claims
+    other.write_bytes(raw)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"more than 20000 files.*Download made-up"):
+        fetch(CATALOGUE["polyisoprene"], other)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2 * len(raw)
+
+
+def test_a_package_of_some_thousand_files_is_read(package, tmp_path):
+    with zipfile.ZipFile(package, "a") as archive:
+        for i in range(5_000):
+            archive.writestr(f"a{i}", b"")
+    assert "runs.csv" in fetch(CATALOGUE["polyisoprene"], package)
+
+
 @pytest.mark.parametrize(
     ("kind", "words"), [(zipfile.ZIP_BZIP2, "packed"), (zipfile.ZIP_DEFLATED, "too large")]
 )

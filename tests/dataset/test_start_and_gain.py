@@ -114,6 +114,28 @@ def test_nothing_is_said_of_a_rate_that_falls_and_takes_the_stress_along(tmp_pat
     assert about(write(tmp_path, run, linear=False), "start") == []
 
 
+@pytest.mark.parametrize("late", [2.0, 4.0, 20.0])
+def test_a_start_up_whose_rise_was_not_recorded_does_not_show_a_start_from_rest(tmp_path, late):
+    run = giesekus(START_UP[1:] + late, lambda t: 0.3)
+    run["time_s"] = START_UP[1:]
+    (said,) = about(write(tmp_path, run, linear=False), "start")
+    assert "does not show it: its first stress, at 0.01 s, is" in said
+    assert float(said.split(" % of the largest")[0].split()[-1]) > 50.0
+
+
+def test_an_oscillation_sampled_too_late_does_not_show_a_start_from_rest(tmp_path):
+    run = giesekus(CYCLES, lambda t: 8.0 * np.cos(OMEGA * t))
+    run = {name: values[9:] for name, values in run.items()}
+    (said,) = about(write(tmp_path, run, linear=False), "start")
+    assert "nothing before it was recorded" in said
+
+
+@pytest.mark.parametrize("rate", [0.05, 0.3, 2.0])
+def test_the_same_records_with_their_rise_are_not_doubted(tmp_path, rate):
+    runs = [giesekus(START_UP[1:], lambda t: rate), giesekus(START_UP[20:], lambda t: rate)]
+    assert about(write(tmp_path, *runs, linear=False), "start") == []
+
+
 @pytest.mark.parametrize("gain", [0.88, 1.15])
 def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
     runs = [giesekus(START_UP, lambda t, r=r: r) for r in (0.02, 0.06, 0.2, 0.5)]
@@ -123,6 +145,69 @@ def test_a_gain_that_all_runs_share_is_said_once_with_its_size(tmp_path, gain):
     found = float(said.split("small strain is ")[1].split()[0])
     assert found == pytest.approx(gain, abs=0.02)
     assert 'modulus_Pa = "fit"' in said
+
+
+def oscillation(amplitude, gain=1.0, cosine=True):
+    wave = np.cos if cosine else np.sin
+    run = giesekus(CYCLES, lambda t: amplitude * OMEGA * wave(OMEGA * t), noise=0.02)
+    return {**run, "stress_Pa": gain * run["stress_Pa"]}
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "gain"), [((0.03,), 0.7), ((0.03,), 0.9), ((0.03, 0.1), 1.2),
+                             ((0.03, 0.1, 10.0), 0.7)]
+)  # fmt: skip
+def test_a_gain_of_oscillations_is_said_however_few_they_are(tmp_path, amplitudes, gain):
+    runs = [oscillation(amplitude, gain) for amplitude in amplitudes]
+    (said,) = about(write(tmp_path, *runs), "gain")
+    assert said.startswith("In the one run" if len(amplitudes) == 1 else "In both runs")
+    found = float(said.split("small strain is ")[1].split()[0])
+    assert found == pytest.approx(gain, rel=0.02)
+
+
+@pytest.mark.parametrize("cosine", [True, False])
+@pytest.mark.parametrize("amplitudes", [(0.03,), (0.1, 0.18), (1.0, 10.0), (0.03, 0.1, 1.0, 10.0)])
+def test_no_gain_is_said_of_oscillations_that_agree_or_are_nonlinear(tmp_path, amplitudes, cosine):
+    runs = [oscillation(amplitude, cosine=cosine) for amplitude in amplitudes]
+    assert about(write(tmp_path, *runs), "gain") == []
+
+
+def test_no_gain_is_said_of_an_oscillation_that_lags_its_rate(tmp_path):
+    run = oscillation(0.05)
+    late = giesekus(CYCLES, lambda t: 0.05 * OMEGA * np.cos(OMEGA * t - 0.5))
+    assert about(write(tmp_path, {**run, "stress_Pa": late["stress_Pa"]}), "gain") == []
+
+
+def start_ups(rates, gain=1.0, noise=0.01):
+    """Start-ups whose noise is a share of the stress."""
+    generator = np.random.default_rng(3)
+    runs = [giesekus(START_UP, lambda t, r=r: r, noise=0.0) for r in rates]
+    for run in runs:
+        spread = noise * generator.standard_normal(len(START_UP))
+        run["stress_Pa"] = gain * run["stress_Pa"] * (1 + spread)
+    return runs
+
+
+@pytest.mark.parametrize("rates", [(0.05,), (0.02, 0.06)])
+def test_one_start_up_or_two_tell_a_gain_that_is_clear_of_their_scatter(tmp_path, rates):
+    (said,) = about(write(tmp_path, *start_ups(rates, 0.9)), "gain")
+    assert "small strain is 0.9" in said
+    assert about(write(tmp_path, *start_ups(rates)), "gain") == []
+    assert about(write(tmp_path, *start_ups(rates, 0.9, noise=0.25)), "gain") == []
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.2, 2.0, 20.0])
+def test_no_gain_is_said_of_one_noisy_start_up_that_agrees(tmp_path, rate):
+    run = giesekus(START_UP, lambda t: rate, noise=0.02)
+    assert about(write(tmp_path, run), "gain") == []
+
+
+def test_a_small_gain_that_three_runs_share_is_noted_and_not_doubted(tmp_path):
+    runs = start_ups((0.02, 0.06, 0.2), 0.94, noise=0.003)
+    found = [f for f in check_folder(write(tmp_path, *runs)) if f.subject == "gain"]
+    assert [f.severity for f in found] == ["note"]
+    assert "is 0.94" in str(found[0])
+    assert "leave open where nothing is wrong" in str(found[0])
 
 
 def test_no_gain_is_said_of_runs_that_agree_with_the_sweep(tmp_path):

@@ -108,3 +108,34 @@ def test_an_import_says_its_conversions(tmp_path):
     said = CliRunner().invoke(app, arguments).output
     assert "stress = Stress [kPa] × 1000" in said
     assert "Time [s] ×" not in said
+
+
+def test_a_frequency_that_does_not_say_radians_is_said_to_be_read_so(tmp_path):
+    write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}", "omega_1_s,Gp_Pa,Gpp_Pa\n1,1,5\n")
+    said = [str(f) for f in check_folder(tmp_path) if f.subject == "units"]
+    assert ["omega_1_s is read as omega in rad/s; if it counts cycles, name it omega_Hz" in text
+            for text in said] == [True]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("column", "rate"),
+    [("rate_before_1_min", 0.05), ("rate_before_1_s", 3.0), ("rate_before", 3.0),
+     ("rate_before_1_ms", 3000.0), ("gdot0", 3.0)],
+)  # fmt: skip
+def test_a_rate_before_is_read_in_the_unit_that_its_heading_names(tmp_path, column, rate):
+    folder = write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}")
+    (folder / "runs.csv").write_text(f"file,{column}\na.csv,3\n")
+    (run,) = load_dataset(folder, rate_before=column)
+    assert run.rate_before == pytest.approx(rate, rel=1e-12)
+    said = " ".join(str(f) for f in check_folder(folder) if f.subject == "start")
+    assert ("multiplying by" in said) == (rate != 3.0)
+    assert (f"multiplying by {rate / 3:.6g};" in said) == (rate != 3.0)
+
+
+def test_a_rate_before_in_another_quantitys_unit_is_refused(tmp_path):
+    folder = write(tmp_path, f"time_s,shear_rate_1_s,stress_Pa\n{ROWS}")
+    (folder / "runs.csv").write_text("file,rate_before_Pa\na.csv,3\n")
+    words = r"rate_before_Pa has the unit Pa, .* End its name with one of 1/s"
+    with pytest.raises(InputError, match=words):
+        load_dataset(folder, rate_before="rate_before_Pa")
+    assert any("has the unit Pa" in str(f) for f in check_folder(folder).of("warning"))

@@ -1,6 +1,7 @@
 """What somebody else put into a result folder is refused, neither followed nor waited for."""
 
 import os
+import socket
 
 import pytest
 
@@ -9,10 +10,14 @@ from discover.study import RunFolder
 from discover.study.lock import LOCK_FILE
 
 
-@pytest.mark.parametrize("kind", ["pipe", "link", "folder"])
-def test_a_lock_that_is_no_plain_file_is_refused_at_once(tmp_path, kind):
+@pytest.mark.parametrize("kind", ["pipe", "link", "folder", "socket"])
+def test_a_lock_that_is_no_plain_file_is_refused_at_once(tmp_path, kind, monkeypatch):
     lock = tmp_path / LOCK_FILE
-    if kind == "pipe":
+    if kind == "socket":
+        monkeypatch.chdir(tmp_path)  # an address has no room for a long path
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(LOCK_FILE)
+    elif kind == "pipe":
         os.mkfifo(lock)
     elif kind == "link":
         lock.symlink_to(tmp_path / "elsewhere")
@@ -21,6 +26,16 @@ def test_a_lock_that_is_no_plain_file_is_refused_at_once(tmp_path, kind):
     with pytest.raises(InputError, match="no plain file"):
         RunFolder(tmp_path, "abc")
     assert not (tmp_path / "elsewhere").exists()
+
+
+def test_a_lock_that_is_another_file_by_a_second_name_is_left_as_it_is(tmp_path):
+    precious = tmp_path / "precious"
+    precious.write_text("thesis")
+    (tmp_path / "out").mkdir()
+    os.link(precious, tmp_path / "out" / LOCK_FILE)
+    with pytest.raises(InputError, match="one name"):
+        RunFolder(tmp_path / "out", "abc")
+    assert precious.read_text() == "thesis"
 
 
 def test_a_lock_left_behind_is_taken_over(tmp_path):

@@ -1,7 +1,13 @@
 """Values of a study are of the kind that they are written as; nothing is turned into another."""
 
+import subprocess
+import sys
+import time
+import tomllib
+
 import pytest
 
+from discover.dataset.toml_file import read_toml
 from discover.errors import InputError
 from discover.study import parse_study, read_study
 
@@ -38,6 +44,34 @@ def test_noise_of_synthetic_data_is_no_truth_value():
         parse_study({"data": {"synthetic": {"law": "giesekus", "noise": True}}})
 
 
+def test_python_refuses_truth_values_and_text_for_numbers_as_studies_do():
+    """In a process of its own: the types that tests check would stop most of these calls."""
+    code = """
+import numpy as np
+import discover as dc
+cases = ({"noise": True}, {"noise": "0.1"}, {"duration": True}, {"seed": True},
+         {"n_samples": None}, {"parameters": {"alpha": True}})
+for case in cases:
+    try:
+        dc.synthetic_dataset("giesekus", **{"parameters": {"alpha": 0.3}, **case})
+    except dc.InputError as error:
+        print(error)
+made = dc.synthetic_dataset(
+    "giesekus", {"alpha": 1}, noise=np.float64(0.01), n_samples=np.int64(20), duration=2
+)
+print(made.noise, len(made.runs[0]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
+    *refused, taken = done.stdout.splitlines()
+    assert [line.split("; got ")[0].count(" must be ") for line in refused] == [1] * 6
+    assert [line.split("; got ")[1].split(".")[0] for line in refused] == [
+        "True", "'0", "True", "True", "None", "True",
+    ]  # fmt: skip
+    assert taken == "0.01 20"
+
+
 def test_whole_numbers_are_numbers_and_truth_values_are_truth_values():
     model = study("model", modulus_Pa=3, parameters={"alpha": 0}).model
     assert (model.modulus_Pa, model.parameters["alpha"]) == (3.0, 0.0)
@@ -66,8 +100,50 @@ def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path, li
         read_study(path)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [".".join(["a"] * 300_000) + " \n", ".".join(['"a\\""'] * 120_000) + " = 1\n",
+     "[" + ".".join(["a"] * 300_000) + "]", "[[" + " . ".join(["a"] * 150_000),
+     "x = {" + ".".join(["'#'"] * 200_000) + " = 1}", "x.\"'\"." + ".".join(["a"] * 300_000)],
+    ids=["no value", "escapes", "header", "open header", "literals", "quotes"],
+)  # fmt: skip
+def test_whatever_follows_a_deep_key_it_is_refused_within_a_second(tmp_path, text):
+    path = tmp_path / "deep.toml"
+    path.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(InputError, match="more than 16 parts on line 1"):
+        read_study(path)
+    assert time.process_time() - begun < 1.0
+
+
+@pytest.mark.parametrize("text", ['"' + '\\"' * 400_000, '"""' + '\\"' * 400_000, "." * 900_000])
+def test_strings_that_never_end_are_read_once(tmp_path, text):
+    path = tmp_path / "open.toml"
+    path.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(InputError, match="not valid TOML"):
+        read_study(path)
+    assert time.process_time() - begun < 2.0
+
+
 def test_dots_in_values_are_no_parts_of_a_key(tmp_path):
     path = tmp_path / "good.toml"
     name = ".".join(["run"] * 50) + ".csv"
     path.write_text(f'[data]\nfolder = "."\nfit = ["{name}"]\n')
     assert read_study(path).data.fit == (name,)
+
+
+DOTS = "a." * 40
+
+
+@pytest.mark.parametrize(
+    "text",
+    [f'x = "{DOTS}\\"{DOTS}"', f"x = '{DOTS}\\'", f'x = """{DOTS}\n"" {DOTS}\\""" {DOTS}"""""',
+     f"x = '''{DOTS}\n'' {DOTS}'''", f"# {DOTS}\nx = 1 # \"{DOTS}", f"x = {[1.5] * 2000}",
+     ".".join(["a"] * 16) + " = 1", f'"{DOTS}" = 1'],
+    ids=["basic", "literal", "lines", "literal lines", "comment", "floats", "16 parts", "one part"],
+)  # fmt: skip
+def test_dots_that_divide_no_key_are_let_through(tmp_path, text):
+    path = tmp_path / "good.toml"
+    path.write_text(text)
+    assert read_toml(path, "study file", "")[0] == tomllib.loads(text)

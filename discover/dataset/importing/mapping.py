@@ -2,8 +2,10 @@
 
 import json
 import math
+import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
+from urllib.parse import quote, unquote_to_bytes
 
 from pydantic import Field, model_validator
 
@@ -80,12 +82,29 @@ class Layout(Section):
     encoding: str | None = None
 
 
+_ENCODED = "file_percent_encoded"
+
+
 class Source(Section):
-    """A file that was imported, with its hash."""
+    """A file that was imported, with its hash.
+
+    TOML is UTF-8, and names on old disks need not be: ``file_percent_encoded`` takes the place of
+    ``file`` there.
+    """
 
     file: str
     sha256: str | None = None
     sweep: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _decoded(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or not isinstance(content.get(_ENCODED), str):
+            return content
+        if "file" in content:
+            raise ValueError(f"give file or {_ENCODED}, not both")
+        name = os.fsdecode(unquote_to_bytes(content[_ENCODED]))
+        return {"file": name, **{k: v for k, v in content.items() if k != _ENCODED}}
 
 
 class Mapping(Section):
@@ -141,12 +160,20 @@ def write_mapping(mapping: Mapping) -> str:
         if known:
             lines += ["", f"[{name}]", *(f"{key} = {_toml(known[key])}" for key in known)]
     for source in mapping.source:
-        lines += ["", "[[source]]", f"file = {_toml(source.file)}"]
+        lines += ["", "[[source]]", _file(source.file)]
         if source.sha256:
             lines.append(f"sha256 = {_toml(source.sha256)}")
         if source.sweep:
             lines.append("sweep = true")
     return "\n".join(lines) + "\n"
+
+
+def _file(name: str) -> str:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return f"{_ENCODED} = {_toml(quote(os.fsencode(name)))}"
+    return f"file = {_toml(name)}"
 
 
 def _toml(value: object) -> str:
