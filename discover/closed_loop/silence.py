@@ -16,6 +16,9 @@ from discover.statistics.dead_records import CHANCE
 from discover.statistics.residual import judging, summarise
 
 _OFF = 1e-30  # factor on the moduli of a fluid that is switched off
+_ALIKE = 1.1
+"""Misfits without and with a fluid that differ by less are alike: where structure is left, few
+samples are independent, and the test alone would not see a fluid that halves the misfit."""
 
 
 def records_are_silent(runs: Sequence[ShearRun]) -> bool:
@@ -52,7 +55,7 @@ def fluid_is_silent(
     weight = np.asarray(batch.weight)
     rows = judging(weight)
     lost, left = (float(np.sum(r[rows] ** 2)) for r in (without, fit.residual))
-    if not np.isfinite(lost) or left <= 0.0:
+    if not np.isfinite(lost) or left <= 0.0 or lost > _ALIKE**2 * left:
         return False
     samples = summarise(fit.residual[rows], weight[rows]).effective_samples
     return bool(samples * np.log(lost / left) < chi2.isf(CHANCE, fluid))

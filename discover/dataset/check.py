@@ -11,7 +11,7 @@ from discover.dataset import units
 from discover.dataset.check_among import doubts_among_runs
 from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
 from discover.dataset.check_run import doubts_of_run
-from discover.dataset.check_start import doubts_of_start
+from discover.dataset.check_start import doubts_of_start, doubts_of_unseen_start
 from discover.dataset.finding import Finding, Findings
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
@@ -87,7 +87,10 @@ def check_folder(
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
     for run in runs:
-        findings += doubts_of_start(run, sweep, spectrum)
+        doubts = list(doubts_of_start(run, sweep, spectrum))
+        if not doubts and spectrum is None:
+            doubts = doubts_of_unseen_start(run)
+        findings += doubts
     findings += against_linear_theory(runs, sweep, spectrum)
     findings += doubts_among_runs(runs)
     findings += _folder(root, index, runs)

@@ -36,8 +36,7 @@ def doubts_of_start(
     is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
     or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
     already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
-    that was recorded with it says that the rate had been another before. Where no sweep says how
-    fast stress grows, a first stress above half of the largest is doubted too.
+    that was recorded with it says that the rate had been another before.
 
     Parameters
     ----------
@@ -46,12 +45,9 @@ def doubts_of_start(
     sweep, spectrum
         The linear sweep and its relaxation modes, if there are any.
     """
-    size = float(np.max(np.abs(run.shear_stress)))
-    first = abs(float(run.shear_stress[0]))
-    if run.rate_before != 0.0 or len(run) < 5 or first < max(_FAR_FROM_REST * size, 1e-300):
+    if not _is_loaded_at_first(run):
         return
-    if first < 5.0 * stress_noise(run):
-        return
+    size, first = _largest_and_first(run)
     if _only_falls(run):
         why = "it falls from there whatever the rate does, as after a step of strain"
     elif _steady_alternation(run):
@@ -61,10 +57,6 @@ def doubts_of_start(
     elif _strained_before(run):
         why = "the strain recorded there is not what its rate had made by then"
     else:
-        # of an oscillation that was recorded from its start on, the cycles have told
-        late = run.time[0] > 0.0 or oscillation(run) is None
-        if late and first >= _RISE_OVER * size and spectrum is None and not _without_memory(run):
-            yield _rise_not_seen(run, first / size)
         return
     yield Finding(
         "warning",
@@ -77,17 +69,44 @@ def doubts_of_start(
     )
 
 
-def _rise_not_seen(run: ShearRun, share: float) -> Finding:
-    return Finding(
+def doubts_of_unseen_start(run: ShearRun) -> Iterator[Finding]:
+    """Yield a doubt if a run began so late that nothing shows whether it started from rest.
+
+    For runs without a sweep, which would say how fast the stress grows, and without a better reason
+    to doubt (`doubts_of_start`). It may have started from rest all the same.
+
+    Parameters
+    ----------
+    run
+        A run that loads.
+    """
+    size, first = _largest_and_first(run)
+    # of an oscillation that was recorded from its start on, the cycles have told
+    told = run.time[0] == 0.0 and oscillation(run) is not None
+    if not _is_loaded_at_first(run) or first < _RISE_OVER * size or told or _without_memory(run):
+        return
+    yield Finding(
         "warning",
         "start",
         run.name,
         f"{run.name} is taken as starting from rest, but does not show it: its first stress, at "
-        f"{run.time[0]:.3g} s, is {100 * share:.0f} % of the largest, and nothing before it was "
-        "recorded. Sample the start, or give rate_before in the study if a steady flow came "
+        f"{run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing before it "
+        "was recorded. Sample the start, or give rate_before in the study if a steady flow came "
         "before; what came before would look like a missing effect. A solvent's viscosity makes "
         "stress at once: where it is most of the fluid's, nothing is wrong.",
     )
+
+
+def _largest_and_first(run: ShearRun) -> tuple[float, float]:
+    return float(np.max(np.abs(run.shear_stress))), abs(float(run.shear_stress[0]))
+
+
+def _is_loaded_at_first(run: ShearRun) -> bool:
+    """Whether a run that is taken as starting from rest has a stress at its first sample."""
+    if run.rate_before != 0.0 or len(run) < 5:
+        return False
+    size, first = _largest_and_first(run)
+    return first >= max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run))
 
 
 def _without_memory(run: ShearRun) -> bool:

@@ -54,9 +54,11 @@ def _found(comparison: Comparison) -> str:
     elif sparse is not None and not sparse.terms:
         parts.append("sparse regression found no term that helps")
     elif sparse is not None:
+        n = len(sparse.terms)
         parts.append(
-            f"sparse regression's terms, {terms_text(sparse, intervals=False)}, describe the data "
-            "and are no finding"
+            f"sparse regression's {n} terms describe the data and are no finding"
+            if n > 1
+            else "sparse regression's term describes the data and is no finding"
         )
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
@@ -104,8 +106,14 @@ def _left(one: LackOfFit) -> str:
     return text
 
 
+_MOST_TERMS = 4
+"""More are a table and no sentence."""
+
+
 def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     text = f"if the law is in the library, it is {terms_text(sparse)}"
+    if len(sparse.terms) > _MOST_TERMS:
+        text = f"if the law is in the library, it has {len(sparse.terms)} terms (Laws found)"
     if comparison.truth is None:
         return text
     wanted = {t.term for t in comparison.truth}

@@ -147,14 +147,14 @@ def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> fl
     return max(values, default=None)
 
 
-def terms_text(outcome: LearnerOutcome, intervals: bool = True) -> str:
-    """Return the law's terms as plain text, with or without the intervals of the coefficients."""
+def terms_text(outcome: LearnerOutcome) -> str:
+    """Return the law's terms as plain text, with the intervals of the coefficients."""
     if not outcome.terms:
         return "no term at all"
     parts = []
     for term in outcome.terms:
         text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
-        if intervals and term.ci95 is not None:
+        if term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)

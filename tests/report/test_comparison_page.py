@@ -204,6 +204,7 @@ def test_an_unexplained_verdict_leads_and_claims_nothing(tmp_path, no_pictures):
     assert "2.2 %" in found
     assert "correlated to 0.78" in found
     assert "no finding" in found
+    assert "σ·σ" not in found  # nor a coefficient of what is none
     assert "nothing is determined" in sure
     assert "close-loop" in following
     page = page_of(comparison, tmp_path)
