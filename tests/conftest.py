@@ -22,6 +22,18 @@ enable_x64()
 enable_compilation_cache(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
 
 
+# files of a minute and more
+_LONG = {
+    "test_measured.py", "test_commands.py", "test_notebooks.py", "test_contract_script.py",
+    "test_tensor_sindy_estimator.py", "test_planting.py", "test_estimators.py", "test_reports.py",
+}  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let long files begin first, so that no worker waits for another at the end."""
+    items.sort(key=lambda item: item.path.name not in _LONG)
+
+
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Return the folder of measured data sets, or skip and say why."""
