@@ -174,8 +174,8 @@ def judge(
         )
     elif silence == "fluid":
         text = (
-            f"{missed}, more than {causes} ({_percent(expected)}), and as well without the fluid: "
-            "what was found explains nothing, and something else is in the records."
+            f"{missed} ({_percent(expected)} of it is what {causes}), and as well without the "
+            "fluid: what was found explains nothing, and something else is in the records."
         )
     elif error > STRUCTURE * expected:
         text = (

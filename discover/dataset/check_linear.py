@@ -1,6 +1,6 @@
 """Doubts about runs held against linear viscoelasticity, and about the sweep itself."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -126,10 +126,11 @@ def against_linear_theory(
             f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
             "learned. Add faster runs.",
         )
-    yield from _shared_gain(runs, sweep, spectrum)
+    linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
+    yield from _shared_gain(runs, linear, sweep, spectrum)
     for run in start_ups:
         yield from _duration(run, mean_time)
-        yield from _small_strain(run, sweep, spectrum)
+        yield from _small_strain(run, *linear[run.name])
         yield from _cox_merz(run, sweep, mean_time)
 
 
@@ -188,14 +189,13 @@ def _linear_part(
 
 
 def _gain(
-    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+    run: ShearRun, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
 ) -> tuple[float, float] | None:
     """Return the logarithm of a run's gain against the sweep and its error; None if it is no gain.
 
     It is one if its ratio to linear theory does not rise or fall while the run is linear, as it
     does after a slow start, and if nothing but noise is left with it.
     """
-    stress, linear = _linear_part(run, sweep, spectrum)
     if len(stress) < _FEWEST_RATIOS or np.any(stress * linear <= 0):
         return None
     ratios = np.log(stress / linear)
@@ -215,11 +215,14 @@ def _gain(
 
 
 def _shared_gain(
-    runs: Sequence[ShearRun], sweep: LinearSweep, spectrum: RelaxationSpectrum
+    runs: Sequence[ShearRun],
+    linear: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    sweep: LinearSweep,
+    spectrum: RelaxationSpectrum,
 ) -> Iterator[Finding]:
     """Yield by which factor all runs differ from the sweep, if it is one for all."""
     from_rest = [run for run in runs if run.flows and run.rate_before == 0.0]
-    found = [gain for run in from_rest if (gain := _gain(run, sweep, spectrum)) is not None]
+    found = [gain for run in from_rest if (gain := _gain(run, *linear[run.name])) is not None]
     if not found:
         return
     gains, errors = np.array(found).T
@@ -254,9 +257,8 @@ def _shared_gain(
 
 
 def _small_strain(
-    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+    run: ShearRun, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
 ) -> Iterator[Finding]:
-    stress, linear = _linear_part(run, sweep, spectrum)
     if len(stress) < _FEWEST_RATIOS:
         return
     ratio = float(np.median(stress / linear))

@@ -57,7 +57,8 @@ def _loop_found(result: LoopResult) -> str:
             f"No candidate explains the data: what comes nearest ({names}) leaves as much without "
             "the fluid."
         )
-    first = "" if result.verdict == "unexplained" else "added "
+    # what comes near without explaining is not called added
+    lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
@@ -66,7 +67,7 @@ def _loop_found(result: LoopResult) -> str:
             for name, p in stage.parameters.items()
         )
         parts.append(
-            f"{first if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
+            f"{lead if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
         )
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
@@ -74,8 +75,6 @@ def _loop_found(result: LoopResult) -> str:
             verdict = _UNKNOWN_NOISE
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
-        if parts:  # after the verdict: what comes near is no finding
-            parts[0] = f"what comes nearest is, {parts[0]}"
     return sentence([verdict, *parts])
 
 

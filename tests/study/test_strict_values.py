@@ -100,6 +100,15 @@ def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path, li
         read_study(path)
 
 
+def seconds_to_refuse(text, reason, folder):
+    path = folder / "study.toml"
+    path.write_text(text)
+    begun = time.process_time()
+    with pytest.raises(InputError, match=reason):
+        read_study(path)
+    return time.process_time() - begun
+
+
 @pytest.mark.parametrize(
     "text",
     [".".join(["a"] * 300_000) + " \n", ".".join(['"a\\""'] * 120_000) + " = 1\n",
@@ -108,22 +117,12 @@ def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path, li
     ids=["no value", "escapes", "header", "open header", "literals", "quotes"],
 )  # fmt: skip
 def test_whatever_follows_a_deep_key_it_is_refused_within_a_second(tmp_path, text):
-    path = tmp_path / "deep.toml"
-    path.write_text(text)
-    begun = time.process_time()
-    with pytest.raises(InputError, match="more than 16 parts on line 1"):
-        read_study(path)
-    assert time.process_time() - begun < 1.0
+    assert seconds_to_refuse(text, "more than 16 parts on line 1", tmp_path) < 1.0
 
 
 @pytest.mark.parametrize("text", ['"' + '\\"' * 400_000, '"""' + '\\"' * 400_000, "." * 900_000])
 def test_strings_that_never_end_are_read_once(tmp_path, text):
-    path = tmp_path / "open.toml"
-    path.write_text(text)
-    begun = time.process_time()
-    with pytest.raises(InputError, match="not valid TOML"):
-        read_study(path)
-    assert time.process_time() - begun < 2.0
+    assert seconds_to_refuse(text, "not valid TOML", tmp_path) < 2.0
 
 
 def test_dots_in_values_are_no_parts_of_a_key(tmp_path):

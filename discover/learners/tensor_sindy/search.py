@@ -166,6 +166,7 @@ class SupportSearch:
             chosen += near[: BREADTH if size == 1 else 4]
         self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
         self._count_independent([self.of_size(size)[0] for size in range(largest + 1)])
+        # read again: the criterion decides between closed forms and polynomials of one size
         return [self.of_size(size)[0] for size in range(largest + 1)]
 
     def _count_independent(self, path: Sequence[Fit]) -> None:
