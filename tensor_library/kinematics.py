@@ -1,11 +1,16 @@
-"""Kinematics of homogeneous flows."""
+"""Kinematics of homogeneous flows.
+
+A velocity gradient is stored in one of three ways: the scalar shear rate of simple shear, which
+costs least; the four components (L11, L22, L33, L12) of a flow whose third axis is principal, which
+holds shear, every extension and both at once; and the full (3, 3) tensor.
+"""
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tensor_library.algebra import Symmetric
 
-VelocityGradient = Float[Array, "3 3"] | Float[Array, ""]
+VelocityGradient = Float[Array, "3 3"] | Float[Array, "4"] | Float[Array, ""]
 
 
 def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
@@ -29,12 +34,15 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
     Parameters
     ----------
     velocity_gradient
-        L, shape (3, 3), or the scalar shear rate of simple shear.
+        L, shape (3, 3); its components 11, 22, 33, 12, where no other is there; or the scalar
+        shear rate of simple shear.
     """
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():
         zero = jnp.zeros_like(velocity_gradient)
         return jnp.stack([zero, zero, zero, velocity_gradient])
+    if velocity_gradient.shape == (4,):
+        return velocity_gradient * jnp.array([2.0, 2.0, 2.0, 1.0])
     return velocity_gradient + velocity_gradient.T
 
 
@@ -42,12 +50,30 @@ def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGra
     """Return L·σ + σ·Lᵀ, the change of stress in a flow that carries the material lines along.
 
     This is what the upper convected derivative subtracts from dσ/dt   [Oldroyd 1950].
+
+    Parameters
+    ----------
+    stress
+        σ, shape (3, 3), or its four components 11, 22, 33, 12.
+    velocity_gradient
+        As in `rate_of_deformation`; the full tensor for a full σ, else one of the other two.
     """
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():
         zero = jnp.zeros_like(stress[0])
         return jnp.stack(
             [2.0 * velocity_gradient * stress[3], zero, zero, velocity_gradient * stress[1]]
+        )
+    if velocity_gradient.shape == (4,):
+        l11, l22, l33, l12 = velocity_gradient
+        s11, s22, s33, s12 = stress
+        return jnp.stack(
+            [
+                2.0 * (l11 * s11 + l12 * s12),
+                2.0 * l22 * s22,
+                2.0 * l33 * s33,
+                (l11 + l22) * s12 + l12 * s22,
+            ]
         )
     product = velocity_gradient @ stress
     return product + product.T

@@ -17,9 +17,10 @@ from jaxtyping import Array, Float
 from discover.closed_loop.library_matrix import LibraryMatrix
 from discover.effects import ConstitutiveEffect, LibraryTerm
 from tensor_library.integrity_basis import integrity_basis
+from tensor_library.kinematics import rate_of_deformation
 
-ModesRate = Callable[[Float[Array, "4 k"], Float[Array, " k"]], Float[Array, "4 k"]]
-"""From σ_k/G_k and λ_k γ̇ of all modes."""
+ModesRate = Callable[[Float[Array, "4 k"], Float[Array, "*c k"]], Float[Array, "4 k"]]
+"""From σ_k/G_k of all modes and their λ_k L: shear rates, (k,), or four components, (4, k)."""
 
 
 class InUse(NamedTuple):
@@ -76,8 +77,8 @@ class AddedTerms:
         library = self._library_rate(theta, used) if self._library.tensors else _nothing
         others = self._others_rate(theta, used) if self._others else _nothing
 
-        def total(stress, shear_rate):
-            return library(stress, shear_rate) + others(stress, shear_rate)
+        def total(stress, gradient):
+            return library(stress, gradient) + others(stress, gradient)
 
         return total
 
@@ -94,9 +95,9 @@ class AddedTerms:
         )
         every = _over_modes(lambda stress, rate: library.sum(matrix, stress, rate))
 
-        def one(stress, shear_rate):
-            tensor = jax.lax.switch(used.tensor, tensors, stress, shear_rate)
-            return coefficient(stress, shear_rate) * tensor
+        def one(stress, gradient):
+            tensor = jax.lax.switch(used.tensor, tensors, stress, gradient)
+            return coefficient(stress, gradient) * tensor
 
         return lambda *flow: jax.lax.switch(used.library, [_nothing, one, every], *flow)
 
@@ -112,16 +113,15 @@ class AddedTerms:
         return lambda *flow: jax.lax.switch(used.others, branches, *flow)
 
 
-def _nothing(stress, shear_rate):
-    del shear_rate
+def _nothing(stress, gradient):
+    del gradient
     return jnp.zeros_like(stress)
 
 
 def _over_modes(term: Callable) -> ModesRate:
     """Return a function of one mode's σ and γ̇, both shape (4,), as one of all modes."""
 
-    def of_mode(stress, shear_rate):
-        zero = jnp.zeros_like(shear_rate)
-        return term(stress, jnp.stack([zero, zero, zero, shear_rate]))
+    def of_mode(stress, gradient):
+        return term(stress, rate_of_deformation(gradient))
 
-    return jax.vmap(of_mode, in_axes=(-1, 0), out_axes=-1)
+    return jax.vmap(of_mode, in_axes=-1, out_axes=-1)

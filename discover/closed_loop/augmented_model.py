@@ -34,6 +34,8 @@ from discover.effects import (
 )
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled
+from discover.protocols.kinematics import Kinematics
+from tensor_library.kinematics import rate_of_deformation
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -107,25 +109,35 @@ class _Program:
         # compliance stand between the driven tool and the fluid, and the tool moves on as
         # commanded. So it does with a wrong gap: the angle is right, and the nominal rate of the
         # tool is the angle's over the nominal gap
+        flow = run.kinematics
         rate = run.commanded_rate
         for effect in self._upstream:
-            rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+            changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+            rate = _in_shear(flow, changed, rate)
         tool_rate = rate[::2]
         for effect in self._downstream:
-            rate = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+            changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
+            rate = _in_shear(flow, changed, rate)
         times = run.times[::2]
-        stress, felt = self._integrate(numbers, used, theta, times, rate)
-        stress = stress + numbers.solvent_viscosity * felt + self._beside(theta, felt)
+        stress, felt = self._integrate(numbers, used, theta, times, rate, flow)
+        stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
-            stress = effect.recorded_stress(self._values(theta, effect), record)
+            changed = effect.recorded_stress(self._values(theta, effect), record)
+            stress = _in_shear(flow, changed, stress)
         return stress[run.sample_index]
 
-    def _beside(self, theta, rate):
-        """Return the stress that effects add beside the modes."""
-        total = jnp.zeros_like(rate)
+    def _beside(self, numbers, theta, rate, flow: Kinematics | None):
+        """Return the recorded stress of the solvent and of what effects add beside the modes.
+
+        What an effect says of shear holds for any flow of the same intensity: the stress is that of
+        a generalised Newtonian fluid   [Bird, Armstrong & Hassager 1987, vol. 1, chapter 4].
+        """
+        intensity, viscous = (1.0, 1.0) if flow is None else (flow.intensity, flow.viscous)
+        total = numbers.solvent_viscosity * viscous * rate
         for effect in self._constitutive:
-            total = total + effect.instantaneous_stress(self._values(theta, effect), rate)
+            shear = effect.instantaneous_stress(self._values(theta, effect), intensity * rate)
+            total = total + viscous / intensity * shear
         return total
 
     def _law(self, numbers, theta):
@@ -144,20 +156,19 @@ class _Program:
         assert by_mode is not None
         factors = by_mode.factors(self._values(theta, by_mode), *modes)
 
-        def of_mode(stress, shear_rate):
-            zero = jnp.zeros_like(shear_rate)
-            return law.extra_term(stress, jnp.stack([zero, zero, zero, shear_rate]))
+        def of_mode(stress, gradient):
+            return law.extra_term(stress, rate_of_deformation(gradient))
 
-        of_law = jax.vmap(of_mode, in_axes=(-1, 0), out_axes=-1)
+        of_law = jax.vmap(of_mode, in_axes=-1, out_axes=-1)
 
-        def differing(stress, shear_rate):
+        def differing(stress, gradient):
             # a mode that an effect adds stands after the declared ones, and is as they are in mean
-            declared = jnp.ones(len(shear_rate)).at[: len(factors)].set(factors)
-            return (declared - 1.0) * (of_law(stress, shear_rate) + added(stress, shear_rate))
+            declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
+            return (declared - 1.0) * (of_law(stress, gradient) + added(stress, gradient))
 
         return differing
 
-    def _integrate(self, numbers, used, theta, times, rate):
+    def _integrate(self, numbers, used, theta, times, rate, flow: Kinematics | None):
         law = self._law(numbers, theta)
         # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
@@ -165,7 +176,7 @@ class _Program:
             modulus = modulus * jnp.exp(theta[0])
         if self.structure.fit_relaxation_time:
             relaxation_time = relaxation_time * jnp.exp(theta[1])
-        of_law = jax.vmap(law.stress_rate, in_axes=(-1, 0), out_axes=-1)
+        of_law = jax.vmap(law.stress_rate, in_axes=-1, out_axes=-1)
         added = self.added.rate(theta, used)
 
         extra = None
@@ -173,21 +184,23 @@ class _Program:
             pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
             extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
 
-        def modes_rate(stress, shear_rate):
-            same = of_law(stress, shear_rate) - added(stress, shear_rate)
+        def modes_rate(stress, gradient):
+            same = of_law(stress, gradient) - added(stress, gradient)
             if self._by_mode is None:
                 return same
             differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))
             return same - jax.lax.switch(
-                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, shear_rate
+                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, gradient
             )
 
         series = None
         if self._series:
             pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
             slip, compliance = (sum(column) for column in zip(*pairs, strict=True))
-            viscosity = numbers.solvent_viscosity + self._beside(theta, jnp.ones(1))[0]
-            series = Series(jnp.asarray(slip), jnp.asarray(compliance), viscosity)
+            viscosity = self._beside(numbers, theta, jnp.ones(1), flow)[0]
+            none = jnp.zeros(())
+            slip, compliance = (_in_shear(flow, jnp.asarray(s), none) for s in (slip, compliance))
+            series = Series(slip, compliance, viscosity)
         return integrate(
             modes_rate,
             law.linear_relaxation,
@@ -197,7 +210,16 @@ class _Program:
             series,
             times,
             rate,
+            flow,
         )
+
+
+def _in_shear(flow: Kinematics | None, changed, unchanged):
+    """Return what a rheometer's effect changes: runs in shear alone.
+
+    An extension is made on another instrument, with flaws of its own.
+    """
+    return changed if flow is None else jnp.where(flow.recorded[3] == 1.0, changed, unchanged)
 
 
 _program = lru_cache(maxsize=16)(_Program)

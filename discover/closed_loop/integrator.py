@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.effects import StateEffect
+from discover.protocols.kinematics import Kinematics
 from discover.simulate.exponential_runge_kutta import phi_functions
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
@@ -84,13 +85,15 @@ def integrate(
     series: Series | None,
     times: Float[Array, " s"],
     rate: Float[Array, " m"],
+    flow: Kinematics | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
-    """Return σ12 of the modes in Pa and the felt shear rate in 1/s at step ends.
+    """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
     Parameters
     ----------
     slope
-        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and λγ̇, shape (k,).
+        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
+        shape (k,), in simple shear, else four components, shape (4, k).
     linear_relaxation
         Whether −σ is part of it; it is then integrated exactly.
     declared, extra
@@ -101,7 +104,9 @@ def integrate(
     series
         Elements in series with the fluid.
     times, rate
-        Step ends, shape (s,), and the shear rate at ends and middles in turn, shape (2 s − 1,).
+        Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
+    flow
+        Which flow has this rate; None is simple shear.
     """
     width = jnp.diff(times)
     weights = [_weights(declared.relaxation_time, width, linear_relaxation)]
@@ -112,12 +117,24 @@ def integrate(
     modulus, relaxation_time = modes
     slope = jax.jit(slope)  # so that it is traced once, and not at each of the four stages
 
+    def gradient(shear_rate):
+        return shear_rate if flow is None else flow.gradient[:, None] * shear_rate
+
+    def recorded(stress):
+        return (stress[3] if flow is None else flow.stress(stress)) @ modulus
+
+    def sheared(stress, shear_rate):
+        # what a state feels: a shear of the same intensity that does the same work
+        if flow is None:
+            return stress[3] @ modulus, shear_rate
+        return flow.equivalent_shear_stress(stress) @ modulus, flow.intensity * shear_rate
+
     def remainder(stress, shear_rate, factor):
         # with all times longer by a factor the law holds in its own time, which runs slower
         if states:
-            change = slope(stress, factor * relaxation_time * shear_rate) / factor
+            change = slope(stress, gradient(factor * relaxation_time * shear_rate)) / factor
         else:
-            change = slope(stress, relaxation_time * shear_rate)
+            change = slope(stress, gradient(relaxation_time * shear_rate))
         return change + stress if linear_relaxation else change
 
     def step(carry, inputs):
@@ -126,9 +143,10 @@ def integrate(
         w = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
         half, full, a21, a31, a32, a41, a43, b1, b23, b4 = w
         scale = _combined("modulus_factor", states, levels)
-        shear_before = scale * (stress[3] @ modulus)
+        shear_before, felt_rate = sheared(stress, middle_rate)
+        shear_before = scale * shear_before
         predicted = [
-            [_relax(e, v, s, middle_rate, shear_before, share * h) for share in (0.5, 1.0)]
+            [_relax(e, v, s, felt_rate, shear_before, share * h) for share in (0.5, 1.0)]
             for (e, v), s in zip(states.items(), levels, strict=True)
         ]
         slow_first = _combined("time_factor", states, levels)
@@ -150,22 +168,24 @@ def integrate(
         after = full * stress + b1 * n1 + b23 * (n2 + n3) + b4 * n4
 
         # the states once more, now with the mean of the stress at both ends
-        shear_after = after[3] @ modulus
+        shear_after, felt_rate = sheared(after, middle_rate + compliance_rate)
+        stress_after = recorded(after)
         if states:
             guess = _combined("modulus_factor", states, [p[1] for p in predicted]) * shear_after
             middle_stress = 0.5 * (shear_before + guess)
             levels = tuple(
-                _relax(e, v, s, middle_rate + compliance_rate, middle_stress, h)
+                _relax(e, v, s, felt_rate, middle_stress, h)
                 for (e, v), s in zip(states.items(), levels, strict=True)
             )
-            shear_after = _combined("modulus_factor", states, levels) * shear_after
+            factor = _combined("modulus_factor", states, levels)
+            shear_after, stress_after = factor * shear_after, factor * stress_after
         if series is not None:
             torque = 0.5 * (
                 shear_before + shear_after
                 + series.viscosity * (first_rate + last_rate + 2.0 * compliance_rate)
             )  # fmt: skip
             missing = missing + compliance_rate * h + series.slip * h * torque
-        return (after, levels, missing, compliance_rate), (shear_after, compliance_rate)
+        return (after, levels, missing, compliance_rate), (stress_after, compliance_rate)
 
     zero = jnp.zeros(())
     start = (

@@ -339,7 +339,7 @@ def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> 
     """
     small = []
     for run in runs:
-        if run.rate_before != 0.0:
+        if run.flow != "shear" or not run.from_rest:
             continue  # a fluid that flowed before is not at small strain
         reached = np.maximum.accumulate(np.abs(strain_of(run)))
         keep = reached <= LINEAR_STRAIN

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import ShearRun
-from discover.protocols.shear import shear_rates
-from discover.simulate.grid import COARSEST_STRAIN, make_grid
+from discover.protocols.kinematics import Kinematics
+from discover.protocols.shear import shear_rates, stack_protocols
+from discover.simulate.grid import make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)
@@ -18,15 +19,6 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
 
-PRE_SHEAR_LENGTH = 2.0
-"""A steady flow before a run is computed over this multiple of the run's length."""
-
-PRE_SHEAR_STRAIN = 300.0
-"""Strain after which any fluid is taken to be steady."""
-
-# The steady state is a fixed point of the scheme whatever its step, so steps need only be stable
-_FEWEST_PRE_SHEAR_STEPS = 100
-
 
 class RunBatch(eqx.Module):
     """Runs on padded grids, with a leading axis of runs.
@@ -34,21 +26,23 @@ class RunBatch(eqx.Module):
     Attributes
     ----------
     times
-        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in a
-        steady flow before the run.
+        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
+        what came before the record.
     commanded_rate
-        Shear rate there, in 1/s.
+        Rate there, in 1/s.
     sample_index
         Position of the samples among step ends, shape (runs, n).
     weight
         1/(rms stress · √samples) at samples, 0 at padding: the squared residuals of a run then
         sum to its squared relative error.
     stress
-        Measured shear stress in Pa, shape (runs, n).
+        Measured stress in Pa, shape (runs, n).
     clock_factor
         Shape (runs,).
     strain_before
         Total strain of the sample before each run, shape (runs,).
+    kinematics
+        Which flow each run is; None where all are simple shear.
     """
 
     times: Float[Array, "runs m"]
@@ -58,6 +52,7 @@ class RunBatch(eqx.Module):
     stress: Float[Array, "runs n"]
     clock_factor: Float[Array, " runs"]
     strain_before: Float[Array, " runs"]
+    kinematics: Kinematics | None = None
 
 
 def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
@@ -79,7 +74,6 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
         if len(grid) > max(_LONG, 2 * len(anchors)):
             grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
-        grid = np.concatenate([_pre_shear(run), grid])
         grids.append((grid, np.searchsorted(grid, run.time)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
     n_samples = max(len(run) for run in runs)
@@ -91,7 +85,6 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         half[::2] = padded
         half[1::2] = 0.5 * (padded[1:] + padded[:-1])
         rate = shear_rates(run.protocol, half).copy()
-        rate[half < 0.0] = run.rate_before
         # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
         # that the slope of the rate at the last sample is the flow's own
         rate[half > grid[-1] + 1.01 * spacing] = 0.0
@@ -110,20 +103,9 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
                 run.strain_before,
             )
         )
-    return RunBatch(*(jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)))
-
-
-def _pre_shear(run: ShearRun) -> Float[np.ndarray, " p"]:
-    """Return times before t = 0, in s, over which the flow before a run becomes steady."""
-    speed = abs(run.rate_before)
-    if speed == 0.0:
-        return np.zeros(0)
-    length = min(PRE_SHEAR_LENGTH * run.time[-1], PRE_SHEAR_STRAIN / speed)
-    count = max(_FEWEST_PRE_SHEAR_STEPS, int(np.ceil(length * speed / COARSEST_STRAIN)))
-    times = np.linspace(-length, 0.0, count + 1)
-    # the rate jumps at 0: step to just before, so that no step straddles it
-    times[-1] = -1e-12 * length
-    return times
+    stacked = stack_protocols([run.protocol for run in runs])
+    columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
+    return RunBatch(*columns, kinematics=stacked.kinematics)
 
 
 def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:

@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_simpson
 from discover.dataset.run import ShearRun
 from discover.laws.multimode import Fluid
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
-from discover.protocols.shear import ShearProtocol, oscillatory_shear, shear_rates
+from discover.protocols.shear import ShearProtocol, oscillatory_shear, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import StudyData
@@ -156,7 +156,7 @@ def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
     dataset = data.dataset
     exact = dataset.exact if isinstance(dataset, SyntheticDataset) else None
     if exact is not None:
-        reference = stresses(exact[run.name])
+        reference = stresses(exact[run.name], run.protocol)
     else:
         candidates = {
             "sigma12": run.shear_stress,
@@ -194,7 +194,7 @@ def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
 
 
 def _exactly(truth: Fluid, protocol: ShearProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
-    return stresses(simulate(truth, protocol, times))
+    return stresses(simulate(truth, protocol, times), protocol)
 
 
 def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
@@ -202,10 +202,10 @@ def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
     return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
 
 
-def stresses(stress: ShearStress) -> dict[str, np.ndarray]:
-    """Return the compared quantities of a solution."""
+def stresses(stress: ShearStress, protocol: ShearProtocol) -> dict[str, np.ndarray]:
+    """Return the compared quantities of a solution; in extension the tensile stress comes first."""
     return {
-        "sigma12": stress.shear_stress,
+        "sigma12": recorded_at(protocol, stress.components),
         "N1": stress.first_normal_stress_difference,
         "N2": stress.second_normal_stress_difference,
     }
@@ -214,7 +214,7 @@ def stresses(stress: ShearStress) -> dict[str, np.ndarray]:
 def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
     """Return what a fluid does in a flow, or None if its stress runs away."""
     try:
-        return stresses(simulate(fluid, flow.protocol, flow.times))
+        return stresses(simulate(fluid, flow.protocol, flow.times), flow.protocol)
     except SimulationError:
         return None
 

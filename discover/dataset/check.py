@@ -16,14 +16,13 @@ from discover.dataset.finding import Finding, Findings
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import (
-    INDEX_FILE,
     SWEEP_FILE,
     find_sweep,
     read_clock_factors,
     read_index,
-    read_run,
     resolve_folder,
 )
+from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.run import LinearSweep, ShearRun, require_signal
 from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
@@ -35,6 +34,9 @@ _RUN_QUANTITIES = (
     units.FIRST_NORMAL_STRESS_DIFFERENCE,
     units.SECOND_NORMAL_STRESS_DIFFERENCE,
     units.STRAIN,
+    units.HENCKY_RATE,
+    units.TENSILE_STRESS,
+    units.HENCKY_STRAIN,
 )
 _SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from discover.dataset.finding import Finding
 from discover.dataset.run import ShearRun
+from discover.protocols.kinematics import KINDS
 
 # Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
 # band) stays within this factor
@@ -26,7 +27,11 @@ def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
     runs
         Those that load; less than two start-ups say nothing.
     """
-    start_ups = [run for run in runs if _is_start_up(run)]
+    for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
+        yield from _among_alike([r for r in runs if r.flow == kind and _is_start_up(r)])
+
+
+def _among_alike(start_ups: Sequence[ShearRun]) -> Iterator[Finding]:
     if len(start_ups) < 2:
         return
     rates = np.array([abs(run.shear_rate[0]) for run in start_ups])
@@ -52,7 +57,7 @@ def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
 def _is_start_up(run: ShearRun) -> bool:
     rate = run.shear_rate
     constant = np.ptp(rate) <= 1e-6 * np.max(np.abs(rate))
-    return bool(len(run) >= 3 and rate[0] != 0 and constant and run.rate_before == 0.0)
+    return bool(len(run) >= 3 and rate[0] != 0 and constant and run.from_rest)
 
 
 def _largest(run: ShearRun) -> float:

@@ -109,6 +109,8 @@ def against_linear_theory(
     sweep, spectrum
         The linear sweep and its relaxation modes, if there are any.
     """
+    fastest = max((np.max(np.abs(run.shear_rate)) for run in runs), default=0.0)
+    runs = [run for run in runs if run.flow == "shear" and run.from_rest]
     start_ups = [run for run in runs if _is_start_up(run)]
     yield from _second_order(start_ups, spectrum)
     if sweep is None or spectrum is None:
@@ -116,7 +118,6 @@ def against_linear_theory(
     # mean relaxation time, weighted by what each mode adds to the viscosity
     moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
     mean_time = moment / spectrum.zero_shear_viscosity
-    fastest = max((np.max(np.abs(run.shear_rate)) for run in runs), default=0.0)
     if runs and fastest * mean_time < 0.1:
         yield Finding(
             "warning",
@@ -221,7 +222,7 @@ def _shared_gain(
     spectrum: RelaxationSpectrum,
 ) -> Iterator[Finding]:
     """Yield by which factor all runs differ from the sweep, if it is one for all."""
-    from_rest = [run for run in runs if run.flows and run.rate_before == 0.0]
+    from_rest = [run for run in runs if run.flows]
     found = [gain for run in from_rest if (gain := _gain(run, *linear[run.name])) is not None]
     if not found:
         return

@@ -71,8 +71,9 @@ def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
     yield from _clock_start(run)
     yield from _strain(run)
     if np.ptp(run.shear_rate) <= 1e-6 * np.max(np.abs(run.shear_rate)):
-        yield from _start_up(run)
-        yield from _normal_stress(run)
+        if run.from_rest and np.any(run.shear_rate):
+            yield from _start_up(run)
+            yield from _normal_stress(run)
     else:
         yield from _cycles(run)
 
@@ -196,7 +197,7 @@ def _cycles(run: ShearRun) -> Iterator[Finding]:
     turns = int(np.sum(np.diff(np.sign(run.shear_rate[run.shear_rate != 0])) != 0))
     if turns < 2:
         return
-    if run.rate_before == 0.0:
+    if run.from_rest:
         yield from _work(run)
     per_cycle = 2.0 * len(run) / turns
     if per_cycle < _FEWEST_PER_CYCLE:

@@ -9,6 +9,7 @@ from discover.dataset.finding import Finding
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.dataset.run import LinearSweep, ShearRun
 from discover.dataset.run_table import oscillation
+from discover.protocols.kinematics import kinematics_of
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
@@ -103,7 +104,7 @@ def _largest_and_first(run: ShearRun) -> tuple[float, float]:
 
 def _is_loaded_at_first(run: ShearRun) -> bool:
     """Whether a run that is taken as starting from rest has a stress at its first sample."""
-    if run.rate_before != 0.0 or len(run) < 5:
+    if not run.from_rest or len(run) < 5:
         return False
     size, first = _largest_and_first(run)
     return first >= max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run))
@@ -165,11 +166,15 @@ def _steady_alternation(run: ShearRun) -> bool:
 
 
 def _more_than_linear(run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum) -> bool:
-    """Hold the first stress against γ̇ (Σ G_k λ_k (1 − exp(−t/λ_k)) + η), η of what is faster."""
+    """Hold the first stress against Tr γ̇ (Σ G_k λ_k (1 − exp(−t/λ_k)) + η), η of what is faster.
+
+    Tr is Trouton's ratio of the flow, 1 in shear.
+    """
     time = float(run.time[0])
     modes = spectrum.modulus * spectrum.relaxation_time
     # what is faster than the sweep is at most its smallest dynamic viscosity
     fast = float(np.min(sweep.loss_modulus / sweep.angular_frequency))
     linear = fast + float(-np.expm1(-time / spectrum.relaxation_time) @ modes)
-    allowed = _LINEAR_FACTOR * abs(float(run.shear_rate[0])) * linear
+    trouton = float(kinematics_of(run.flow).viscous)
+    allowed = _LINEAR_FACTOR * trouton * abs(float(run.shear_rate[0])) * linear
     return abs(float(run.shear_stress[0])) > allowed + 5.0 * stress_noise(run)

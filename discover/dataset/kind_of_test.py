@@ -1,26 +1,49 @@
-"""Which test a line of ``runs.csv`` declares, and whether a run of that kind can be fitted.
-
-A run that is no transient in shear from a known state must not be read as one: it is set aside,
-with the reason, and the other runs are used.
-"""
+"""Which test a line of ``runs.csv`` declares: flow, control, and what came before t = 0."""
 
 import math
+from dataclasses import dataclass
 
 from discover.dataset.table import Table
 from discover.errors import InputError
+from discover.protocols.kinematics import KINDS
 
 _VALUES = {
-    "flow": ("shear", "uniaxial", "planar", "biaxial"),
+    "flow": KINDS,
     "control": ("rate", "stress"),
     "start": ("rest", "periodic", "steady"),
 }
 """Columns of ``runs.csv`` that say what was done, with their values; the first is the default."""
 
-_NUMBERS = ("step_strain", "step_time_s", "temperature_C")
+_LARGEST_STEP = 1000.0
+"""Strain beyond which a step is a slip of unit, such as per cent."""
 
 
-def reason_to_set_aside(index: Table, row: int, rate_before: bool = False) -> str | None:
-    """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
+@dataclass(frozen=True)
+class DeclaredTest:
+    """What a line of ``runs.csv`` says was done.
+
+    Attributes
+    ----------
+    flow, control, start
+        As in the columns of these names.
+    step_strain
+        Strain put on before t = 0; zero where there was none.
+    step_time
+        Time over which it was put on, in s; zero is at once.
+    rate_before
+        Rate of the steady flow before t = 0, in 1/s.
+    """
+
+    flow: str
+    control: str
+    start: str
+    step_strain: float
+    step_time: float
+    rate_before: float
+
+
+def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
+    """Return which test the run on a line of ``runs.csv`` is.
 
     Parameters
     ----------
@@ -29,32 +52,57 @@ def reason_to_set_aside(index: Table, row: int, rate_before: bool = False) -> st
     row
         Counted from 0.
     rate_before
-        Whether the study says from which steady flow each run starts.
+        Rate of the steady flow before the run, in 1/s, where the study says so.
 
     Raises
     ------
     InputError
-        If a column that says what was done holds something that it cannot.
+        If a column that says what was done holds something that it cannot, or two contradict each
+        other.
     """
-    declared = {column: _value(index, row, column) for column in _VALUES}
-    step = {column: _number(index, row, column) for column in _NUMBERS}
-    if declared["flow"] != "shear":
-        return f"it is {declared['flow']} extension, and only shear is fitted"
-    if step["step_strain"]:
-        return "it is relaxation after a step of strain, and runs from rest alone are fitted"
-    if declared["start"] == "periodic":
-        return "it was recorded in steady alternation, and runs from rest alone are fitted"
-    if declared["start"] == "steady" and not rate_before:
+    flow, control, start = (_value(index, row, column) for column in _VALUES)
+    step, time = (_number(index, row, column) or 0.0 for column in ("step_strain", "step_time_s"))
+    where = f"Line {index.lines[row]} of {index.name}"
+    if abs(step) > _LARGEST_STEP:
+        raise InputError(
+            f"{where}: step_strain is {step:g}. A strain is a pure number, 1 for 100 %; correct it."
+        )
+    if time < 0.0:
+        raise InputError(f"{where}: step_time_s is {time:g}. Give a time from 0 on.")
+    if step and (start != "rest" or rate_before):
+        raise InputError(
+            f"{where} declares both a step of strain and a flow before it. Leave one of them out."
+        )
+    if start == "periodic" and rate_before:
+        raise InputError(
+            f"{where} declares both an oscillation and a steady flow before t = 0. Leave one of "
+            "them out."
+        )
+    _number(index, row, "temperature_C")
+    return DeclaredTest(flow, control, start, step, time, rate_before or 0.0)
+
+
+def reason_to_set_aside(index: Table, row: int, rate_before: bool = False) -> str | None:
+    """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
+
+    Parameters
+    ----------
+    index, row
+        As in `declared_test`.
+    rate_before
+        Whether it is known from which steady flow each run starts.
+
+    Raises
+    ------
+    InputError
+        As `declared_test`.
+    """
+    if declared_test(index, row, None).start == "steady" and not rate_before:
         return (
             "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
             "flow in the study (rate_before)"
         )
     return None
-
-
-def stress_was_imposed(index: Table, row: int) -> bool:
-    """Return whether a line of ``runs.csv`` says that the stress was imposed and not the rate."""
-    return _value(index, row, "control") == "stress"
 
 
 def _value(index: Table, row: int, column: str) -> str:

@@ -1,37 +1,26 @@
 """Load a folder of measured runs: ``runs.csv``, one CSV a run, optionally ``lve.csv``."""
 
 import os
-import re
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import units
-from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
-from discover.dataset.kind_of_test import reason_to_set_aside, stress_was_imposed
-from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
+from discover.dataset.differentiation import DEFAULT_WINDOW
+from discover.dataset.kind_of_test import reason_to_set_aside
+from discover.dataset.read_run import INDEX_FILE, read_run
+from discover.dataset.run import LinearSweep, ShearDataset
 from discover.dataset.sequence import in_sequence
 from discover.dataset.table import Table, read_bytes, read_table, shown
-from discover.dataset.thinning import MOST_SAMPLES, thin, thin_sweep
+from discover.dataset.thinning import thin_sweep
 from discover.errors import InputError
-from discover.protocols.shear import ShearProtocol, measured_rate, start_up
 
 DATA_VARIABLE = "DISCOVER_DATA"
 """Environment variable that names the folder of data folders."""
 
-INDEX_FILE = "runs.csv"
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
-
-# A rate column is a command, repeated, if it varies no more than rounding to text does
-_CONSTANT = 1e-6
-
-# From rest a passive fluid cannot return more work than it was given. A record that is noise around
-# zero comes near 0, one with the wrong sign near -1
-_WRONG_SIGN = -0.5
-
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 def folder_roots(base: str | Path | None = None) -> list[Path]:
@@ -110,8 +99,8 @@ def load_dataset(
     A column may carry another unit in its name, such as ``stress_kPa`` or ``time_ms``. A run
     without a shear rate must have the strain; its rate is then derived from it, and its metadata
     say so under ``shear_rate_source``. A run of more than `MOST_SAMPLES` samples is thinned, and
-    its metadata say how under ``thinned``. A run that is no transient in shear is set aside; see
-    `reason_to_set_aside`.
+    its metadata say how under ``thinned``. Flow, control and start of a run are columns of
+    ``runs.csv``; see `discover.dataset.kind_of_test`.
 
     Parameters
     ----------
@@ -139,7 +128,8 @@ def load_dataset(
     root = resolve_folder(folder, base)
     index = read_index(root)
     factors = read_clock_factors(index, clock_factor)
-    before = np.zeros(len(index))
+    before = None
+    rate_before = rate_before or _declared_rate_before(index)
     if rate_before is not None:
         before = read_column(index, "rate_before", rate_before)
         before = before * units.heading_factor(rate_before, units.SHEAR_RATE)
@@ -148,7 +138,7 @@ def load_dataset(
     if not used and aside:
         raise InputError(
             f"No run of {root.resolve().name!r} can be fitted: {index.columns['file'][0]} is set "
-            f"aside, since {aside[0]}. Add runs in shear from rest."
+            f"aside, since {aside[0]}."
         )
     runs = tuple(
         read_run(
@@ -156,10 +146,9 @@ def load_dataset(
             index,
             row,
             factors[row],
-            # of a test at a given stress the rate is what the fluid answered
-            rate_is_measured or stress_was_imposed(index, row),
+            rate_is_measured,
             rate_window,
-            before[row],
+            None if before is None else float(before[row]),
         )
         for row in used
     )
@@ -176,6 +165,13 @@ def load_dataset(
             if reason is not None
         },
     )
+
+
+def _declared_rate_before(index: Table) -> str | None:
+    """Return the column with the rate before runs that are declared to start from a steady flow."""
+    if "steady" not in index.columns.get("start", ()):
+        return None
+    return next((name for name in index.columns if name.startswith("rate_before")), None)
 
 
 def _provenance(root: Path) -> str:
@@ -261,124 +257,6 @@ def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs
             f"Correct the name, or leave {key} out."
         )
     return index.numbers(column)
-
-
-def read_run(
-    root: Path,
-    index: Table,
-    row: int,
-    clock_factor: float = 1.0,
-    rate_is_measured: bool = False,
-    rate_window: int = DEFAULT_WINDOW,
-    rate_before: float = 0.0,
-) -> ShearRun:
-    """Return the run on one line of ``runs.csv``.
-
-    Raises
-    ------
-    InputError
-        If its file is missing or wrong.
-    """
-    name = index.columns["file"][row]
-    table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
-    time = _checked_time(table)
-    metadata = _metadata(index, row)
-    strain = table.quantity(units.STRAIN)
-    rate = table.quantity(units.SHEAR_RATE)
-    derived = rate is None
-    if rate is None:
-        if strain is None:
-            # said in the words of the commoner mistake
-            strain = table.required(units.SHEAR_RATE)
-        try:
-            rate = differentiate(time, strain, rate_window)
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from error
-        if not np.all(np.isfinite(rate)):
-            raise InputError(
-                f"{name}: no shear rate can be derived from its strain and time; their values are "
-                "too far apart. Check their units."
-            )
-    stress = table.required(units.SHEAR_STRESS)
-    _check_sign(name, time, rate, stress)
-    normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
-    second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
-    if len(time) > MOST_SAMPLES:
-        keep, metadata["thinned"] = thin(time, rate, stress)
-        time, rate, stress = time[keep], rate[keep], stress[keep]
-        normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
-    if derived:
-        protocol = measured_rate(time, rate)
-        source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
-    else:
-        protocol, source = _protocol(time, rate, rate_is_measured)
-    metadata["shear_rate_source"] = source
-    return ShearRun(
-        name=name,
-        time=time,
-        protocol=protocol,
-        shear_rate=rate,
-        shear_stress=stress,
-        first_normal_stress_difference=normal,
-        second_normal_stress_difference=second,
-        strain=strain,
-        clock_factor=float(clock_factor),
-        rate_is_measured=derived or rate_is_measured,
-        rate_before=float(rate_before),
-        metadata=metadata,
-    )
-
-
-def _checked_time(table: Table) -> Float[np.ndarray, " n"]:
-    time = table.required(units.TIME)
-    if time[0] < 0:
-        raise InputError(
-            f"time in {table.name} must start at or after 0, when the flow starts; line "
-            f"{table.lines[0]} holds {time[0]:g} s. Remove what came before the flow."
-        )
-    backwards = np.flatnonzero(np.diff(time) <= 0)
-    if backwards.size:
-        row = int(backwards[0]) + 1
-        more = f" ({backwards.size - 1} more lines are like it.)" if backwards.size > 1 else ""
-        raise InputError(
-            f"time in {table.name} must increase strictly; line {table.lines[row]} holds "
-            f"{time[row]:g} s after {time[row - 1]:g} s. Sort the rows and remove repeated "
-            f"times.{more}"
-        )
-    return time
-
-
-def _check_sign(name: str, time: np.ndarray, rate: np.ndarray, stress: np.ndarray) -> None:
-    """Refuse a record in which the fluid drives the rheometer."""
-    if len(time) < 2:
-        return
-    power = rate * stress
-    work, size = np.trapezoid(power, time), np.trapezoid(np.abs(power), time)
-    if work < _WRONG_SIGN * size:
-        raise InputError(
-            f"The stress in {name} is opposite to the shear rate over most of the run: the fluid "
-            "would drive the rheometer. Change the sign of one of the two columns."
-        )
-
-
-def _protocol(
-    time: np.ndarray, rate: np.ndarray, rate_is_measured: bool
-) -> tuple[ShearProtocol, str]:
-    level = float(np.median(rate))
-    if np.ptp(rate) <= _CONSTANT * abs(level):
-        return start_up(level), "measured, constant" if rate_is_measured else "commanded, constant"
-    return measured_rate(time, rate), "read sample by sample, linear between samples"
-
-
-def _metadata(index: Table, row: int) -> dict[str, float | str]:
-    metadata: dict[str, float | str] = {}
-    for column, cells in index.columns.items():
-        if column == "file":
-            continue
-        # float() would also read 1_2, nan or inf, which are labels here
-        cell = cells[row]
-        metadata[column] = float(cell) if _NUMBER.fullmatch(cell) else cell
-    return metadata
 
 
 def find_sweep(root: Path) -> LinearSweep | None:

@@ -10,6 +10,8 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.notebook_view import NotebookView
+from discover.protocols.history import after_steady_flow
+from discover.protocols.kinematics import FlowKind
 from discover.protocols.shear import ShearProtocol
 
 if TYPE_CHECKING:
@@ -21,7 +23,10 @@ SLOWEST_RATE = 1e-12
 
 @dataclass(frozen=True)
 class ShearRun:
-    """One experiment in simple shear.
+    """One experiment in shear or in extension.
+
+    In extension the rate is the Hencky rate, the stress the tensile stress σ11 − σ22, and the
+    strain the Hencky strain; biaxial rate and stress are those of one of the two equal directions.
 
     Attributes
     ----------
@@ -30,11 +35,12 @@ class ShearRun:
     time
         Sampling times in s, shape (n,), increasing, from the start of the flow at 0.
     protocol
-        The shear rate as a function of time, commanded or measured.
+        The rate as a function of time, commanded or measured, which flow has it, and what came
+        before t = 0.
     shear_rate
-        Shear rate at the sampling times, in 1/s, shape (n,).
+        Rate at the sampling times, in 1/s, shape (n,).
     shear_stress
-        σ12 in Pa, shape (n,).
+        The stress recorded, in Pa, shape (n,): σ12 in shear.
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
     strain
@@ -45,7 +51,8 @@ class ShearRun:
     rate_is_measured
         Whether the shear rate was measured, or derived from measured strain, and not commanded.
     rate_before
-        Shear rate in 1/s of the steady flow before t = 0; zero is rest.
+        Rate in 1/s of the steady flow before t = 0, which becomes part of the protocol; zero where
+        there was none.
     strain_before
         Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
     metadata
@@ -107,6 +114,9 @@ class ShearRun:
                 f"The shear rate before the run {self.name!r} must be finite; got "
                 f"{self.rate_before}. Give 0 for a run from rest."
             )
+        if self.rate_before != 0.0 and self.from_rest and self.time[-1] > 0.0:
+            begun = after_steady_flow(self.protocol, self.rate_before, float(self.time[-1]))
+            object.__setattr__(self, "protocol", begun)
 
     def __len__(self) -> int:
         return self.time.shape[0]
@@ -117,13 +127,14 @@ class ShearRun:
         return f"<ShearRun {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
 
     def _recorded(self) -> dict[str, np.ndarray | None]:
+        in_shear = self.flow == "shear"
         return {
             "time_s": self.time,
-            "shear_rate_1_s": self.shear_rate,
-            "stress_Pa": self.shear_stress,
+            "shear_rate_1_s" if in_shear else "hencky_rate_1_s": self.shear_rate,
+            "stress_Pa" if in_shear else "tensile_stress_Pa": self.shear_stress,
             "N1_Pa": self.first_normal_stress_difference,
             "N2_Pa": self.second_normal_stress_difference,
-            "strain": self.strain,
+            "strain" if in_shear else "hencky_strain": self.strain,
         }
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -132,9 +143,19 @@ class ShearRun:
         return pd.DataFrame(columns)
 
     @property
+    def flow(self) -> FlowKind:
+        """Which flow it is: ``shear``, ``uniaxial``, ``planar`` or ``biaxial``."""
+        return self.protocol.flow
+
+    @property
+    def from_rest(self) -> bool:
+        """Whether the fluid is taken to be at rest until t = 0."""
+        return float(self.protocol.begins) == 0.0
+
+    @property
     def flows(self) -> bool:
         """Whether anything flows in the run, or did just before it."""
-        return bool(max(np.max(np.abs(self.shear_rate)), abs(self.rate_before)) > SLOWEST_RATE)
+        return not self.from_rest or bool(np.max(np.abs(self.shear_rate)) > SLOWEST_RATE)
 
     def window(self, keep: np.ndarray) -> "ShearRun":
         """Return the run with only the samples where the boolean array `keep` holds.

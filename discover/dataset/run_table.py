@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import SLOWEST_RATE, ShearRun
 
 # share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
 # many where the stress was commanded, and noise
@@ -29,7 +29,7 @@ def run_line(run: ShearRun) -> dict[str, Any]:
     normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
     return {
         "run": run.name,
-        "flow": "oscillation" if wave else flow,
+        "flow": flow if not wave else "oscillation" if run.from_rest else "steady alternation",
         "samples": len(run),
         "duration_s": float(run.time[-1]),
         "largest_rate_1_s": float(np.max(np.abs(run.shear_rate))),
@@ -44,15 +44,16 @@ def run_line(run: ShearRun) -> dict[str, Any]:
 def _flow(run: ShearRun) -> str:
     if not run.flows:
         return "rest"
-    size = max(float(np.max(np.abs(run.shear_rate))), abs(run.rate_before))
+    size = max(float(np.max(np.abs(run.shear_rate))), abs(run.rate_before), SLOWEST_RATE)
     jumps = np.count_nonzero(np.abs(np.diff(run.shear_rate)) > 1e-6 * size)
     if jumps > len(run) // 4:
         return _VARYING
     if jumps:
         return "steps of rate"
-    if abs(run.shear_rate[0]) <= 1e-6 * size:
-        return "cessation"
-    return "step of rate" if run.rate_before else "start-up"
+    if abs(run.shear_rate[0]) <= 1e-6 * size or np.max(np.abs(run.shear_rate)) <= SLOWEST_RATE:
+        return "cessation" if run.rate_before or run.from_rest else "relaxation after a step strain"
+    kind = "step of rate" if run.rate_before else "start-up"
+    return kind if run.flow == "shear" else f"{run.flow} extension, {kind}"
 
 
 def oscillation(run: ShearRun) -> tuple[float, float] | None:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.identify.histories import SAME, random_histories
-from discover.identify.laws_side_by_side import LawTerms, dense, joint_library, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, dense, joint_library, stresses_of_laws
 from discover.identify.twins import Twin, find_twins
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
@@ -73,7 +73,7 @@ def _problem(
 ) -> TrajectoryProblem:
     """Return the problem of reproducing a law's σ12 in the random histories in which it lives."""
     flows = random_histories()
-    stress = shear_stresses(library, [law], flows.protocols, flows.grids, base)[0, :, :, 3]
+    stress = stresses_of_laws(library, [law], flows.protocols, flows.grids, base)[0, :, :, 3]
     lives = np.all(np.isfinite(stress), axis=1)
     stress = np.where(lives[:, None], stress, 0.0)
     scale = np.sqrt(np.mean(stress**2, axis=1))

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from discover.identify.histories import Histories, random_histories
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.programs import compiled
+from discover.simulate.runge_kutta import runge_kutta_4
 
 _ZERO = 1e-10
 """Relative singular value that counts as zero; exact ones come out at rounding error."""
@@ -118,34 +119,14 @@ def _arrivals(law, protocols, times):
     def one(protocol, grid):
         def slope(t, state):
             stress, change = state
-            rate = protocol.shear_rate(t)
+            rate = protocol.velocity_gradient(t)
             value, jacobian = (
                 law.stress_rate(stress, rate),
                 jax.jacfwd(law.stress_rate)(stress, rate),
             )
             return value, jacobian @ change
 
-        def advance(state, interval):
-            t, step = interval
-
-            def moved(k, factor):
-                return jax.tree.map(lambda s, v: s + factor * step * v, state, k)
-
-            k1 = slope(t, state)
-            k2 = slope(t + 0.5 * step, moved(k1, 0.5))
-            k3 = slope(t + 0.5 * step, moved(k2, 0.5))
-            k4 = slope(t + step, moved(k3, 1.0))
-            after = jax.tree.map(
-                lambda s, a, b, c, d: s + step / 6.0 * (a + 2.0 * b + 2.0 * c + d),
-                state,
-                k1,
-                k2,
-                k3,
-                k4,
-            )
-            return after, after[1][3]
-
         start = (jnp.zeros(4), jnp.eye(4)[:, :3])
-        return jax.lax.scan(advance, start, (grid[:-1], jnp.diff(grid)))[1]
+        return runge_kutta_4(slope, start, grid)[1][1:, 3]
 
     return jax.vmap(one)(protocols, times)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.laws_side_by_side import LawTerms, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.shear import (
     ShearProtocol,
@@ -142,7 +142,7 @@ def differences(
         By default `random_histories()`.
     """
     flows = random_histories() if histories is None else histories
-    stresses = shear_stresses(library, [reference, *others], flows.protocols, flows.grids, base)
+    stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)
     observed = observe_differences(stresses[:, : flows.n_random])
     return [difference(observed[0], other) for other in observed[1:]]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
@@ -15,7 +15,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.protocols.shear import ShearProtocol
 from discover.simulate.grid import IntegrationGrid
-from tensor_library.kinematics import planar_extension, uniaxial_extension
+from discover.simulate.runge_kutta import runge_kutta_4
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -76,14 +76,14 @@ def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
         yield count, coefficients, inner
 
 
-def shear_stresses(
+def stresses_of_laws(
     library: TermLibrary,
     laws: Sequence[LawTerms],
     protocols: ShearProtocol,
     grids: IntegrationGrid,
     base: AbstractConstitutiveLaw | None = None,
 ) -> Float[np.ndarray, "laws runs n 4"]:
-    """Return the dimensionless stresses of several laws in a batch of shear flows.
+    """Return the dimensionless stresses of several laws in a batch of flows.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def shear_stresses(
     """
     base = UpperConvectedMaxwell() if base is None else base
     parts = [
-        np.asarray(_shear(library, base, c, inner, protocols, grids))[:count]
+        np.asarray(_march(library, base, c, inner, protocols, grids))[:count]
         for count, c, inner in _batches(library, laws)
     ]
     return np.concatenate(parts)
@@ -113,78 +113,14 @@ def _law(library, base, coefficients, inner) -> LibraryExpansion:
 
 
 @compiled
-def _shear(library, base, coefficients, inner, protocols, grids):
-    # Classical Runge–Kutta steps: to compare laws of one relaxation time needs no more, and a plain
-    # scan compiles in a fraction of the time of a solver made for spectra.
+def _march(library, base, coefficients, inner, protocols, grids):
     def one(c, i, protocol, grid):
         law = _law(library, base, c, i)
 
-        def advance(stress, interval):
-            t, step = interval
-            after = runge_kutta_step(
-                lambda time, s: law.stress_rate(s, protocol.shear_rate(time)), t, step, stress
-            )
-            return after, after
+        def slope(t, stress):
+            return law.stress_rate(stress, protocol.velocity_gradient(t))
 
-        start = jnp.zeros(4)
-        _, after = jax.lax.scan(advance, start, (grid.times[:-1], jnp.diff(grid.times)))
-        return jnp.concatenate([start[None], after])[grid.sample_index]
+        return runge_kutta_4(slope, jnp.zeros(4), grid.times)[grid.sample_index]
 
     over_runs = jax.vmap(one, in_axes=(None, None, 0, 0))
     return jax.vmap(over_runs, in_axes=(0, 0, None, None))(coefficients, inner, protocols, grids)
-
-
-def runge_kutta_step(slope, t, step, state):
-    """Return the state after one classical fourth-order step of dy/dt = slope(t, y)."""
-    k1 = slope(t, state)
-    k2 = slope(t + 0.5 * step, state + 0.5 * step * k1)
-    k3 = slope(t + 0.5 * step, state + 0.5 * step * k2)
-    k4 = slope(t + step, state + step * k3)
-    return state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-
-
-def extensional_stresses(
-    library: TermLibrary,
-    laws: Sequence[LawTerms],
-    rates: Float[np.ndarray, " r"],
-    times: Float[np.ndarray, " n"],
-    base: AbstractConstitutiveLaw | None = None,
-) -> Float[np.ndarray, "laws kinds r n 3"]:
-    """Return σ11, σ22, σ33 of several laws after the start of uniaxial and planar extension.
-
-    Classical Runge–Kutta steps from each time to the next; `times` are equally spaced and start
-    at 0.
-
-    Parameters
-    ----------
-    library, laws, base
-        As in `shear_stresses`.
-    rates
-        Extension rates, dimensionless.
-    times
-        Dimensionless.
-    """
-    base = UpperConvectedMaxwell() if base is None else base
-    step = jnp.asarray(float(times[1] - times[0]))
-    parts = [
-        np.asarray(_extend(library, base, c, inner, jnp.asarray(rates), step, len(times)))[:count]
-        for count, c, inner in _batches(library, laws)
-    ]
-    return np.concatenate(parts)
-
-
-@compiled
-def _extend(library, base, coefficients, inner, rates, step, n_times):
-    def one(c, i, gradient: Float[Array, "3 3"]):
-        law = _law(library, base, c, i)
-
-        def advance(stress, _):
-            after = runge_kutta_step(lambda _, s: law.stress_rate(s, gradient), 0.0, step, stress)
-            return after, jnp.diagonal(stress)
-
-        return jax.lax.scan(advance, jnp.zeros((3, 3)), None, length=n_times)[1]
-
-    gradients = jnp.stack([jax.vmap(f)(rates) for f in (uniaxial_extension, planar_extension)])
-    over_rates = jax.vmap(one, in_axes=(None, None, 0))
-    over_kinds = jax.vmap(over_rates, in_axes=(None, None, 0))
-    return jax.vmap(over_kinds, in_axes=(0, 0, None))(coefficients, inner, gradients)

@@ -114,9 +114,9 @@ def predict_laws(
     protocols: Sequence[ShearProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
 ) -> Float[np.ndarray, "laws flows n 3"]:
-    """Return σ12, N1 and N2 in Pa of every law in every flow; not finite where a law runs away.
+    """Return the recorded stress, N1 and N2 in Pa of every law in every flow.
 
-    Flows with fewer samples than others repeat their last one.
+    Not finite where a law runs away. Flows with fewer samples than others repeat their last one.
 
     Parameters
     ----------
@@ -135,8 +135,8 @@ def _predict(
 ) -> Float[Array, "laws flows n 3"]:
     def of_law(fluid):
         stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
-        normal = stress[..., :3]
-        first = normal[..., 0] - normal[..., 1]
-        return jnp.stack([stress[..., 3], first, normal[..., 1] - normal[..., 2]], axis=-1)
+        recorded = jax.vmap(lambda flow, s: flow.recorded_stress(s.T))(protocols, stress)
+        s11, s22, s33, _ = jnp.moveaxis(stress, -1, 0)
+        return jnp.stack([recorded, s11 - s22, s22 - s33], axis=-1)
 
     return eqx.filter_vmap(of_law)(fluids)

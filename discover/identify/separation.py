@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from discover.identify.histories import observe_differences, random_histories
-from discover.identify.laws_side_by_side import LawTerms, extensional_stresses, shear_stresses
+from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.protocols.shear import in_flow, stack_protocols, start_up
+from discover.simulate.grid import make_grids
 from tensor_library.library import TermLibrary
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)
@@ -72,16 +74,18 @@ def separations(
     """
     laws = [reference, *others]
     flows = random_histories()
-    stresses = shear_stresses(library, laws, flows.protocols, flows.grids, base)
+    stresses = stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
     names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
     times = np.linspace(0.0, _DURATION, 161)
-    rates = np.asarray(_EXTENSION_RATES)
-    extension = extensional_stresses(library, laws, rates, times, base)
+    starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
+    protocols = [in_flow(start_up(rate), kind) for kind, rate in starts]
+    grids = make_grids(protocols, [times] * len(protocols), strain_step=np.inf)
+    extension = stresses_of_laws(library, laws, stack_protocols(protocols), grids, base)
     return [
         _best(
             [
                 *_in_shear(names, shear[0], shear[i]),
-                *_in_extension(rates, extension[0], extension[i]),
+                *_in_extension(starts, extension[0], extension[i]),
             ]
         )
         for i in range(1, len(laws))
@@ -109,16 +113,14 @@ def _in_shear(names, reference, other):
                 yield Separation(name, quantity, value)
 
 
-def _in_extension(rates, reference, other):
-    for kind, name in enumerate(("uniaxial", "planar")):
-        for i, rate in enumerate(rates):
-            a, b = reference[kind, i], other[kind, i]
-            scale = _rms(a[:, 0] - a[:, 1])
-            first, second = (0, 1) if name == "uniaxial" else (1, 2)
-            value = _relative(a[:, first] - a[:, second], b[:, first] - b[:, second], scale)
-            if value is not None:
-                flow = f"{name} extension at a rate of {rate:g}"
-                yield Separation(flow, _EXTENSION_QUANTITY[name], value)
+def _in_extension(starts, reference, other):
+    for (kind, rate), a, b in zip(starts, reference, other, strict=True):
+        scale = _rms(a[:, 0] - a[:, 1])
+        first, second = (0, 1) if kind == "uniaxial" else (1, 2)
+        value = _relative(a[:, first] - a[:, second], b[:, first] - b[:, second], scale)
+        if value is not None:
+            flow = f"{kind} extension at a rate of {rate:g}"
+            yield Separation(flow, _EXTENSION_QUANTITY[kind], value)
 
 
 def _best(found: list[Separation]) -> tuple[Separation, ...]:

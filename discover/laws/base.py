@@ -39,9 +39,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         Parameters
         ----------
         stress
-            Dimensionless extra stress, (3, 3), or (4,) in simple shear.
+            Dimensionless extra stress, (3, 3), or its components 11, 22, 33, 12.
         velocity_gradient
-            Dimensionless L, (3, 3), or the scalar shear rate in simple shear.
+            Dimensionless L: (3, 3) for a full stress; for four components those of L, or the scalar
+            shear rate in simple shear. See `tensor_library.kinematics`.
         """
         rate = rate_of_deformation(velocity_gradient)
         change = rate + upper_convected_production(stress, velocity_gradient)

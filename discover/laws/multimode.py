@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.maxwell import UpperConvectedMaxwell
+from tensor_library.kinematics import VelocityGradient, rate_of_deformation
 
 
 @runtime_checkable
@@ -109,21 +110,23 @@ class Fluid(eqx.Module):
         return rate if self.law.linear_relaxation else jnp.zeros_like(rate)
 
     def state_rate(
-        self, state: Float[Array, "k 4"], shear_rate: Float[Array, ""]
+        self, state: Float[Array, "k 4"], velocity_gradient: VelocityGradient
     ) -> Float[Array, "k 4"]:
-        """Return d(state)/dt in simple shear, in 1/s.
+        """Return d(state)/dt, in 1/s.
 
         Parameters
         ----------
         state
-            σ_k/G_k in the four shear components.
-        shear_rate
-            γ̇ in 1/s.
+            σ_k/G_k in the four components.
+        velocity_gradient
+            The shear rate γ̇ in 1/s, or the four components of L in 1/s.
         """
-        scaled = jax.vmap(self.law.stress_rate)(state, self.relaxation_time * shear_rate)
-        return scaled / self.relaxation_time[:, None]
+        scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
+        return jax.vmap(self.law.stress_rate)(state, scaled) / self.relaxation_time[:, None]
 
-    def stress(self, state: Float[Array, "k 4"], shear_rate: Float[Array, ""]) -> Float[Array, "4"]:
+    def stress(
+        self, state: Float[Array, "k 4"], velocity_gradient: VelocityGradient
+    ) -> Float[Array, "4"]:
         """Return the total extra stress (11, 22, 33, 12) in Pa."""
         polymer = jnp.tensordot(self.modulus, state, axes=1)
-        return polymer.at[3].add(self.solvent_viscosity * shear_rate)
+        return polymer + self.solvent_viscosity * rate_of_deformation(velocity_gradient)

@@ -1,11 +1,15 @@
-"""Shear protocols."""
+"""Protocols: the rate of deformation in time, the flow that has it, and what came before."""
 
 from discover import first_use as first_use  # double precision, before any array is made
+from discover.protocols.history import after_alternation, after_steady_flow, after_step_strain
+from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
 from discover.protocols.shear import (
     ShearProtocol,
+    in_flow,
     measured_rate,
     oscillatory_shear,
+    recorded_at,
     shear_rates,
     smooth_between_samples,
     stack_protocols,
@@ -15,11 +19,20 @@ from discover.protocols.shear import (
 )
 
 __all__ = [
+    "KINDS",
+    "FlowKind",
+    "Kinematics",
     "ShearProtocol",
+    "after_alternation",
+    "after_steady_flow",
+    "after_step_strain",
+    "in_flow",
+    "kinematics_of",
     "measured_rate",
     "oscillatory_shear",
     "paper_test_protocols",
     "paper_training_protocols",
+    "recorded_at",
     "shear_rates",
     "smooth_between_samples",
     "stack_protocols",

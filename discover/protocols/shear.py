@@ -1,6 +1,7 @@
-"""Shear protocols: what the rheometer was told to do."""
+"""Protocols: what the rheometer was told to do, in shear and in extension."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -11,13 +12,17 @@ from scipy.interpolate import PchipInterpolator
 
 from discover.errors import InputError
 from discover.programs import compiled
+from discover.protocols.kinematics import FlowKind, Kinematics, kind_of, kinematics_of
+from tensor_library.kinematics import VelocityGradient
 
 
 class ShearProtocol(eqx.Module):
-    """Shear rate as a function of time: a piecewise-linear table plus a sum of cosines.
+    """Rate of deformation as a function of time: a piecewise-linear table plus a sum of cosines.
 
     One class holds every protocol, so that runs of different kinds stack into one batch and
-    superposed flows need nothing new. A jump is two table entries at the same time.
+    superposed flows need nothing new. A jump is two table entries at the same time. The fluid is at
+    rest until the protocol begins, which is before t = 0 where something came before the record: a
+    step of strain, a steady flow, an oscillation that had gone on.
 
     Attributes
     ----------
@@ -25,6 +30,10 @@ class ShearProtocol(eqx.Module):
         Table of shear rate against time, in s and 1/s, shape (m,); held at its end values.
     amplitudes, frequencies, phases
         Cosine terms a cos(ω t + φ), shape (c,), in 1/s, rad/s and rad.
+    begins
+        Time in s, zero or negative, until which the fluid was at rest.
+    kinematics
+        Which flow has this rate; None is simple shear, for which a scalar is enough.
     """
 
     table_times: Float[Array, " m"]
@@ -32,9 +41,25 @@ class ShearProtocol(eqx.Module):
     amplitudes: Float[Array, " c"]
     frequencies: Float[Array, " c"]
     phases: Float[Array, " c"]
+    begins: Float[Array, ""] = eqx.field(default=0.0, converter=jnp.asarray)
+    kinematics: Kinematics | None = None
+
+    def velocity_gradient(self, time: Float[Array, ""]) -> VelocityGradient:
+        """Return L(t) in 1/s: its four components, or the scalar shear rate in simple shear."""
+        rate = self.shear_rate(time)
+        return rate if self.kinematics is None else rate * self.kinematics.gradient
+
+    @property
+    def flow(self) -> FlowKind:
+        """Name of the flow."""
+        return kind_of(self.kinematics)
+
+    def recorded_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
+        """Return what a rheometer records of σ11, σ22, σ33, σ12 in this flow."""
+        return components[3] if self.kinematics is None else self.kinematics.stress(components)
 
     def shear_rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
-        """Return γ̇(t) in 1/s; at a jump, the value after it."""
+        """Return γ̇(t) in 1/s, in extension the Hencky rate; at a jump, the value after it."""
         time = jnp.asarray(time)
         table = _interpolate(time, self.table_times, self.table_rates)
         waves = self.amplitudes * jnp.cos(self.frequencies * time + self.phases)
@@ -88,8 +113,12 @@ def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> ShearProtocol:
+    table = jnp.asarray(times, float), jnp.asarray(rates, float)
     return ShearProtocol(
-        *(jnp.asarray(a, float) for a in (times, rates, amplitudes, frequencies, phases))
+        *table,
+        jnp.asarray(amplitudes, float),
+        jnp.asarray(frequencies, float),
+        jnp.asarray(phases, float),
     )
 
 
@@ -188,13 +217,29 @@ def smooth_between_samples(protocol: ShearProtocol) -> ShearProtocol | None:
     return measured_rate(dense, np.asarray(PchipInterpolator(knots, rates)(dense)))
 
 
+def in_flow(protocol: ShearProtocol, kind: str) -> ShearProtocol:
+    """Return the protocol with its rate in another flow: uniaxial, planar or biaxial extension.
+
+    Raises
+    ------
+    InputError
+        If there is no such flow.
+    """
+    found = kinematics_of(kind)
+    return replace(protocol, kinematics=None if kind == "shear" else found)
+
+
 def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
     """Return one protocol with a leading batch axis, for `jax.vmap`.
 
-    Tables are padded by holding their last value, cosines by zero amplitudes.
+    Tables are padded by holding their last value, cosines by zero amplitudes. Simple shear keeps
+    its fast path unless there is another flow among them.
     """
     m = max(p.table_times.shape[0] for p in protocols)
     c = max(p.amplitudes.shape[0] for p in protocols)
+    if any(p.kinematics is not None for p in protocols):
+        shear = kinematics_of("shear")
+        protocols = [p if p.kinematics else replace(p, kinematics=shear) for p in protocols]
     stacked = [_padded(p, m, c) for p in protocols]
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
 
@@ -204,15 +249,26 @@ def _padded(protocol: ShearProtocol, entries: int, cosines: int) -> ShearProtoco
     times, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     rows = entries - times.size
     waves = (0, cosines - protocol.amplitudes.shape[0])
-    parts = (
-        np.concatenate([times, times[-1] + 1.0 + np.arange(rows)]),
-        np.pad(rates, (0, rows), mode="edge"),
-        *(
-            np.pad(np.asarray(v), waves)
-            for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
-        ),
+    amplitudes, frequencies, phases = (
+        jnp.asarray(np.pad(np.asarray(v), waves))
+        for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
     )
-    return ShearProtocol(*map(jnp.asarray, parts))
+    return replace(
+        protocol,
+        table_times=jnp.asarray(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
+        table_rates=jnp.asarray(np.pad(rates, (0, rows), mode="edge")),
+        amplitudes=amplitudes,
+        frequencies=frequencies,
+        phases=phases,
+    )
+
+
+def recorded_at(
+    protocol: ShearProtocol, components: Float[np.ndarray, "n 4"]
+) -> Float[np.ndarray, " n"]:
+    """Return what a rheometer records of σ11, σ22, σ33, σ12 at many times, shape (n,)."""
+    flow = protocol.kinematics
+    return components[:, 3] if flow is None else components @ np.asarray(flow.recorded)
 
 
 def shear_rates(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

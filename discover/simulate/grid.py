@@ -15,6 +15,11 @@ MAX_GRID_POINTS = 200_000
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
 
+_FEWEST_HISTORY_STEPS = 100
+
+# Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
+_FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
+
 # A rate is constant while it changes by less than this fraction from sample to sample
 _CHANGE = 0.05
 
@@ -25,7 +30,8 @@ class IntegrationGrid(eqx.Module):
     Attributes
     ----------
     times
-        Step times in s, shape (s,), strictly increasing from 0; padded past the last sample.
+        Step times in s, shape (s,), strictly increasing from where the protocol begins; padded past
+        the last sample.
     sample_index
         Position in `times` of every sample, shape (n,); padded with the last one.
     sample_mask
@@ -49,7 +55,9 @@ def make_grid(
 
     Every sample and every kink of the protocol is a step; between them no step turns the fluid
     through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
-    defaults the fourth-order method is accurate to about 1e-6 of the stress (tested).
+    defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
+    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`: a steady state is a fixed point
+    of the method whatever its step.
 
     Parameters
     ----------
@@ -71,14 +79,21 @@ def make_grid(
         If the run would need an absurd number of steps.
     """
     times = np.asarray(times, dtype=float)
-    end = float(times[-1])
+    begins, end = float(protocol.begins), float(times[-1])
     knots = np.asarray(protocol.table_times)
     rates = np.asarray(protocol.table_rates)
-    kinks = knots[(knots > 0.0) & (knots < end)]
+    kinks = knots[(knots > begins) & (knots < end)]
     jumps = np.intersect1d(kinks, knots[1:][np.diff(knots) <= 0.0])
     # Step to just before a jump and on from it, so that no step straddles one
-    anchors = np.unique(np.concatenate([[0.0], times, kinks, jumps * (1.0 - 1e-12)]))
-    fastest = np.max(np.abs(rates)) + np.sum(np.abs(np.asarray(protocol.amplitudes)))
+    before = jumps - 1e-12 * np.where(jumps == 0.0, -begins, np.abs(jumps))
+    steady = _steady_history(protocol)
+    # what is gone through in steady steps sets no pace for the record
+    recorded = rates[max(int(np.searchsorted(knots, 0.0, side="right")) - 1, 0) :]
+    table = np.max(np.abs(recorded if steady.size else rates))
+    rest = _relaxation(times) if begins < 0.0 and not np.any(recorded) else ()
+    anchors = np.unique(np.concatenate([[begins, 0.0], times, kinks, before, steady, rest]))
+    intensity = 1.0 if protocol.kinematics is None else float(protocol.kinematics.intensity)
+    fastest = intensity * (table + np.sum(np.abs(np.asarray(protocol.amplitudes))))
     waves = np.asarray(protocol.frequencies)[np.asarray(protocol.amplitudes) != 0.0]
     limit = min(
         max_step,
@@ -89,12 +104,14 @@ def make_grid(
     limits = np.full(gaps.shape, limit)
     if growth > 0.0 and not np.any(np.asarray(protocol.amplitudes)) and np.isfinite(limit):
         limits = np.maximum(limit, _grown(anchors, knots, rates, growth))
+    if steady.size:
+        limits[anchors[:-1] < 0.0] = np.inf
     pieces = np.maximum(1, np.ceil(gaps / limits - 1e-9)) if gaps.size else np.zeros(0)
     if np.sum(pieces) > MAX_GRID_POINTS:
         raise InputError(
-            f"A run of {end:g} s at shear rates up to {fastest:g} 1/s would need "
+            f"A run of {end - begins:g} s at rates up to {fastest:g} 1/s would need "
             f"{int(np.sum(pieces))} steps (at most {MAX_GRID_POINTS}). Check the units of time and "
-            "shear rate, or thin the run."
+            "rate, or thin the run."
         )
     grid = np.concatenate(
         [
@@ -104,6 +121,29 @@ def make_grid(
         + [anchors[-1:]]
     )
     return grid, np.searchsorted(grid, times)
+
+
+def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:
+    """Return steps that grow with the time since the flow stopped: no strain sets their pace."""
+    later = times[times > 0.0]
+    if not later.size:
+        return np.zeros(0)
+    first = _FIRST_AT_REST * later[0]
+    count = int(np.ceil(np.log(later[-1] / first) / np.log1p(_GROWTH_AT_REST)))
+    return np.geomspace(first, later[-1], count + 1)[:-1]
+
+
+def _steady_history(protocol: ShearProtocol) -> Float[np.ndarray, " p"]:
+    """Return steps through a constant rate before t = 0; none where it was anything else."""
+    begins = float(protocol.begins)
+    knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    history = rates[(knots >= begins) & (knots <= 0.0)][:2]
+    constant = len(history) == 2 and history[0] == history[1] and knots[1] == 0.0
+    if begins == 0.0 or np.any(np.asarray(protocol.amplitudes)) or not constant:
+        return np.zeros(0)
+    strain = abs(history[0] * begins)
+    count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / COARSEST_STRAIN)))
+    return np.linspace(begins, 0.0, count + 1)[:-1]
 
 
 def _grown(

@@ -59,12 +59,12 @@ class ShearStress:
 
 def _vector_field(t, state, args):
     fluid, protocol = args
-    return fluid.state_rate(state, protocol.shear_rate(t))
+    return fluid.state_rate(state, protocol.velocity_gradient(t))
 
 
 def _observe(t, state, args):
     fluid, protocol = args
-    return fluid.stress(state, protocol.shear_rate(t))
+    return fluid.stress(state, protocol.velocity_gradient(t))
 
 
 def _decay(fluid: Fluid) -> Float[Array, "k 1"]:
@@ -80,7 +80,7 @@ def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
         solver,
-        0.0,
+        protocol.begins,
         times[-1],
         None,
         fluid.rest(),

@@ -1,10 +1,11 @@
-"""What ``runs.csv`` says was done: what is no transient in shear is not read as one."""
+"""What ``runs.csv`` says was done is how a run is read."""
 
 import numpy as np
 import pytest
 
 from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
+from discover.protocols import shear_rates
 
 TIME = np.linspace(0.1, 2.0, 8)
 
@@ -27,33 +28,92 @@ def folder(path, header, *lines):
     return path
 
 
-def test_extension_is_set_aside_and_shear_is_used(tmp_path):
+def test_extension_is_read_beside_shear_with_its_own_columns(tmp_path):
     made = folder(tmp_path / "melt", "file,flow", "a.csv,shear", "b.csv,uniaxial", "c.csv,")
     data = load_dataset(made)
-    assert data.names == ("a.csv", "c.csv")
-    assert data.left_out == (
-        "b.csv is set aside: it is uniaxial extension, and only shear is fitted."
+    assert [run.flow for run in data] == ["shear", "uniaxial", "shear"]
+    assert list(data["b.csv"].to_dataframe()) == ["time_s", "hencky_rate_1_s", "tensile_stress_Pa"]
+    np.testing.assert_array_equal(data["b.csv"].shear_stress, TIME)
+    assert not [f for f in check_folder(made) if "aside" in f.text or "not used" in f.text]
+
+
+def test_an_extension_in_the_columns_of_shear_is_refused_with_the_remedy(tmp_path):
+    made = folder(tmp_path / "melt", "file,flow", "a.csv,uniaxial")
+    index = made / "runs.csv"
+    index.write_text(index.read_text().replace("uniaxial", "shear"))
+    with pytest.raises(InputError, match="Write uniaxial, planar or biaxial in its column flow"):
+        load_dataset(made)
+
+
+def test_a_steady_start_without_its_rate_is_not_read_as_a_start_from_rest(tmp_path):
+    made = folder(tmp_path / "melt", "file,start", "a.csv,", "b.csv,steady")
+    data = load_dataset(made)
+    assert data.names == ("a.csv",)
+    assert "rate_before" in data.left_out
+    with pytest.raises(InputError, match="rate_before"):
+        data.select(["b.csv"])
+
+
+def test_a_steady_start_takes_its_rate_from_the_column_of_that_name(tmp_path):
+    made = folder(
+        tmp_path / "blood", "file,start,rate_before_1_min", "a.csv,steady,300", "b.csv,,0"
     )
-    findings = [f for f in check_folder(made) if f.severity == "note" and "aside" in f.text]
-    assert [f.file for f in findings] == ["b.csv"]
+    data = load_dataset(made)
+    assert [run.rate_before for run in data] == [5.0, 0.0]
+    assert [run.from_rest for run in data] == [False, True]
+
+
+def test_a_step_of_strain_is_part_of_what_was_imposed(tmp_path):
+    header = "file,step_strain,step_time_s"
+    made = folder(tmp_path / "melt", header, "a.csv,2,", "b.csv,2,0.5")
+    for name in ("a.csv", "b.csv"):
+        rows = ["time_s,stress_Pa", *(f"{t},{np.exp(-t)}" for t in TIME)]
+        (made / name).write_text("\n".join(rows) + "\n")
+    at_once, slow = load_dataset(made)
+    assert float(slow.protocol.begins) == -0.5
+    assert 0.0 < -float(at_once.protocol.begins) < 0.01 * TIME[0]
+    assert not np.any(slow.shear_rate)
+    assert slow.strain is not None
+    assert slow.strain[0] == 2.0
+    np.testing.assert_allclose(shear_rates(slow.protocol, np.array([-0.25])) * 0.5, 2.0)
+
+
+def waves(path, start, cycles=2.0):
+    made = folder(path, "file,start", f"a.csv,{start}")
+    time = np.linspace(0.0, cycles * np.pi, 80)
+    rows = [f"{t},{2.0 * np.cos(2.0 * t)},{np.sin(2.0 * t + 0.3)}" for t in time]
+    (made / "a.csv").write_text("\n".join(["time_s,shear_rate_1_s,stress_Pa", *rows]) + "\n")
+    return made
+
+
+def test_steady_alternation_goes_back_by_whole_cycles_of_the_record(tmp_path):
+    run = load_dataset(waves(tmp_path / "gel", "periodic"))[0]
+    assert float(run.protocol.begins) < -8.0 * np.pi
+    times = np.array([0.3, 1.1, 2.9])
+    before = shear_rates(run.protocol, times - 3.0 * np.pi)
+    # straight lines between 40 samples of a cycle miss (2 pi / 40)^2 / 8 of the amplitude
+    np.testing.assert_allclose(before, 2.0 * np.cos(2.0 * times), atol=0.02)
+
+
+def test_a_start_in_steady_alternation_needs_a_cycle(tmp_path):
+    with pytest.raises(InputError, match=r"less than one period|does not alternate"):
+        load_dataset(waves(tmp_path / "gel", "periodic", cycles=0.8))
+    with pytest.raises(InputError, match="does not alternate"):
+        load_dataset(folder(tmp_path / "melt", "file,start", "a.csv,periodic"))
 
 
 @pytest.mark.parametrize(
     ("header", "cells", "word"),
     [
-        ("file,start", "periodic", "steady alternation"),
-        ("file,start", "steady", "rate_before"),
-        ("file,step_strain", "0.03", "step of strain"),
-        ("file,flow", "planar", "planar extension"),
+        ("file,step_strain", "300000", "1 for 100 %"),
+        ("file,step_strain,step_time_s", "1,-2", "from 0 on"),
+        ("file,step_strain,start", "1,periodic", "both a step of strain"),
     ],
 )
-def test_a_test_that_is_no_transient_from_rest_is_not_read_as_one(tmp_path, header, cells, word):
-    made = folder(tmp_path / "melt", header, "a.csv,", f"b.csv,{cells}")
-    data = load_dataset(made)
-    assert data.names == ("a.csv",)
-    assert word in data.left_out
+def test_what_cannot_have_been_done_is_refused(tmp_path, header, cells, word):
+    made = folder(tmp_path / "melt", header, f"a.csv,{cells}")
     with pytest.raises(InputError, match=word):
-        data.select(["b.csv"])
+        load_dataset(made)
 
 
 def test_what_is_declared_as_it_is_taken_is_used(tmp_path):
@@ -93,14 +153,9 @@ def test_an_unknown_value_is_said_with_those_that_are_known(tmp_path, header, ce
     assert repr(cell) in str(error.value)
 
 
-def test_a_folder_of_extension_alone_is_refused_with_the_reason(tmp_path):
-    made = folder(tmp_path / "melt", "file,flow", "a.csv,biaxial")
-    with pytest.raises(InputError, match="biaxial extension"):
-        load_dataset(made)
-
-
 @pytest.mark.measured
-def test_the_shear_runs_of_a_melt_are_read_beside_its_extensions(measured_data):
+def test_a_melt_is_read_with_its_extensions(measured_data):
     data = load_dataset(measured_data / "ldpe150r")
-    assert len(data) == 7
-    assert len(data.set_aside) == 6
+    assert [run.flow for run in data].count("uniaxial") == 6
+    assert len(data) == 13
+    assert not data.set_aside

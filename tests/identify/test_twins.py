@@ -9,7 +9,7 @@ import pytest
 from discover.identify.fitted_twins import fit_twins
 from discover.identify.hidden_stresses import hidden_stresses
 from discover.identify.histories import SAME, differences, random_histories
-from discover.identify.laws_side_by_side import LawTerms, extensional_stresses
+from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.identify.separation import separations
 from discover.identify.twins import find_twins, same_in_every_shear
 from discover.laws import (
@@ -19,7 +19,8 @@ from discover.laws import (
     LinearPhanThienTanner,
     UpperConvectedMaxwell,
 )
-from discover.simulate import simulate_homogeneous_flow
+from discover.protocols import in_flow, stack_protocols, start_up
+from discover.simulate import make_grids, simulate_homogeneous_flow
 from tensor_library import build_library, parse_term, uniaxial_extension
 
 SLIP = "sigma.gammadot+gammadot.sigma"
@@ -110,12 +111,14 @@ def test_random_histories_span_weak_to_strong_flows_and_repeat():
 def test_laws_side_by_side_extend_as_one_alone():
     times = np.linspace(0, 4, 81)
     laws = [LawTerms({"sigma.sigma": 0.2}), LawTerms({})]
-    stress = extensional_stresses(LIBRARY, laws, np.array([0.3]), times)
+    protocol = in_flow(start_up(0.3), "uniaxial")
+    grids = make_grids([protocol], [times])
+    stress = stresses_of_laws(LIBRARY, laws, stack_protocols([protocol]), grids)
     gradient = uniaxial_extension(jnp.asarray(0.3))
     alone = simulate_homogeneous_flow(Giesekus(0.2), lambda t: gradient, times)
     # fourth-order steps of 0.05 on rates of order one
-    np.testing.assert_allclose(stress[0, 0, 0, :, 0], alone[:, 0, 0], atol=1e-6)
-    np.testing.assert_allclose(stress[0, 0, 0, :, 2], alone[:, 2, 2], atol=1e-6)
+    np.testing.assert_allclose(stress[0, 0, :, 0], alone[:, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(stress[0, 0, :, 2], alone[:, 2, 2], atol=1e-6)
 
 
 def test_what_separates_a_law_from_itself_is_nothing():

@@ -34,7 +34,7 @@ from discover.learners.tbnn_ude.spread import (
     coefficient_spread,
     member_predictions,
 )
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.shear import ShearProtocol, recorded_at
 from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
@@ -230,7 +230,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         fluid = self.fluid_
         problem = make_problem(runs, np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
-        return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
+        return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):

@@ -18,14 +18,14 @@ from discover.simulate.solve import solve_on_grid
 
 
 class TrainingProblem(eqx.Module):
-    """Shear stress of several runs, and the modes that the network serves.
+    """Recorded stress of several runs, and the modes that the network serves.
 
     Attributes
     ----------
     protocols, grids
         Flows and fixed time grids, with a leading axis of runs.
     target
-        Measured σ12 over the sum of the moduli, shape (runs, n).
+        Measured stress over the sum of the moduli, shape (runs, n).
     modulus, relaxation_time
         Of each mode, shape (k,); the moduli sum to one.
     """
@@ -45,17 +45,22 @@ class TrainingProblem(eqx.Module):
         law: AbstractConstitutiveLaw,
         adjoint: diffrax.AbstractAdjoint | None = None,
     ) -> Float[Array, "runs n"]:
-        """Return predicted minus measured σ12, zero where a sample is padding."""
+        """Return predicted minus measured stress, zero where a sample is padding."""
         fluid = self.fluid(law)
 
         def one(protocol, grid):
-            return solve_on_grid(fluid, protocol, grid, adjoint)[:, 3]
+            return protocol.recorded_stress(solve_on_grid(fluid, protocol, grid, adjoint).T)
 
         return self._missed_by(jax.vmap(one)(self.protocols, self.grids))
 
     def misses(self, states: Float[Array, "runs n k 4"]) -> Float[Array, "runs n"]:
-        """Return predicted minus measured σ12 from the stresses of the modes at the samples."""
-        return self._missed_by(jnp.tensordot(states[..., 3], self.modulus, axes=1))
+        """Return predicted minus measured stress from the stresses of the modes at the samples."""
+        total = jnp.tensordot(self.modulus, states, axes=(0, 2))
+
+        def recorded(protocol, components):
+            return protocol.recorded_stress(components.T)
+
+        return self._missed_by(jax.vmap(recorded)(self.protocols, total))
 
     def _missed_by(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
         return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)

@@ -65,7 +65,7 @@ def states_and_jacobian(
     count: int | None = None,
     first: Int[Array, ""] | np.int32 | int = 0,
 ) -> tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]]:
-    """Return the stress of every mode at the samples, and the derivatives of σ12 by every weight.
+    """Return the stress of every mode at the samples, and what each weight changes of the record.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ def states_and_jacobian(
     decay = jax.lax.stop_gradient(fluid.decay_rate())[:, None, None]
     n_weights = weights.shape[0]
 
-    def one_mode(state, sensitivity, time_scale, shear_rate):
+    def one_mode(state, sensitivity, time_scale, gradient):
         def change(s, w):
-            return rebuild(w).stress_rate(s, time_scale * shear_rate) / time_scale
+            return rebuild(w).stress_rate(s, time_scale * gradient) / time_scale
 
         # one evaluation and four pullbacks give both derivatives
         value, pull = jax.vjp(change, state, weights)
@@ -95,11 +95,11 @@ def states_and_jacobian(
 
     @jax.jit  # traced once for all stages of a step
     def field(t, y, protocol):
-        rate = protocol.shear_rate(t)
-        return jax.vmap(one_mode, (0, 0, 0, None))(y[..., 0], y[..., 1:], relaxation_time, rate)
+        gradient = protocol.velocity_gradient(t)
+        return jax.vmap(one_mode, (0, 0, 0, None))(y[..., 0], y[..., 1:], relaxation_time, gradient)
 
     def observe(t, y, protocol):
-        return y[..., 0], jnp.tensordot(modulus, y[:, 3, 1:], axes=1)
+        return y[..., 0], protocol.recorded_stress(jnp.tensordot(modulus, y[..., 1:], axes=1))
 
     def one_run(protocol, grid):
         solution = diffrax.diffeqsolve(

@@ -33,6 +33,7 @@ from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
+from discover.protocols.shear import recorded_at
 from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
@@ -324,7 +325,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         # the same padded layout as in the fit, so that folds share a compilation
         problem = make_problem(runs, self.library_, strain_step=self.strain_step)
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
-        return [stresses[i, : len(run), 3] for i, run in enumerate(runs)]
+        return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
     def _frequencies(self, library: TermLibrary) -> list[dict[str, Any]]:
         """Return how often each term was chosen from halves of the data, the most often first."""

@@ -53,18 +53,27 @@ def _mode_rates(library, base, active, coefficients, inner, state, rate):
 
 def _vector_field(t, state, args):
     problem, protocol, active, coefficients, inner = args
-    rate = problem.relaxation_time * protocol.shear_rate(t)
+    rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
     mode = partial(_mode_rates, problem.library, problem.base, active, coefficients, inner)
     rates = jax.vmap(mode)(state, rate)
     return rates / problem.relaxation_time[:, None, None]
 
 
 def _observe(t, state, args):
-    """Return σ12, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
+    """Return the recorded stress, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
     problem, protocol, *_ = args
     total = jnp.tensordot(problem.modulus, state, axes=1)
-    shear = total[3].at[0].add(problem.solvent_viscosity * protocol.shear_rate(t))
-    return jnp.stack([shear, total[0] - total[1], total[1] - total[2]])
+    return _recorded(total.at[:, 0].add(_of_solvent(problem, protocol, t)), protocol)
+
+
+def _of_solvent(problem, protocol, t):
+    return problem.solvent_viscosity * rate_of_deformation(protocol.velocity_gradient(t))
+
+
+def _recorded(total, protocol):
+    """Return the recorded stress, N1 and N2 of σ11, σ22, σ33, σ12 along the first axis."""
+    recorded = protocol.recorded_stress(total)
+    return jnp.stack([recorded, total[0] - total[1], total[1] - total[2]])
 
 
 def _solve_run(problem, active, coefficients, inner, protocol, grid):
@@ -133,7 +142,7 @@ def predict_many(
 
     def field(t, stress, args):
         protocol, coefficients, inner = args
-        rate = problem.relaxation_time * protocol.shear_rate(t)
+        rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
 
         def mode(stress, rate):
             terms = evaluate_active(
@@ -146,8 +155,7 @@ def predict_many(
 
     def seen(t, stress, args):
         total = jnp.tensordot(problem.modulus, stress, axes=1)
-        shear = total[3] + problem.solvent_viscosity * args[0].shear_rate(t)
-        return jnp.stack([shear, total[0] - total[1], total[1] - total[2]])
+        return _recorded(total + _of_solvent(problem, args[0], t), args[0])
 
     def run(coefficients, inner, protocol, grid):
         solution = diffrax.diffeqsolve(

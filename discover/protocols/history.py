@@ -1,0 +1,128 @@
+"""What was done to the fluid before the first sample, as the beginning of its protocol."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.protocols.shear import ShearProtocol
+
+STEADY_LENGTH = 2.0
+"""A steady flow before a run is computed over this multiple of the run's length."""
+
+STEADY_STRAIN = 300.0
+"""Strain after which any fluid is taken to be steady."""
+
+CYCLES = 10
+"""Cycles computed before the first sample of an oscillation that had gone on. It begins where the
+strain is in the middle of its range, so that what relaxes slowly starts without an offset."""
+
+# Of the time to the first sample: the duration of a step of strain that has none of its own
+_AT_ONCE = 1e-3
+_PER_CYCLE = 64
+
+
+def after_steady_flow(protocol: ShearProtocol, rate: float, end: float) -> ShearProtocol:
+    """Return the protocol, begun by a flow at a constant rate that has become steady.
+
+    Parameters
+    ----------
+    protocol
+        From t = 0 on.
+    rate
+        Of the flow before, in 1/s.
+    end
+        Time of the last sample, in s.
+    """
+    length = min(STEADY_LENGTH * end, STEADY_STRAIN / abs(rate))
+    return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
+
+
+def after_step_strain(
+    protocol: ShearProtocol, strain: float, first: float, duration: float = 0.0
+) -> ShearProtocol:
+    """Return the protocol, begun by a step of strain that ends at t = 0.
+
+    Parameters
+    ----------
+    protocol
+        From t = 0 on.
+    strain
+        Put on.
+    first
+        Time of the first sample after 0, in s: a step at once takes a thousandth of it, which
+        changes a relaxing stress by less than a thousandth.
+    duration
+        Over which the strain was put on at a constant rate, in s; 0 is at once.
+    """
+    length = duration if duration > 0.0 else _AT_ONCE * first
+    rate = strain / length
+    return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
+
+
+def after_alternation(
+    protocol: ShearProtocol, period: float, times: Float[np.ndarray, " n"]
+) -> ShearProtocol:
+    """Return the protocol, begun by cycles like the first one of the record.
+
+    Parameters
+    ----------
+    protocol
+        Its rate over the first period of the record is that of every cycle before.
+    period
+        In s.
+    times
+        Of the samples, in s.
+    """
+    if np.any(np.asarray(protocol.amplitudes)):
+        # a cosine has gone on for ever: begin where its rate is largest
+        turn = -CYCLES * period + np.arange(_PER_CYCLE) / _PER_CYCLE * period
+        largest = int(np.argmax(np.abs(_rates(protocol, turn))))
+        return replace(protocol, begins=jnp.asarray(float(turn[largest])))
+    # one cycle of the record, whole cycles before it, and from the largest rate on
+    phase = np.arange(_PER_CYCLE) / _PER_CYCLE * period
+    first = float(times[0])
+    cycle = _rates(protocol, first + phase)
+    knots = np.concatenate([first + phase - k * period for k in range(CYCLES, 0, -1)])
+    rates = np.tile(cycle, CYCLES)
+    start = int(np.argmax(np.abs(cycle)))
+    return _begun(protocol, knots[start:], rates[start:], replaces_until=first)
+
+
+def _rates(protocol: ShearProtocol, times: np.ndarray) -> np.ndarray:
+    table = np.interp(times, np.asarray(protocol.table_times), np.asarray(protocol.table_rates))
+    waves = np.asarray(protocol.amplitudes) * np.cos(
+        np.outer(times, np.asarray(protocol.frequencies)) + np.asarray(protocol.phases)
+    )
+    return table + np.sum(waves, axis=1)
+
+
+def _begun(
+    protocol: ShearProtocol,
+    knots: np.ndarray,
+    rates: np.ndarray,
+    replaces_until: float = 0.0,
+) -> ShearProtocol:
+    """Return the protocol with a table of rates before it."""
+    if np.any(np.asarray(protocol.amplitudes)):
+        raise InputError(
+            "An oscillation given by a formula has no beginning, so nothing can come before it. "
+            "Give its rate in samples: measured_rate(times, rates)."
+        )
+    own_times, own_rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    if replaces_until == 0.0:
+        first = np.interp(0.0, own_times, own_rates)
+        keep = own_times > 0.0
+        own_times = np.concatenate([[0.0], own_times[keep]])
+        own_rates = np.concatenate([[first], own_rates[keep]])
+    else:
+        keep = own_times >= replaces_until
+        own_times, own_rates = own_times[keep], own_rates[keep]
+    return replace(
+        protocol,
+        table_times=jnp.asarray(np.concatenate([knots, own_times])),
+        table_rates=jnp.asarray(np.concatenate([rates, own_rates])),
+        begins=jnp.asarray(float(knots[0])),
+    )

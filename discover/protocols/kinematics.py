@@ -1,0 +1,87 @@
+"""Kinematics of the homogeneous flows that a rheometer makes, and what it records in each.
+
+All of them share their principal third axis, so that the stress has four components, 11, 22, 33 and
+12, and the velocity gradient the same four. A rate times a fixed gradient is the whole flow.
+"""
+
+from typing import Literal
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.errors import InputError
+
+FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
+
+KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
+"""Flows by name; the first is the default everywhere."""
+
+# L11, L22, L33, L12 of a flow at unit rate. Biaxial: the rate is that of each of the two equal
+# directions   [Bird, Armstrong & Hassager 1987, vol. 1, section 3.1; Meissner et al. 1982]
+_GRADIENT = {
+    "shear": (0.0, 0.0, 0.0, 1.0),
+    "uniaxial": (1.0, -0.5, -0.5, 0.0),
+    "planar": (1.0, -1.0, 0.0, 0.0),
+    "biaxial": (1.0, -2.0, 1.0, 0.0),
+}
+_TENSION = (1.0, -1.0, 0.0, 0.0)
+
+
+class Kinematics(eqx.Module):
+    """A homogeneous flow at unit rate, and the stress that is recorded in it.
+
+    Attributes
+    ----------
+    gradient
+        L11, L22, L33, L12 at unit rate.
+    recorded
+        Weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, σ11 − σ22 in extension.
+    intensity
+        √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in uniaxial
+        extension.
+    viscous
+        Recorded stress of a Newtonian fluid of unit viscosity at unit rate: 1 in shear, 3, 4 and 6
+        in uniaxial, planar and biaxial extension   [Trouton 1906, Proc. R. Soc. A 77, 426].
+    """
+
+    gradient: Float[Array, "*batch 4"]
+    recorded: Float[Array, "*batch 4"]
+    intensity: Float[Array, "*batch"]
+    viscous: Float[Array, "*batch"]
+
+    def stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
+        """Return the recorded stress of σ11, σ22, σ33, σ12."""
+        return jnp.tensordot(self.recorded, components, axes=1)
+
+    def equivalent_shear_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
+        """Return the stress whose work at the shear rate of equal intensity is that of the flow."""
+        return jnp.tensordot(self.gradient, components, axes=1) / self.intensity
+
+
+def kind_of(kinematics: Kinematics | None) -> FlowKind:
+    """Return the name of a flow; None is simple shear."""
+    if kinematics is None:
+        return "shear"
+    gradient = np.asarray(kinematics.gradient)
+    return next(kind for kind in KINDS if np.array_equal(_GRADIENT[kind], gradient))
+
+
+def kinematics_of(kind: str) -> Kinematics:
+    """Return the kinematics of a flow by its name.
+
+    Raises
+    ------
+    InputError
+        If there is no such flow.
+    """
+    if kind not in _GRADIENT:
+        raise InputError(f"Unknown flow {kind!r}; the flows are {', '.join(KINDS)}.")
+    gradient = np.array(_GRADIENT[kind])
+    rate = gradient * np.array([2.0, 2.0, 2.0, 1.0])  # γ̇ = L + Lᵀ
+    recorded = np.array(_GRADIENT["shear"] if kind == "shear" else _TENSION)
+    intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
+    return Kinematics(
+        *(jnp.asarray(part) for part in (gradient, recorded, intensity, recorded @ rate))
+    )

@@ -1,0 +1,157 @@
+"""Extension, steps of strain and steady alternation, against scipy on full tensors."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.closed_loop.augmented_model import AugmentedModel
+from discover.closed_loop.declared import DeclaredModel
+from discover.closed_loop.run_batch import make_batch
+from discover.dataset.run import ShearRun
+from discover.errors import InputError
+from discover.laws import Fluid, make_law
+from discover.protocols import (
+    after_alternation,
+    after_step_strain,
+    in_flow,
+    kinematics_of,
+    measured_rate,
+    oscillatory_shear,
+    recorded_at,
+    stack_protocols,
+    start_up,
+    step_rates,
+)
+from discover.simulate import make_grids, simulate, solve_batch
+
+MODULUS, TIME, SOLVENT, MOBILITY = np.array([100.0, 20.0]), np.array([0.2, 3.0]), 5.0, 0.3
+TIMES = np.linspace(0.05, 4.0, 30)
+# L at unit rate, and the tensor component that is recorded, written by hand
+UNIT = {
+    "shear": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+    "uniaxial": np.diag([1.0, -0.5, -0.5]),
+    "planar": np.diag([1.0, -1.0, 0.0]),
+    "biaxial": np.diag([1.0, -2.0, 1.0]),
+}
+
+
+def fluid():
+    return Fluid(make_law("giesekus", {"alpha": MOBILITY}), MODULUS, TIME, SOLVENT)
+
+
+def recorded_by_scipy(kind, rate, times, begins=0.0, jumps=()):
+    """Return the recorded stress of a two-mode Giesekus fluid with solvent, in Pa."""
+
+    def slope(t, y):
+        gradient = UNIT[kind] * rate(t)
+        out = []
+        for stress, modulus, time in zip(y.reshape(2, 3, 3), MODULUS, TIME, strict=True):
+            change = modulus * (gradient + gradient.T) + gradient @ stress + stress @ gradient.T
+            out.append(change - stress / time - MOBILITY / modulus / time * stress @ stress)
+        return np.ravel(out)
+
+    y, t, found = np.zeros(18), begins, {}
+    for end in [*sorted(jumps), times[-1]]:
+        inside = times[(times > t) & (times <= end)]
+        solution = solve_ivp(
+            slope, (t, end), y, t_eval=np.unique([*inside, end]), rtol=1e-9, atol=1e-9
+        )
+        found |= dict(zip(solution.t, solution.y.T, strict=True))
+        y, t = solution.y[:, -1], end
+    total = np.array([found[t].reshape(2, 3, 3).sum(axis=0) for t in times])
+    gradients = np.array([UNIT[kind] * rate(t) for t in times])
+    total = total + SOLVENT * (gradients + np.swapaxes(gradients, 1, 2))
+    return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
+
+
+def in_the_loop(protocols, times=TIMES):
+    """Return what the closed loop's model predicts."""
+    runs = [
+        ShearRun(str(i), times, protocol, np.ones(len(times)), np.ones(len(times)))
+        for i, protocol in enumerate(protocols)
+    ]
+    declared = DeclaredModel(
+        make_law("giesekus", {"alpha": MOBILITY}), MODULUS, TIME, solvent_viscosity=SOLVENT
+    )
+    model = AugmentedModel(declared, [])
+    return model.predict(model.zero(), make_batch(runs, strain_step=0.05))
+
+
+@pytest.mark.parametrize("kind", ["uniaxial", "planar", "biaxial"])
+def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
+    protocol = in_flow(start_up(0.6), kind)
+    exact = recorded_by_scipy(kind, lambda _: 0.6, TIMES)
+    adaptive = recorded_at(protocol, simulate(fluid(), protocol, TIMES).components)
+    grids = make_grids([protocol], [TIMES])
+    fixed = np.asarray(solve_batch(fluid(), stack_protocols([protocol]), grids))[0]
+    # rtol 1e-8 of a mode; the fixed grid is good to 1e-6 in shear and the loop's steps to 1e-5
+    np.testing.assert_allclose(adaptive, exact, rtol=1e-6)
+    np.testing.assert_allclose(recorded_at(protocol, fixed), exact, rtol=1e-5)
+    np.testing.assert_allclose(in_the_loop([protocol])[0], exact, rtol=1e-4)
+
+
+def test_shear_beside_extension_is_what_it_is_alone():
+    shear = step_rates([0.0, 2.0], [1.0, -0.5])
+    stretched = in_flow(start_up(0.6), "uniaxial")
+    both = in_the_loop([shear, stretched])
+    np.testing.assert_allclose(both[0], in_the_loop([shear])[0], rtol=1e-9)
+    np.testing.assert_allclose(both[1], in_the_loop([stretched])[0], rtol=1e-9)
+
+
+def test_relaxation_after_a_step_of_strain_is_that_of_scipy():
+    held = after_step_strain(start_up(0.0), 2.0, TIMES[0])
+    begins, length = float(held.begins), -float(held.begins)
+    assert length < 2e-3 * TIMES[0]
+    exact = recorded_by_scipy(
+        "shear", lambda t: 2.0 / length if t < 0.0 else 0.0, TIMES, begins, jumps=[0.0]
+    )
+    found = recorded_at(held, simulate(fluid(), held, TIMES).components)
+    np.testing.assert_allclose(found, exact, rtol=1e-5)
+    np.testing.assert_allclose(in_the_loop([held])[0], exact, rtol=1e-3)
+
+
+def test_a_step_of_strain_at_once_leaves_the_elastic_stress_of_maxwell():
+    maxwell = Fluid(make_law("ucm"), 100.0, 1.0)
+    held = after_step_strain(start_up(0.0), 1.5, 0.01)
+    times = np.array([0.01, 0.5, 1.0])
+    stress = simulate(maxwell, held, times)
+    # Lodge & Meissner: σ12 = G γ exp(−t/λ), N1 = γ σ12; the step lasts 1e-5 of λ
+    np.testing.assert_allclose(stress.shear_stress, 150.0 * np.exp(-times), rtol=2e-5)
+    np.testing.assert_allclose(
+        stress.first_normal_stress_difference, 1.5 * stress.shear_stress, rtol=2e-5
+    )
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_an_oscillation_that_had_gone_on_is_periodic_from_its_first_sample(sampled):
+    period = 2.0 * np.pi / 2.0
+    times = np.linspace(0.0, 2.0 * period, 129)
+    wave = oscillatory_shear(3.0, 2.0)
+    if sampled:
+        wave = measured_rate(times, 3.0 * np.cos(2.0 * times))
+    found = in_the_loop([after_alternation(wave, period, times)], times)[0]
+    size = np.max(np.abs(found))
+    # λω is 0.4 and 6: ten cycles leave exp(−10 · 2π/6) = 3e-5 of the transient
+    assert np.max(np.abs(found[:65] - found[64:])) < 1e-4 * size
+    started = in_the_loop([wave], times)[0]
+    assert np.max(np.abs(started[:65] - started[64:])) > 0.05 * size
+
+
+def test_troutons_ratios_are_three_four_and_six():
+    ratios = {"shear": 1.0, "uniaxial": 3.0, "planar": 4.0, "biaxial": 6.0}
+    assert {kind: float(kinematics_of(kind).viscous) for kind in ratios} == ratios
+
+
+def test_an_unknown_flow_is_refused_with_those_that_are_known():
+    with pytest.raises(InputError, match="shear, uniaxial, planar, biaxial"):
+        in_flow(start_up(1.0), "triaxial")
+
+
+def test_the_work_of_a_flow_is_that_of_its_equivalent_shear():
+    stress = jnp.array([3.0, -1.0, 0.5, 0.7])
+    for kind, unit in UNIT.items():
+        flow = kinematics_of(kind)
+        full = np.array([[3.0, 0.7, 0.0], [0.7, -1.0, 0.0], [0.0, 0.0, 0.5]])
+        work = float(np.sum(full * unit))
+        assert float(flow.intensity * flow.equivalent_shear_stress(stress)) == pytest.approx(work)
