@@ -86,6 +86,7 @@ def record_runs(
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
                 conditions=_conditions(run, order),
+                flow=run.flow,
             )
         )
     return records

@@ -14,7 +14,11 @@ from jaxtyping import Array, Float
 
 from discover.effects import StateEffect
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import phi_functions
+from discover.simulate.exponential_runge_kutta import (
+    KrogstadWeights,
+    krogstad_weights,
+    phi_functions,
+)
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
@@ -39,27 +43,11 @@ class Series(NamedTuple):
     viscosity: Float[Array, ""]
 
 
-def _weights(relaxation_time, width, linear_relaxation):
-    """Return the ten weights of Krogstad's method, shape (steps, 10, k)."""
+def _weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 10 k"]:
+    """Return the weights of every step, in the dimensionless time of each mode."""
     h = width[:, None] / relaxation_time
     z = -h if linear_relaxation else jnp.zeros_like(h)
-    half_first, half_second, _ = phi_functions(0.5 * z)
-    first, second, third = phi_functions(z)
-    return jnp.stack(
-        [
-            jnp.exp(0.5 * z),
-            jnp.exp(z),
-            0.5 * h * half_first,
-            h * (0.5 * half_first - half_second),
-            h * half_second,
-            h * (first - 2.0 * second),
-            2.0 * h * second,
-            h * (first - 3.0 * second + 4.0 * third),
-            h * (2.0 * second - 4.0 * third),
-            h * (4.0 * third - second),
-        ],
-        axis=1,
-    )
+    return jnp.stack(krogstad_weights(z, h), axis=1)
 
 
 def _relax(effect: StateEffect, values, state, shear_rate, stress, width):
@@ -140,8 +128,7 @@ def integrate(
     def step(carry, inputs):
         stress, levels, missing, compliance_rate = carry
         (first_rate, middle_rate, last_rate), h, parts = inputs
-        w = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
-        half, full, a21, a31, a32, a41, a43, b1, b23, b4 = w
+        w = KrogstadWeights(*(parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)))
         scale = _combined("modulus_factor", states, levels)
         shear_before, felt_rate = sheared(stress, middle_rate)
         shear_before = scale * shear_before
@@ -160,15 +147,14 @@ def integrate(
                 series, modes, scale_last, stress, shear_before, missing, compliance_rate, n1, w,
                 first_rate, last_rate, h, times[-1],
             )  # fmt: skip
-        n2 = remainder(half * stress + a21 * n1, middle_rate + compliance_rate, slow_middle)
-        n3 = remainder(
-            half * stress + a31 * n1 + a32 * n2, middle_rate + compliance_rate, slow_middle
-        )
-        n4 = remainder(full * stress + a41 * n1 + a43 * n3, last_rate + compliance_rate, slow_last)
-        after = full * stress + b1 * n1 + b23 * (n2 + n3) + b4 * n4
+        middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
+        n2 = remainder(w.half * stress + w.a21 * n1, middle_rate, slow_middle)
+        n3 = remainder(w.half * stress + w.a31 * n1 + w.a32 * n2, middle_rate, slow_middle)
+        n4 = remainder(w.full * stress + w.a41 * n1 + w.a43 * n3, last_rate, slow_last)
+        after = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
 
         # the states once more, now with the mean of the stress at both ends
-        shear_after, felt_rate = sheared(after, middle_rate + compliance_rate)
+        shear_after, felt_rate = sheared(after, middle_rate)
         stress_after = recorded(after)
         if states:
             guess = _combined("modulus_factor", states, [p[1] for p in predicted]) * shear_after
@@ -182,7 +168,7 @@ def integrate(
         if series is not None:
             torque = 0.5 * (
                 shear_before + shear_after
-                + series.viscosity * (first_rate + last_rate + 2.0 * compliance_rate)
+                + series.viscosity * (first_rate + last_rate + compliance_rate)
             )  # fmt: skip
             missing = missing + compliance_rate * h + series.slip * h * torque
         return (after, levels, missing, compliance_rate), (stress_after, compliance_rate)
@@ -213,7 +199,7 @@ def _compliance_rate(
     stress at the end is predicted by one exponential Euler step, linear in the rate; what the
     prediction misses is carried in `missing` to the next step.
     """
-    full, whole = w[1], w[7] + 2.0 * w[8] + w[9]
+    full, whole = w.full, w.b1 + 2.0 * w.b23 + w.b4
     stretch = modes.relaxation_time * (1.0 + stress[1])
     predicted = scale * ((full * stress[3] + whole * n1[3]) @ modes.modulus)
     stiffness = scale * ((whole * stretch) @ modes.modulus)

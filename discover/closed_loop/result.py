@@ -18,6 +18,7 @@ from discover.errors import InputError
 from discover.laws import Fluid
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
+from discover.protocols.kinematics import FlowKind
 
 if TYPE_CHECKING:
     from discover.closed_loop.reading import Reading
@@ -84,16 +85,18 @@ class RunRecord:
     time, strain, instrument_time
         In s, dimensionless, and in s on the instrument's clock, shape (n,).
     shear_rate
-        Commanded, in 1/s, shape (n,).
+        Commanded, in 1/s, shape (n,); in extension the Hencky rate.
     measured
-        Shear stress in Pa, shape (n,).
+        Recorded stress in Pa, shape (n,): σ12 in shear, σ11 − σ22 in extension.
     predicted
-        Shear stress in Pa by the declared model and after each stage, shape (stages + 1, n).
+        Recorded stress in Pa by the declared model and after each stage, shape (stages + 1, n).
     errors
         Relative error of each of these, shape (stages + 1,).
     conditions
         Numbers that the source gives of the run, such as its temperature, and its place in the
         order of the runs.
+    flow
+        Which flow it is.
     """
 
     name: str
@@ -106,6 +109,7 @@ class RunRecord:
     predicted: Float[np.ndarray, "stages n"]
     errors: Float[np.ndarray, " stages"]
     conditions: dict[str, float] = field(default_factory=dict)
+    flow: FlowKind = "shear"
 
     def line(self) -> dict[str, Any]:
         """Return the run as one line of a table: its errors, the declared model's first."""

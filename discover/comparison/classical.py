@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.flows import QUANTITIES, Flow, Stresses, relative_errors
+from discover.comparison.flows import QUANTITIES, Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.truth import true_terms
 from discover.identify.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.maxwell import UpperConvectedMaxwell
@@ -120,13 +120,16 @@ def fit_classical_laws(
         at = int(np.argmin(misfits[name]))
         value, misfit = values[at], float(misfits[name][at])
         if not np.isfinite(misfit):
-            nothing = {flow.name: relative_errors(None, flow.reference) for flow in judged}
+            nothing = {
+                flow.name: of_recorded(relative_errors(None, flow.reference), flow)
+                for flow in judged
+            }
             fits.append(ClassicalFit(name, {}, None, None, nothing))
             continue
         parameters = {} if value is None else {_parameter(name): float(value)}
         criterion = extended_bic(max(misfit, _FLOOR), samples, len(parameters), 0, len(CLASSICAL))
         errors = {
-            flow.name: relative_errors(_stresses(rows[at]), flow.reference)
+            flow.name: of_recorded(relative_errors(_stresses(rows[at]), flow.reference), flow)
             for flow, rows in zip(judged, predicted[name][len(training) :], strict=True)
         }
         fits.append(ClassicalFit(name, parameters, misfit, criterion, errors))

@@ -9,7 +9,7 @@ import pandas as pd
 from discover.comparison.classical import ClassicalFit
 from discover.comparison.equations import outcome_equation
 from discover.comparison.explanation import Explanation
-from discover.comparison.flows import Flow, Stresses, relative_errors
+from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.identifiability import Rival
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome, plain
@@ -185,7 +185,7 @@ class Comparison(PageView, NotebookView):
         lines = {}
         for flow in self.judged:
             for who in ("before", *self.outcomes):
-                for quantity, error in self.errors(who, flow).items():
+                for quantity, error in of_recorded(self.errors(who, flow), flow).items():
                     lines.setdefault((flow.name, quantity), {})[who] = error
         table = pd.DataFrame.from_dict(lines, orient="index", dtype=float)
         table.index = pd.MultiIndex.from_tuples(lines, names=["flow", "quantity"])
@@ -284,4 +284,4 @@ class Comparison(PageView, NotebookView):
         return plain(content)
 
     def _errors(self, who: str, flows: Sequence[Flow]) -> dict[str, dict[str, float | None]]:
-        return {flow.name: self.errors(who, flow) for flow in flows}
+        return {flow.name: of_recorded(self.errors(who, flow), flow) for flow in flows}

@@ -19,6 +19,9 @@ from discover.study.build import StudyData
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""
 
+TENSILE_STRESS = "tensile_stress"
+"""What is recorded in extension, as spelled in JSON; it takes the place of σ12."""
+
 Stresses = Mapping[str, Float[np.ndarray, " _"]]
 """Some of `QUANTITIES`, each of shape (n,)."""
 
@@ -73,6 +76,11 @@ class Flow:
         return self.name if self.kind == "test" else f"{self.kind}/{self.name}"
 
     @property
+    def in_shear(self) -> bool:
+        """Whether it is simple shear; else what is recorded is the tensile stress."""
+        return self.protocol.kinematics is None
+
+    @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
         amplitudes = np.asarray(self.protocol.amplitudes)
@@ -100,6 +108,8 @@ class Flow:
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
         if not np.any(amplitudes) and rates.size == 1:
+            if not self.in_shear:
+                return f"{self.protocol.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name
 
@@ -159,7 +169,7 @@ def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
         reference = stresses(exact[run.name], run.protocol)
     else:
         candidates = {
-            "sigma12": run.shear_stress,
+            "sigma12": run.shear_stress,  # in extension the tensile stress
             "N1": run.first_normal_stress_difference,
             "N2": run.second_normal_stress_difference,
         }
@@ -236,3 +246,10 @@ def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[st
             difference = np.linalg.norm(prediction[quantity] - reference[quantity])
             errors[quantity] = float(difference / norm)
     return errors
+
+
+def of_recorded(errors: Mapping[str, float | None], flow: Flow) -> dict[str, float | None]:
+    """Return errors under the names of what is recorded: the tensile stress in extension."""
+    if flow.in_shear:
+        return dict(errors)
+    return {TENSILE_STRESS: errors["sigma12"]}

@@ -24,16 +24,19 @@ class Placement:
     frequency
         Angular frequency over the largest fitted one; None where one of the two does not
         oscillate, for a step of the rate excites every frequency.
+    new_flow
+        Which flow it is, where no fitted one is of that kind; empty otherwise.
     """
 
     rate: float
     strain: float
     frequency: float | None
+    new_flow: str = ""
 
     @property
     def inside(self) -> bool:
-        """Whether nothing exceeds the fitted flows."""
-        return not self.beyond
+        """Whether nothing exceeds the fitted flows, and flows of the kind were fitted."""
+        return not (self.beyond or self.new_flow)
 
     @property
     def beyond(self) -> dict[str, float]:
@@ -51,11 +54,15 @@ class Placement:
         if self.inside:
             return "inside the fitted range"
         parts = [f"{name} {factor:.2g} times the largest" for name, factor in self.beyond.items()]
+        if self.new_flow:
+            what = "shear" if self.new_flow == "shear" else f"{self.new_flow} extension"
+            parts.insert(0, f"{what}, of which nothing was fitted")
         return f"beyond the fitted range: {', '.join(parts)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the placement as ``comparison.json`` holds it."""
-        return {"inside": self.inside, "beyond": self.beyond}
+        said = {"inside": self.inside, "beyond": self.beyond}
+        return said | ({"new_flow": self.new_flow} if self.new_flow else {})
 
 
 def place(flow: Flow, training: Sequence[Flow]) -> Placement:
@@ -72,11 +79,14 @@ def place(flow: Flow, training: Sequence[Flow]) -> Placement:
         The fitted flows.
     """
     frequencies = [f for other in training if (f := other.frequency) is not None]
+    kind = flow.protocol.flow
+    alike = [other for other in training if other.protocol.flow == kind]
     oscillates = flow.frequency is not None and len(frequencies) == len(training)
     return Placement(
-        _ratio(_largest(flow.shear_rate), [_largest(other.shear_rate) for other in training]),
-        _ratio(_largest(flow.strain), [_largest(other.strain) for other in training]),
+        _ratio(_largest(flow.shear_rate), [_largest(f.shear_rate) for f in alike or training]),
+        _ratio(_largest(flow.strain), [_largest(f.strain) for f in alike or training]),
         _ratio(flow.frequency or 0.0, frequencies) if oscillates else None,
+        "" if alike else kind,
     )
 
 

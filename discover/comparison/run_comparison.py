@@ -80,7 +80,7 @@ def compare(
     """
     options = study.compare
     data = load_study_data(study, seed) if data is None else data
-    _require_plain_runs(data)
+    _require_one_split(data)
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
@@ -291,18 +291,12 @@ def _require_teacher(study: Study) -> None:
         )
 
 
-def _require_plain_runs(data: StudyData) -> None:
+def _require_one_split(data: StudyData) -> None:
     """Refuse what only the closed loop can do."""
     if data.each:
         raise InputError(
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
             'such as held_out = ["fast.csv"].'
-        )
-    flowing = [run.name for run in data.dataset if run.rate_before != 0.0]
-    if flowing:
-        raise InputError(
-            f"The run {flowing[0]!r} starts from a steady flow (rate_before); the learners start "
-            "every run from rest. Use close-loop, or compare runs from rest."
         )
 
 

@@ -99,8 +99,8 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
 def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return every law fitted to the runs, classical and learned: constants, misfit, errors.
 
-    Errors are means of σ12's over the flows that no fit saw, those inside the fitted range apart
-    from those beyond it.
+    Errors are means, of the recorded stress, over the flows that no fit saw, those inside the
+    fitted range apart from those beyond it.
     """
     placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
     rows = []
@@ -143,11 +143,12 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
 def _mean_errors(
     errors: Mapping[str, Mapping[str, float | None]], inside: Mapping[str, bool]
 ) -> dict[str, float | None]:
-    """Return the mean error of σ12 inside the fitted range and beyond it."""
+    """Return the mean error of the recorded stress inside the fitted range and beyond it."""
     means: dict[str, float | None] = {}
     for name, wanted in (("inside", True), ("beyond", False)):
         flows = [flow for flow, is_inside in inside.items() if is_inside is wanted]
-        values = [errors[flow]["sigma12"] for flow in flows]
+        # what is recorded comes first
+        values = [next(iter(errors[flow].values())) for flow in flows]
         said = [value for value in values if value is not None]
         # a law that cannot be integrated through one of the flows has no mean
         means[name] = float(np.mean(said)) if said and len(said) == len(values) else None

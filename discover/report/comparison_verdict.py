@@ -151,9 +151,10 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
         runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
         errors = {flow.name: comparison.errors(name, flow) for flow in flows}
+        recorded = "σ12" if all(flow.in_shear for flow in flows) else "the recorded stress"
         said = [
             f"{symbol} by {percent(value)}"
-            for symbol, quantity in (("σ12", "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
             if (value := worst(errors, quantity.split()[0])) is not None
         ]
         if said:

@@ -55,7 +55,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
             if predicted is None:
                 continue
             limits = _limits(comparison, who, flow)
-            for quantity in QUANTITIES:
+            for quantity in QUANTITIES if flow.in_shear else QUANTITIES[:1]:
                 low, high = limits.get(quantity, (np.nan, np.nan))
                 parts.append(
                     _lines(
@@ -64,7 +64,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
                         time_s=flow.times,
                         strain=flow.strain,
                         rate_1_s=flow.shear_rate,
-                        quantity=quantity,
+                        quantity=quantity if flow.in_shear else "tensile_stress",
                         source=_SOURCES.get(who, who),
                         value=predicted[quantity],
                         low95=low,
@@ -76,7 +76,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
 
 
 def loop_predictions(result: LoopResult) -> pd.DataFrame:
-    """Return the curves of a closed loop: σ12 by the declared model and by the augmented one.
+    """Return the curves of a closed loop, by the declared model and by the augmented one.
 
     Units as in `comparison_predictions`. Where nothing was added there is only the declared model.
     """
@@ -87,6 +87,10 @@ def write_predictions(table: pd.DataFrame, folder: RunFolder) -> None:
     """Write a table of predictions into a folder of results."""
     # nine digits: more than any measurement has, and than the integration promises
     folder.write(PREDICTIONS, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+
+
+def _recorded(flow: str) -> str:
+    return "sigma12" if flow == "shear" else "tensile_stress"
 
 
 def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
@@ -100,7 +104,7 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
             time_s=record.time,
             strain=record.strain,
             rate_1_s=record.shear_rate,
-            quantity="sigma12",
+            quantity=_recorded(record.flow),
             source=source,
             value=predicted,
             low95=np.nan,

@@ -7,6 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from discover.comparison.outcome import LearnerOutcome
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
+
+TENSILE = "σ₁₁ − σ₂₂"
+"""Symbol of the tensile stress."""
+
+
+def recorded_symbol(flows: Iterable[str]) -> str:
+    """Return the symbol of the stress that is recorded in these flows."""
+    kinds = {flow == "shear" for flow in flows}
+    if len(kinds) > 1:
+        return "stress"
+    return TENSILE if kinds == {False} else "σ₁₂"
+
+
 LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
 
 

@@ -1,7 +1,7 @@
 """A diffrax solver that treats linear relaxation exactly."""
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import diffrax
 import jax
@@ -37,6 +37,53 @@ def phi_functions(
         jnp.where(small, series_first, first),
         jnp.where(small, series_second, second),
         jnp.where(small, series, third),
+    )
+
+
+class KrogstadWeights(NamedTuple):
+    """What one step of Krogstad's method multiplies state and remainders with.
+
+    The stages are Y2 = half y + a21 N1, Y3 = half y + a31 N1 + a32 N2 and Y4 = full y + a41 N1 +
+    a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y.
+    """
+
+    half: Float[Array, " ..."]
+    full: Float[Array, " ..."]
+    a21: Float[Array, " ..."]
+    a31: Float[Array, " ..."]
+    a32: Float[Array, " ..."]
+    a41: Float[Array, " ..."]
+    a43: Float[Array, " ..."]
+    b1: Float[Array, " ..."]
+    b23: Float[Array, " ..."]
+    b4: Float[Array, " ..."]
+
+
+def krogstad_weights(
+    z: Float[Array, " ..."], step: Float[Array, " ..."] | Float[Array, ""]
+) -> KrogstadWeights:
+    """Return the weights of a step   [Krogstad 2005, JCP 203, 72].
+
+    Parameters
+    ----------
+    z
+        Minus the decay over the step.
+    step
+        Its length, in the unit of time of the remainders.
+    """
+    half_first, half_second, _ = phi_functions(0.5 * z)
+    first, second, third = phi_functions(z)
+    return KrogstadWeights(
+        half=jnp.exp(0.5 * z),
+        full=jnp.exp(z),
+        a21=0.5 * step * half_first,
+        a31=step * (0.5 * half_first - half_second),
+        a32=step * half_second,
+        a41=step * (first - 2.0 * second),
+        a43=2.0 * step * second,
+        b1=step * (first - 3.0 * second + 4.0 * third),
+        b23=step * (2.0 * second - 4.0 * third),
+        b4=step * (4.0 * third - second),
     )
 
 
@@ -84,17 +131,16 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
         """Make one step from t0 to t1."""
         del solver_state, made_jump
         step = t1 - t0
+        step = jnp.asarray(step)
         z = -self.decay * step
-        half_first, half_second, _ = phi_functions(0.5 * z)
-        first, second, third = phi_functions(z)
-        none, half, full = jnp.zeros_like(z), jnp.exp(0.5 * z), jnp.exp(z)
-        decayed = jnp.stack([jnp.ones_like(z), half, half, full])
-        tableau = step * jnp.stack(
+        w, none = krogstad_weights(z, step), jnp.zeros_like(z)
+        decayed = jnp.stack([jnp.ones_like(z), w.half, w.half, w.full])
+        tableau = jnp.stack(
             [
                 jnp.stack([none, none, none, none]),
-                jnp.stack([0.5 * half_first, none, none, none]),
-                jnp.stack([0.5 * half_first - half_second, half_second, none, none]),
-                jnp.stack([first - 2.0 * second, none, 2.0 * second, none]),
+                jnp.stack([w.a21, none, none, none]),
+                jnp.stack([w.a31, w.a32, none, none]),
+                jnp.stack([w.a41, none, w.a43, none]),
             ]
         )
         times = t0 + step * jnp.array([0.0, 0.5, 0.5, 1.0])
@@ -107,14 +153,9 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
 
         start = jnp.zeros((4, *y0.shape), y0.dtype)
         (n1, n2, n3, n4), _ = jax.lax.scan(stage, start, (jnp.arange(4), decayed, tableau, times))
-        last = 4.0 * third - second
-        y1 = full * y0 + step * (
-            (first - 3.0 * second + 4.0 * third) * n1
-            + (2.0 * second - 4.0 * third) * (n2 + n3)
-            + last * n4
-        )
+        y1 = w.full * y0 + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
         slope = n1 - self.decay * y0
         slope_after = terms.vf(t1, y1, args)
-        error = step * last * (slope_after + self.decay * y1 - n4)
+        error = w.b4 * (slope_after + self.decay * y1 - n4)
         dense = {"y0": y0, "y1": y1, "k0": step * slope, "k1": step * slope_after}
         return y1, error, dense, None, diffrax.RESULTS.successful

@@ -22,6 +22,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
+from discover.report.wording import TENSILE, recorded_symbol
 
 SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
 START_UP_SHOWN = 10.0
@@ -88,19 +89,20 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
 
 
 def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
-    """Return σ12, N1 and N2 in start-up."""
+    """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
     stress_unit, time_label, _ = units(comparison)
-    with figure(1, 3, height=2.9) as (drawing, axes):
+    quantities = QUANTITIES if flow.in_shear else QUANTITIES[:1]
+    with figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
         if not flow.is_truth:
             shown = np.ones_like(shown)
-        for panel, quantity in zip(axes[0], QUANTITIES, strict=True):
+        for panel, quantity in zip(axes[0], quantities, strict=True):
             for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
             _frame(panel, comparison, flow, quantity, shown)
-            panel.set_ylabel(SYMBOLS[quantity] + stress_unit)
+            panel.set_ylabel((SYMBOLS[quantity] if flow.in_shear else TENSILE) + stress_unit)
             panel.set_xlabel(time_label)
         legend_above(drawing, axes)
         return picture(
@@ -114,6 +116,7 @@ def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
     stress_unit, time_label, _ = units(comparison)
+    recorded = recorded_symbol(flow.protocol.flow for flow in flows)
     columns = min(4, len(flows))
     rows = -(-len(flows) // columns)
     with figure(rows, columns, height=1.8) as (drawing, axes):
@@ -121,9 +124,7 @@ def training_picture(comparison: Comparison) -> Picture:
             panel.set_visible(False)
         for panel, flow in zip(axes.ravel(), flows, strict=False):
             if flow.measured is not None:
-                panel.plot(
-                    flow.times, flow.measured, ".", color=MEASURED, ms=2.5, label="data (σ₁₂)"
-                )
+                panel.plot(flow.times, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
@@ -137,10 +138,10 @@ def training_picture(comparison: Comparison) -> Picture:
         for panel in axes[-1]:
             panel.set_xlabel(time_label)
         for panel in axes[:, 0]:
-            panel.set_ylabel("σ₁₂" + stress_unit)
+            panel.set_ylabel(recorded + stress_unit)
         legend_above(drawing, axes)
         return picture(
-            drawing, "training", "The only data that the learners saw: σ₁₂ of these runs."
+            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
         )
 
 

@@ -1,5 +1,7 @@
 """Pictures of a closed loop: data and predictions, residuals, waterfall, ranking."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.ticker import EngFormatter
 
@@ -21,7 +23,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import effect_title, percent
+from discover.report.wording import TENSILE, effect_title, percent, recorded_symbol
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
@@ -33,6 +35,14 @@ _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the dura
 
 def _through_decades(record: RunRecord) -> bool:
     return runs_through_decades(record.time, record.shear_rate)
+
+
+def _recorded(records: Sequence[RunRecord]) -> str:
+    return recorded_symbol(record.flow for record in records)
+
+
+def _what_is_drawn(records: Sequence[RunRecord]) -> str:
+    return f" Stress is σ₁₂ in shear, {TENSILE} in extension." * (_recorded(records) == "stress")
 
 
 def runs_picture(result: LoopResult) -> Picture:
@@ -59,12 +69,13 @@ def runs_picture(result: LoopResult) -> Picture:
         for panel in axes[-1]:
             panel.set_xlabel("time (s)")
         for panel in axes[:, 0]:
-            panel.set_ylabel("σ₁₂ (Pa)")
+            panel.set_ylabel(f"{_recorded(records)} (Pa)")
         legend_above(drawing, axes)
         return picture(
             drawing,
             "runs",
-            "Every run in the window of the loop. Runs in orange were held out: no fit saw them.",
+            "Every run in the window of the loop. Runs in orange were held out: no fit saw them."
+            + _what_is_drawn(records),
         )
 
 
@@ -100,6 +111,8 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
 def short_title(record: RunRecord) -> str:
     """Return the name of a run, and below it its errors before and after."""
     name = literal(shortened(record.name))
+    if record.flow != "shear" and record.flow not in name:
+        name = f"{name}, {record.flow}"
     return f"{name}\n{percent(record.errors[0])} → {percent(record.errors[-1])}"
 
 
@@ -145,7 +158,7 @@ def residual_picture(result: LoopResult) -> Picture:
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-            axes[row, 0].set_ylabel("residual (% of rms σ₁₂)")
+            axes[row, 0].set_ylabel(f"residual (% of rms {_recorded(result.records)})")
             axes[row, 0].set_title(title, loc="left")
         legend_above(drawing, axes)
         return picture(
