@@ -11,7 +11,7 @@ and with it double precision and the cache of compiled programs are set up.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from discover._version import __version__ as __version__
 
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.closed_loop.in_memory import close_loop as close_loop

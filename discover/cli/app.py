@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from discover import __version__
+from discover._version import __version__
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export

@@ -10,8 +10,10 @@ from jaxtyping import Float
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.kind_of_test import reason_to_set_aside, stress_was_imposed
-from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
+from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.dataset.run import ShearRun
 from discover.dataset.sequence import in_sequence
+from discover.dataset.shear_dataset import ShearDataset
 from discover.dataset.table import Table, read_bytes, read_table, shown
 from discover.dataset.thinning import MOST_SAMPLES, thin, thin_sweep
 from discover.errors import InputError

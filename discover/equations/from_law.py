@@ -6,7 +6,7 @@ import numpy as np
 
 from discover.effects.base import ConstitutiveEffect
 from discover.effects.constitutive.finite_extensibility import shares_of_fene_p
-from discover.equations.equation import EquationTerm
+from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion

@@ -15,7 +15,7 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.from_law import EXPONENTIAL, finitely_extensible_terms
-from discover.equations.latex import header_lines
+from discover.equations.latex_file import header_lines
 from discover.errors import InputError
 from tensor_library.terms import parse_term
 

@@ -4,9 +4,10 @@ import math
 import re
 from typing import Any
 
-from discover.equations.equation import Equation, EquationTerm
+from discover.equations.equation import Equation
 from discover.equations.from_law import EXPONENTIAL, finitely_extensible_terms
 from discover.equations.rheotool import extension_factor
+from discover.equations.term import EquationTerm
 from discover.errors import InputError
 
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)

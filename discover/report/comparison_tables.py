@@ -10,7 +10,7 @@ from discover.comparison.identifiability import EXACT, Rival
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
-from discover.learners.result import RecoveredTerm
+from discover.learners import RecoveredTerm
 from discover.report.plots.flows import SYMBOLS
 from discover.report.plots.style import LEARNER_TITLES
 from discover.report.wording import (
