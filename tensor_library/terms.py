@@ -3,7 +3,8 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -156,6 +157,14 @@ class CandidateTerm:
     def latex(self) -> str:
         """Return the term as LaTeX, ready for a coefficient in front: a sum has its brackets."""
         return self.spell(LatexNotation())
+
+
+class TermShare(NamedTuple):
+    """A term, by its canonical spelling, with the coefficient that a law or an effect gives it."""
+
+    term: str
+    coefficient: float
+    inner: Mapping[str, float] = MappingProxyType({})
 
 
 def parse_term(name: str) -> CandidateTerm:

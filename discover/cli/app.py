@@ -12,6 +12,7 @@ from discover.cli.distil_command import distil
 from discover.cli.export_command import export
 from discover.cli.fetch_command import fetch_data
 from discover.cli.interruption import obeying_interrupts
+from discover.cli.names_commands import effects, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
@@ -47,6 +48,8 @@ app.command("close-loop")(close_loop)
 app.command("batch")(batch)
 app.command("distil")(distil)
 app.command("export")(export)
+app.command("laws")(laws)
+app.command("effects")(effects)
 data_app.command("fetch")(fetch_data)
 app.add_typer(data_app, name="data")
 

@@ -1,7 +1,7 @@
 """Named laws, as study files and the command line spell them.
 
-A file in this folder that says ``NAMED = {...}`` is a law that can be asked for; nothing else has
-to be edited. A program that uses this package registers laws of its own instead.
+A file in this folder that says ``NAMED = {...}`` is a law that is built in. A user's own are
+registered, by a program or by an installed package: see docs/adding-a-law.md.
 """
 
 import importlib
@@ -19,6 +19,7 @@ import jax.numpy as jnp
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
+from tensor_library.registry import Registry
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,8 +38,8 @@ def _named_laws() -> dict[str, NamedLaw]:
     return laws
 
 
-LAWS: dict[str, NamedLaw] = _named_laws()
-"""Named laws by the name in study files."""
+LAWS: Registry[NamedLaw] = Registry("law", "discover.laws", _named_laws)
+"""Named laws by the name in study files; a package's own by entry points of this group."""
 
 RESERVED = ("learned",)
 """What a study file may write in place of the name of a law."""
@@ -96,7 +97,9 @@ def register_law(
     title: str = "",
     source: str = "",
 ) -> NamedLaw:
-    """Make a law of one's own known by name, to studies and loops in this process.
+    """Make a law of one's own known by name, to studies, loops and exports in this process.
+
+    An installed package does so in every process: see docs/adding-a-law.md.
 
     Parameters
     ----------
