@@ -35,14 +35,25 @@ class Registry(MutableMapping[str, T]):
         self.kind, self.group = kind, group
         self._built_in = built_in
         self._known: dict[str, T] = {}
-        self._begun = self._complete = False
+        self._own: frozenset[str] | None = None
+        self._looked = self._complete = False
         self._lock = threading.RLock()
+
+    @property
+    def present(self) -> dict[str, T]:
+        """What is built in and what was registered, without looking at installed packages."""
+        with self._lock:
+            if self._own is None:
+                self._own = frozenset()  # should the making of them look here
+                self._known.update(self._built_in())
+                self._own = frozenset(self._known)
+            return self._known
 
     def __getitem__(self, name: str) -> T:
         return self._all()[name]
 
     def __setitem__(self, name: str, value: T) -> None:
-        self._all()[name] = value
+        self.present[name] = value
 
     def __delitem__(self, name: str) -> None:
         del self._all()[name]
@@ -57,24 +68,22 @@ class Registry(MutableMapping[str, T]):
         if self._complete:
             return self._known
         with self._lock:
-            # modules that are imported here look here too, to register what they bring
-            if not self._begun:
-                self._begun = True
-                self._known.update(self._built_in())
-                own = frozenset(self._known)
+            known = self.present
+            if not self._looked:
+                self._looked = True  # modules that are imported here may look here too
                 for entry in entry_points(group=self.group):
-                    self._bring(entry, own)
+                    self._bring(entry)
                 self._complete = True
-            return self._known
+            return known
 
-    def _bring(self, entry: EntryPoint, own: frozenset[str]) -> None:
+    def _bring(self, entry: EntryPoint) -> None:
         """Import the module that an entry point names; it registers what it brings."""
-        if entry.name in own:
+        if entry.name in (self._own or ()):
             self._leave_out(entry, "the name is taken by one that is built in")
             return
         try:
             entry.load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             self._leave_out(entry, kind + (str(error).splitlines() or [""])[0])
             return

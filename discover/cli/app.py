@@ -2,6 +2,7 @@
 
 import io
 import sys
+import warnings
 from typing import Annotated
 
 import typer
@@ -54,11 +55,18 @@ data_app.command("fetch")(fetch_data)
 app.add_typer(data_app, name="data")
 
 
+def _one_line(message: Warning | str, *rest: object, **options: object) -> str:
+    """Return a warning as a user reads it, without the line of code that gave it."""
+    del rest, options
+    return f"discover: warning: {' '.join(str(message).split())}\n"
+
+
 def main() -> None:
     """Run the command line."""
     for stream in (sys.stdout, sys.stderr):
         # σ12 on a terminal that knows no Greek, or half a character in a file's name
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    warnings.formatwarning = _one_line
     with obeying_interrupts():
         app()

@@ -81,7 +81,7 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
             "An effect must be a ConstitutiveEffect, a KinematicEffect or a SignalEffect; got "
             f"{effect!r}. See docs/adding-an-effect.md."
         )
-    require_new_name(effect.name, list(named_effects()), "effect")
+    require_new_name(effect.name, list(EFFECTS.present), "effect")
     if not effect.parameters:
         raise InputError(f"The effect {effect.name!r} needs a parameter: its amplitude, first.")
     EFFECTS[effect.name] = effect

@@ -117,7 +117,7 @@ def register_law(
     InputError
         If the name is taken or is none, a range is none, or `build` makes no law.
     """
-    require_new_name(name, [*LAWS, *RESERVED], "law")
+    require_new_name(name, [*LAWS.present, *RESERVED], "law")
     ranges = {}
     for key, ends in (parameters or {}).items():
         try:
