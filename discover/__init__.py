@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.dataset import ShearRun as ShearRun
     from discover.dataset import check_folder as check_folder
     from discover.dataset import load_dataset as load_dataset
+    from discover.dataset.importing import register_importer as register_importer
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
     from discover.errors import InputError as InputError
@@ -60,6 +61,7 @@ __all__ = [
     "measured_rate",
     "oscillatory_shear",
     "register_effect",
+    "register_importer",
     "register_law",
     "start_up",
     "step_rates",
@@ -76,6 +78,7 @@ _PLACES = {
         "check_folder",
         "load_dataset",
     ),
+    "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),
     "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),

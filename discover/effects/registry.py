@@ -13,7 +13,7 @@ from discover.effects import constitutive, kinematic, signal
 from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
 from discover.effects.library_term import library_term
 from discover.errors import InputError
-from discover.laws.registry import require_new_name
+from discover.new_names import require_new_name
 from tensor_library.registry import Registry
 from tensor_library.terms import parse_term
 

@@ -19,6 +19,7 @@ import jax.numpy as jnp
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
+from discover.new_names import require_new_name
 from tensor_library.registry import Registry
 
 if TYPE_CHECKING:
@@ -133,26 +134,6 @@ def register_law(
     entry = NamedLaw(title or name.replace("_", " "), build, ranges, source=source)
     LAWS[name] = entry
     return entry
-
-
-def require_new_name(name: str, known: list[str], what: str) -> None:
-    """Check a name that is to be registered.
-
-    Raises
-    ------
-    InputError
-        If it is taken, or could not be written in a study file.
-    """
-    if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
-        raise InputError(
-            f"The name of a {what} must be lower-case letters, digits and underscores; got {name!r}"
-            f". Write it like {known[0]!r}."
-        )
-    if name in known:
-        raise InputError(
-            f"The {what} {name!r} is known already, and what was computed with it is kept under "
-            "that name. Choose another name, or start Python anew."
-        )
 
 
 def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) -> None:

@@ -7,12 +7,10 @@ import importlib.util
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 import typer.main
 
 from discover.cli import app
-from discover.dataset import load_dataset
 from discover.study import read_study
 
 ROOT = Path(__file__).parents[2]
@@ -21,22 +19,6 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 def blocks(page, language):
     return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.S | re.M)
-
-
-def test_the_page_on_loaders_makes_a_folder_that_loads(tmp_path):
-    script = tmp_path / "load_binary.py"
-    script.write_text(blocks("docs/adding-a-loader.md", "python")[0])
-    time = np.linspace(0.0, 2.0, 30)
-    torque = 1e-4 * (1.0 - np.exp(-time))
-    np.savez(tmp_path / "run1.npz", milliseconds=1e3 * time, rate=np.full(30, 2.0), torque=torque)
-    spec = importlib.util.spec_from_file_location("load_binary", script)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    findings = module.load([tmp_path / "run1.npz"], tmp_path / "melt")
-    assert not [finding for finding in findings if finding.severity == "error"]
-    run = load_dataset(str(tmp_path / "melt")).runs[0]
-    np.testing.assert_allclose(run.time, time)
-    np.testing.assert_allclose(run.shear_stress[-1], 3 * torque[-1] / (2 * np.pi * 0.0125**3))
 
 
 def test_the_page_on_effects_names_neighbours_that_exist():
