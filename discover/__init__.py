@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.laws import make_law as make_law
     from discover.laws.registry import laws_table as laws
     from discover.laws.registry import register_law as register_law
+    from discover.learners import register_learner as register_learner
     from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
@@ -63,6 +64,7 @@ __all__ = [
     "register_effect",
     "register_importer",
     "register_law",
+    "register_learner",
     "start_up",
     "step_rates",
     "synthetic_dataset",
@@ -83,6 +85,7 @@ _PLACES = {
     "discover.errors": ("InputError",),
     "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),
     "discover.laws.registry": ("register_law",),
+    "discover.learners": ("register_learner",),
     "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),

@@ -28,7 +28,7 @@ class LearnerResult(HasEquation, TermTables):
     train_seconds
         Wall-clock time of `fit`.
     loss_history
-        Iterations and losses, both of shape (m,).
+        Iterations and losses, both of shape (m,); empty where there is nothing to show.
     details
         What else this learner can say; JSON-able.
     message
@@ -40,8 +40,10 @@ class LearnerResult(HasEquation, TermTables):
     learner: str
     law: AbstractConstitutiveLaw
     terms: tuple[RecoveredTerm, ...]
-    train_seconds: float
-    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    train_seconds: float = 0.0
+    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]] = field(
+        default_factory=lambda: (np.zeros(0), np.zeros(0))
+    )
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()

@@ -1,7 +1,7 @@
 """A package that cannot be used is left out with one warning that names it."""
 
 import pytest
-from user_packages import install
+from user_packages import install, project
 
 LOUD = 'import sys\nprint("imported", file=sys.stderr)\n'
 LAW = """
@@ -9,11 +9,6 @@ import discover as dc
 from discover.laws import Giesekus
 dc.register_law({name!r}, Giesekus, {{"alpha": (0.0, 1.0)}})
 """
-
-
-def project(name="mine", group="discover.laws", **entries):
-    lines = [f'[project]\nname = "{name}"\nversion = "2.5"', f'[project.entry-points."{group}"]']
-    return "\n".join([*lines, *(f'{key} = "{value}"' for key, value in entries.items())])
 
 
 @pytest.mark.parametrize(
@@ -32,7 +27,7 @@ def project(name="mine", group="discover.laws", **entries):
     ],
 )
 def test_a_broken_package_is_one_warning_and_all_else_works(workplace, code, entry, why):
-    install(workplace.packages, "mine", code, project(**entry))
+    install(workplace.packages, "mine", code, project("laws", **entry))
     done = workplace.run("laws")
     assert "giesekus " in done.stdout
     assert len(done.stdout.splitlines()) == 6
@@ -42,8 +37,8 @@ def test_a_broken_package_is_one_warning_and_all_else_works(workplace, code, ent
 
 
 def test_of_two_packages_with_the_same_name_the_second_is_left_out(workplace):
-    install(workplace.packages, "one", LAW.format(name="ours"), project("one", ours="one"))
-    install(workplace.packages, "two", LAW.format(name="ours"), project("two", ours="two"))
+    install(workplace.packages, "one", LAW.format(name="ours"), project("laws", "one", ours="one"))
+    install(workplace.packages, "two", LAW.format(name="ours"), project("laws", "two", ours="two"))
     done = workplace.run("laws")
     assert "ours " in done.stdout
     (said,) = done.stderr.splitlines()
@@ -53,21 +48,23 @@ def test_of_two_packages_with_the_same_name_the_second_is_left_out(workplace):
 def test_a_sound_package_gives_no_warning(workplace):
     # negative control of the tests above; two laws of one module are one import
     code = LOUD + LAW.format(name="one") + LAW.format(name="two")
-    install(workplace.packages, "mine", code, project(one="mine", two="mine"))
+    install(workplace.packages, "mine", code, project("laws", one="mine", two="mine"))
     done = workplace.run("laws")
     assert done.stderr == "imported\n"
     assert len(done.stdout.splitlines()) == 8
 
 
 def test_help_loads_no_package(workplace):
-    install(workplace.packages, "mine", LOUD + LAW.format(name="mine"), project(mine="mine"))
+    install(
+        workplace.packages, "mine", LOUD + LAW.format(name="mine"), project("laws", mine="mine")
+    )
     assert workplace.run("--help").stderr == ""
     assert workplace.run("effects").stderr == ""
     assert workplace.run("laws").stderr == "imported\n"
 
 
 def test_a_package_that_the_program_has_imported_itself_is_registered_once(workplace):
-    install(workplace.packages, "mine", LAW.format(name="mine"), project(mine="mine"))
+    install(workplace.packages, "mine", LAW.format(name="mine"), project("laws", mine="mine"))
     script = "import mine, discover as dc; print(dc.laws().loc['mine', 'parameter'])"
     done = workplace.run(script=script)
     assert done.stdout == "alpha\n"

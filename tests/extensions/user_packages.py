@@ -33,6 +33,27 @@ def install(folder, module, code, project):
     (record / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
+LEARNER_CODE = """
+import discover as dc
+from discover.learners import LearnerResult, RecoveredTerm
+
+
+def learn(task):
+    law = dc.make_law("giesekus", {"alpha": 0.2})
+    return LearnerResult("", law, (RecoveredTerm("sigma.sigma", 0.2),))
+
+
+dc.register_learner("mine", learn)
+"""
+
+
+def project(kind, name="mine", **entries):
+    """Return the project file of a distribution of version 2.5 with entry points of one kind."""
+    lines = [f'[project]\nname = "{name}"\nversion = "2.5"']
+    lines += [f'[project.entry-points."discover.{kind}"]']
+    return "\n".join([*lines, *(f'{key} = "{value}"' for key, value in entries.items())])
+
+
 class Workplace:
     """A user's folder, where packages are installed and commands run as processes of their own."""
 
