@@ -11,7 +11,7 @@ and with it double precision and the cache of compiled programs are set up.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from discover._version import __version__ as __version__
 
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.closed_loop.in_memory import close_loop as close_loop
@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.dataset import ShearRun as ShearRun
     from discover.dataset import check_folder as check_folder
     from discover.dataset import load_dataset as load_dataset
+    from discover.dataset.importing import register_importer as register_importer
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
     from discover.errors import InputError as InputError
@@ -29,6 +30,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.laws import make_law as make_law
     from discover.laws.registry import laws_table as laws
     from discover.laws.registry import register_law as register_law
+    from discover.learners import register_learner as register_learner
     from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
@@ -60,7 +62,9 @@ __all__ = [
     "measured_rate",
     "oscillatory_shear",
     "register_effect",
+    "register_importer",
     "register_law",
+    "register_learner",
     "start_up",
     "step_rates",
     "synthetic_dataset",
@@ -76,10 +80,12 @@ _PLACES = {
         "check_folder",
         "load_dataset",
     ),
+    "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),
     "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),
     "discover.laws.registry": ("register_law",),
+    "discover.learners": ("register_learner",),
     "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),

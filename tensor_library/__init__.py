@@ -20,7 +20,7 @@ from tensor_library.kinematics import (
     upper_convected_production,
 )
 from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import CandidateTerm, parse_term
+from tensor_library.terms import CandidateTerm, TermShare, parse_term
 
 __all__ = [
     "INVARIANT_NAMES",
@@ -28,6 +28,7 @@ __all__ = [
     "TENSOR_NAMES",
     "CandidateTerm",
     "TermLibrary",
+    "TermShare",
     "anticommutator",
     "build_library",
     "from_shear",

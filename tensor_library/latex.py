@@ -2,7 +2,7 @@ r"""Terms as LaTeX: bold tensors, centred dots for contractions, ``\operatorname
 
 from collections.abc import Sequence
 
-from tensor_library.spelling import Notation
+from tensor_library.notation import Notation
 
 _TENSORS = {
     "I": r"\boldsymbol{I}",

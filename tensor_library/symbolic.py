@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import sympy
 
-from tensor_library.spelling import Notation
+from tensor_library.notation import Notation
 
 STRESS = sympy.Symbol("sigma", commutative=False)
 RATE = sympy.Symbol("gammadot", commutative=False)

@@ -3,7 +3,8 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -13,7 +14,7 @@ from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
 from tensor_library.integrity_basis import TENSOR_NAMES, TENSOR_ORDERS, integrity_basis
 from tensor_library.invariants import INVARIANT_NAMES, INVARIANT_ORDERS, scalar_invariants
 from tensor_library.latex import LatexNotation
-from tensor_library.spelling import spell
+from tensor_library.notation import Notation, T
 
 if TYPE_CHECKING:
     import sympy
@@ -112,15 +113,58 @@ class CandidateTerm:
             value = self.form.function(invariants[0], parameter) * value
         return value
 
+    def spell(
+        self,
+        notation: Notation[T],
+        coefficient: float | None = None,
+        inner: Mapping[str, float] | None = None,
+    ) -> T:
+        """Return the term in a notation, as a factor: a sum of tensors is bracketed.
+
+        Parameters
+        ----------
+        notation
+            How to write it.
+        coefficient
+            Number in front; none if None.
+        inner
+            Inner parameters by name; one that is missing stays a letter.
+        """
+        factors = [] if coefficient is None else [notation.number(coefficient)]
+        if self.form is not None:
+            name = self.form.inner_name
+            known = name in (inner or {})
+            parameter = notation.number((inner or {})[name]) if known else notation.letter(name)
+            forms = {"exp": notation.exponential, "saturating": notation.saturating}
+            if self.closed_form not in forms:
+                raise ValueError(f"The closed form {self.closed_form!r} cannot be written out.")
+            trace = notation.trace(notation.tensor("sigma"))
+            factors.append(forms[self.closed_form](parameter, trace))
+        for name, power in zip(INVARIANT_NAMES, self.powers, strict=True):
+            if power:
+                trace = notation.trace(_contraction(name[len("tr(") : -1], notation))
+                factors.append(trace if power == 1 else notation.power(trace, power))
+        summands = [_contraction(name, notation) for name in TENSOR_NAMES[self.tensor].split("+")]
+        factors.append(summands[0] if len(summands) == 1 else notation.sum(summands))
+        return notation.product(factors)
+
     def sympy(self) -> "sympy.Expr":
         """Return the term as a SymPy expression with non-commuting tensors."""
         from tensor_library.symbolic import SympyNotation
 
-        return spell(self, SympyNotation())
+        return self.spell(SympyNotation())
 
     def latex(self) -> str:
         """Return the term as LaTeX, ready for a coefficient in front: a sum has its brackets."""
-        return spell(self, LatexNotation())
+        return self.spell(LatexNotation())
+
+
+class TermShare(NamedTuple):
+    """A term, by its canonical spelling, with the coefficient that a law or an effect gives it."""
+
+    term: str
+    coefficient: float
+    inner: Mapping[str, float] = MappingProxyType({})
 
 
 def parse_term(name: str) -> CandidateTerm:
@@ -163,3 +207,7 @@ def parse_term(name: str) -> CandidateTerm:
             "'tr(sigma)*sigma'."
         )
     return CandidateTerm(TENSOR_NAMES.index(tensor), tuple(powers), closed_form)
+
+
+def _contraction(name: str, notation: Notation[T]) -> T:
+    return notation.contraction([notation.tensor(one) for one in name.split(".")])

@@ -19,7 +19,7 @@ from discover.identify import (
 from discover.identify.experiment_outcome import Weight
 from discover.identify.physics import PhysicsCheck, PhysicsReport
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure
-from discover.learners.result import RecoveredTerm
+from discover.learners import RecoveredTerm
 from discover.notebook_view import NotebookView, as_html, table_of
 
 LAW = LawTerms({"sigma.sigma": 0.2, "gammadot": -0.01})

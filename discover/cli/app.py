@@ -2,16 +2,18 @@
 
 import io
 import sys
+import warnings
 from typing import Annotated
 
 import typer
 
-from discover import __version__
+from discover._version import __version__
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export
 from discover.cli.fetch_command import fetch_data
 from discover.cli.interruption import obeying_interrupts
+from discover.cli.names_commands import effects, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
@@ -47,8 +49,16 @@ app.command("close-loop")(close_loop)
 app.command("batch")(batch)
 app.command("distil")(distil)
 app.command("export")(export)
+app.command("laws")(laws)
+app.command("effects")(effects)
 data_app.command("fetch")(fetch_data)
 app.add_typer(data_app, name="data")
+
+
+def _one_line(message: Warning | str, *rest: object, **options: object) -> str:
+    """Return a warning as a user reads it, without the line of code that gave it."""
+    del rest, options
+    return f"discover: warning: {' '.join(str(message).split())}\n"
 
 
 def main() -> None:
@@ -57,5 +67,6 @@ def main() -> None:
         # σ12 on a terminal that knows no Greek, or half a character in a file's name
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    warnings.formatwarning = _one_line
     with obeying_interrupts():
         app()

@@ -142,6 +142,10 @@ def import_data(
         float | None,
         typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
     ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help="Importer of your own; by default by suffix, else text."),
+    ] = None,
     delimiter: Annotated[
         str | None, typer.Option("--delimiter", help="tab, semicolon or comma.")
     ] = None,
@@ -153,7 +157,7 @@ def import_data(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Make a data folder from text exports of a rheometer (CSV, TRIOS, RheoCompass)."""
+    """Make a data folder from exports of a rheometer: CSV, TRIOS, RheoCompass, or your own."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
     from discover.dataset.check import check_folder
     from discover.dataset.importing import import_files
@@ -168,6 +172,7 @@ def import_data(
         blocks=block,
         start_time_s=start_time,
         layout={
+            "format": form,
             "delimiter": delimiter,
             "decimal": decimal,
             "header_row": header_row,

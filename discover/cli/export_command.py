@@ -22,7 +22,7 @@ def export(
     ] = "python",
     law: Annotated[
         str | None,
-        typer.Option("--law", help="tensor_sindy or tbnn_ude; by default the sparse one."),
+        typer.Option("--law", help="Name of the learner; by default the sparse one."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; else standard output.")

@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect
-from discover.equations import EquationTerm, combined, effect_terms, law_terms
+from discover.equations import effect_terms, law_terms
 from discover.laws import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
+from tensor_library.terms import TermShare
 
 
 class AugmentedLaw(AbstractConstitutiveLaw):
@@ -38,10 +39,15 @@ class AugmentedLaw(AbstractConstitutiveLaw):
             extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
         return extra
 
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return the terms of the declared law, then those of the effects.
 
-@law_terms.register
-def _(law: AugmentedLaw) -> tuple[EquationTerm, ...]:
-    terms = law_terms(law.base)
-    for effect, values in zip(law.effects, law.values, strict=True):
-        terms += effect_terms(effect, np.asarray(values))
-    return combined(terms)
+        Raises
+        ------
+        InputError
+            If one of them is no sum of library terms.
+        """
+        found = law_terms(self.base)
+        for effect, values in zip(self.effects, self.values, strict=True):
+            found += effect_terms(effect, np.asarray(values))
+        return tuple(TermShare(t.term, t.coefficient, t.inner) for t in found)

@@ -88,7 +88,9 @@ class _Program:
         self._series = [e for e in kinematic if isinstance(e, SeriesElement)]
         self._signal = [e for e in effects if isinstance(e, SignalEffect)]
         over_runs = jax.vmap(self._predict_run, in_axes=(None, None, None, 0))
-        self.predict = compiled(over_runs, made_from=structure)
+        # a name does not tell one law from another that was registered under it in its place
+        build = LAWS[structure.law_name].build if structure.free_parameters else None
+        self.predict = compiled(over_runs, made_from=(structure, build))
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 

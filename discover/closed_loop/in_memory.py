@@ -8,7 +8,7 @@ from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import LoopResult
-from discover.dataset.run import ShearDataset
+from discover.dataset import ShearDataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS

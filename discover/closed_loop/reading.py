@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import permutation_test, rankdata
 
-from discover.closed_loop.result import RunRecord
+from discover.closed_loop.run_record import RunRecord
 from discover.closed_loop.waves import Wave, oscillation, read_wave
 
 _BINS = 24

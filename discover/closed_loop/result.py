@@ -6,22 +6,21 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.equations import Equation, HasEquation, equation_to_json
+from discover.closed_loop.reading import Reading, read_residual
+from discover.closed_loop.run_record import RunRecord
+from discover.equations import Equation, HasEquation, Tested, equation_to_json, law_terms
+from discover.equations.box import box_of, flow_numbers
+from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
 from discover.laws import Fluid
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
-from discover.protocols.kinematics import FlowKind
-
-if TYPE_CHECKING:
-    from discover.closed_loop.reading import Reading
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 
@@ -72,60 +71,6 @@ class Stage:
     equation: str
     source: str
     check: str
-
-
-@dataclass(frozen=True)
-class RunRecord:
-    """One run in the window of the loop, measured and predicted.
-
-    Attributes
-    ----------
-    name, held_out
-        The run, and whether it was held out.
-    time, strain, instrument_time
-        In s, dimensionless, and in s on the instrument's clock, shape (n,).
-    shear_rate
-        Commanded, in 1/s, shape (n,); in extension the Hencky rate.
-    measured
-        Recorded stress in Pa, shape (n,): σ12 in shear, σ11 − σ22 in extension.
-    predicted
-        Recorded stress in Pa by the declared model and after each stage, shape (stages + 1, n).
-    errors
-        Relative error of each of these, shape (stages + 1,).
-    conditions
-        Numbers that the source gives of the run, such as its temperature, and its place in the
-        order of the runs.
-    flow
-        Which flow it is.
-    """
-
-    name: str
-    held_out: bool
-    time: Float[np.ndarray, " n"]
-    strain: Float[np.ndarray, " n"]
-    instrument_time: Float[np.ndarray, " n"]
-    shear_rate: Float[np.ndarray, " n"]
-    measured: Float[np.ndarray, " n"]
-    predicted: Float[np.ndarray, "stages n"]
-    errors: Float[np.ndarray, " stages"]
-    conditions: dict[str, float] = field(default_factory=dict)
-    flow: FlowKind = "shear"
-
-    def line(self) -> dict[str, Any]:
-        """Return the run as one line of a table: its errors, the declared model's first."""
-        stages = ["declared", *(f"stage_{i}" for i in range(1, len(self.errors)))]
-        errors = dict(zip(stages, map(float, self.errors), strict=True))
-        return {"run": self.name, "held_out": self.held_out, **errors}
-
-    @property
-    def residual(self) -> Float[np.ndarray, "stages n"]:
-        """Prediction minus measurement in Pa, for each model."""
-        return self.predicted - self.measured
-
-    @property
-    def relative_residual(self) -> Float[np.ndarray, "stages n"]:
-        """The residual over the root-mean-square stress."""
-        return self.residual / (float(np.sqrt(np.mean(self.measured**2))) or 1.0)
 
 
 @dataclass(frozen=True)
@@ -208,16 +153,49 @@ class LoopResult(PageView, HasEquation, NotebookView):
         return f"<LoopResult: {self.verdict}; {added}; error {100 * fit:.2g} %{judged}>"
 
     def equation(self) -> Equation:
-        """Return the augmented fluid as an equation; see `discover.closed_loop.equation`."""
-        from discover.closed_loop.equation import loop_equation
+        """Return the augmented fluid as an equation, with the box in which it was tested.
 
-        return loop_equation(self)
+        Raises
+        ------
+        InputError
+            If an effect gives the fluid a state, or adds what is no sum of library terms.
+        """
+        fluid = self.fluid
+        if fluid is None:
+            states = [s.effect for s in self.stages if s.kind == "constitutive"]
+            raise InputError(
+                f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
+                "state that no law of stress and rate carries, so it cannot be written out as one "
+                "equation."
+            )
+        modulus = tuple(float(g) for g in fluid.modulus)
+        relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
+        time = mean_relaxation_time(modulus, relaxation_time)
+        learned_in = box_of(_numbers(r, time) for r in self.records if not r.held_out)
+        judged_in = box_of(_numbers(r, time) for r in self.records if r.held_out)
+        notes = [f"Verdict of the loop: {self.verdict}."]
+        outside = [s.effect for s in self.stages if s.kind != "constitutive"]
+        if outside:
+            notes.append(
+                f"The record also holds {', '.join(outside)}, which is no part of the fluid and is "
+                "not in this equation."
+            )
+        held_out = self.error_after.held_out
+        errors = {} if held_out is None else {"sigma12 (mean over runs)": held_out}
+        return Equation(
+            law_terms(fluid.law),
+            modulus,
+            relaxation_time,
+            fluid.law.linear_relaxation,
+            float(fluid.solvent_viscosity),
+            title="Declared law with the constitutive effects that a closed loop added.",
+            notes=tuple(notes),
+            tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
+        )
 
     @cached_property
-    def readings(self) -> "tuple[Reading, Reading]":
+    def readings(self) -> tuple[Reading, Reading]:
         """On what the residuals of the declared and of the augmented model depend."""
-        from discover.closed_loop.reading import read_residual
-
         return read_residual(self.records, 0), read_residual(self.records, -1)
 
     def table(self) -> pd.DataFrame:
@@ -320,6 +298,10 @@ class LoopResult(PageView, HasEquation, NotebookView):
         """Write ``loop.json``."""
         text = json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
         Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def _numbers(record: RunRecord, time: float) -> tuple[float, float]:
+    return flow_numbers(record.time, record.shear_rate, time)
 
 
 def _plain(value: Any) -> Any:

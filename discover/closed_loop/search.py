@@ -33,6 +33,7 @@ from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.physical_range import at_an_end, undetermined
 from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.closed_loop.search_checkpoint import SearchCheckpoint
+from discover.closed_loop.search_state import SearchState
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import ShearRun
 from discover.effects import AbstractEffect, ModeDependence
@@ -51,8 +52,8 @@ LEADERS = 8
 _COMPARED = 16
 
 
-class Search:
-    """The state of a search.
+class Search(SearchState):
+    """A forward search, with its state.
 
     Parameters
     ----------
@@ -70,34 +71,6 @@ class Search:
         What a complete model may leave of the data.
     checkpoint
         Keeps the search after each stage; by default nothing is kept.
-
-    Attributes
-    ----------
-    fit
-        The current fit.
-    active
-        Effects in it, in the order in which they came.
-    path
-        Parameter vectors of the declared model and after each effect.
-    rankings
-        Candidates at each stage, the strongest evidence first.
-    aliases, support
-        Aliases and evidence of each effect when it was added.
-    left_out
-        Mean error of runs left out.
-    settled
-        Effects established at small strain.
-    known
-        Mean and standard deviation of parameters determined there, by position.
-    rounds
-        How often the whole was examined again.
-    not_named
-        Effects that fitted best only with a value that they cannot have, or that the data leave
-        open; and why, in a sentence without its stop.
-    refused
-        Those of them that were in the model and are no candidates any more.
-    unasked
-        Effects whose aliases were found beside others than those that are in the model now.
     """
 
     def __init__(
@@ -111,22 +84,10 @@ class Search:
         checkpoint: SearchCheckpoint | None = None,
     ):
         self.checkpoint = checkpoint or SearchCheckpoint(None, "")
-        self.rounds = 0
-        self.model, self.batch, self.held_batch = model, batch, held_batch
+        super().__init__(model)
+        self.batch, self.held_batch = batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
         self.tolerated = tolerated
-        self.active: list[str] = []
-        self.settled: tuple[str, ...] = ()
-        self.rankings: list[tuple[CandidateScore, ...]] = []
-        self.aliases: dict[str, tuple[str, ...]] = {}
-        self.support: dict[str, float] = {}
-        self.fit: Fit
-        self.path: list[np.ndarray] = []
-        self.left_out = float("inf")
-        self.known: dict[int, tuple[float, float]] = {}
-        self.not_named: dict[str, str] = {}
-        self.refused: set[str] = set()
-        self.unasked: set[str] = set()
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""

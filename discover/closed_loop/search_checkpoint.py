@@ -5,15 +5,13 @@ Nothing in a search is random, so one that goes on from a stage ends where an un
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
 from discover.closed_loop.least_squares import Fit
-
-if TYPE_CHECKING:
-    from discover.closed_loop.search import Search
+from discover.closed_loop.search_state import SearchState
 
 
 @runtime_checkable
@@ -43,12 +41,12 @@ class SearchCheckpoint:
     def __init__(self, store: Store | None, name: str):
         self.store, self.name = store, name
 
-    def save(self, search: "Search") -> None:
+    def save(self, search: SearchState) -> None:
         """Keep the state of a search between two stages."""
         if self.store is not None:
             self.store.save(self.name, _state(search))
 
-    def restore(self, search: "Search") -> bool:
+    def restore(self, search: SearchState) -> bool:
         """Bring a search to the state that was kept, and return whether there was one."""
         state = self.store.load(self.name) if self.store is not None else None
         if state is None or state.get("model") != _model_of(search):
@@ -57,12 +55,12 @@ class SearchCheckpoint:
         return True
 
 
-def _model_of(search: "Search") -> list[str]:
+def _model_of(search: SearchState) -> list[str]:
     """Return what the positions in a parameter vector mean."""
     return [effect.name for effect in search.model.effects]
 
 
-def _state(search: "Search") -> dict[str, Any]:
+def _state(search: SearchState) -> dict[str, Any]:
     fit = search.fit
     return {
         "model": _model_of(search),
@@ -90,7 +88,7 @@ def _state(search: "Search") -> dict[str, Any]:
     }
 
 
-def _set(search: "Search", state: dict[str, Any]) -> None:
+def _set(search: SearchState, state: dict[str, Any]) -> None:
     fit = state["fit"]
     search.fit = Fit(
         np.array(fit["theta"]),

@@ -8,9 +8,8 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, EquationTerm, Tested, combined, law_terms
 from discover.equations.box import box_of, flow_numbers
 from discover.errors import InputError
+from discover.learners.registry import learner_title
 from discover.study.build import DeclaredModel
-
-TITLES = {"tensor_sindy": "sparse regression", "tbnn_ude": "the neural network"}
 
 _PROJECTION = (
     "This is the network put into words (its projection on the library). The network itself has no "
@@ -49,6 +48,8 @@ def outcome_equation(
     study
         Name of the study.
     """
+    who = learner_title(outcome.learner)
+    who = f"the {who}" if outcome.learner == "tbnn_ude" else who
     found = tuple(EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in outcome.terms)
     time = known.mean_relaxation_time
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
@@ -61,7 +62,7 @@ def outcome_equation(
         known,
         # without a known part in the way, the terms keep their intervals
         terms=combined(known.terms + found) if known.terms else found,
-        title=f"Law found by {TITLES.get(outcome.learner, outcome.learner)} in the study {study}.",
+        title=f"Law found by {who} in the study {study}.",
         notes=(_PROJECTION,) if outcome.learner == "tbnn_ude" else (),
         tested=tested,
     )

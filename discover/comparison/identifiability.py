@@ -26,7 +26,7 @@ from discover.identify.physics import mean_relaxation_time
 from discover.identify.relations import spell
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
-from discover.learners.result import RecoveredTerm
+from discover.learners import RecoveredTerm
 from discover.protocols.shear import stack_protocols
 from discover.simulate.grid import make_grids
 from discover.study.build import DeclaredModel

@@ -6,7 +6,7 @@ from typing import Any, overload
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare as compare_study
 from discover.comparison.training import Progress, searched, silent
-from discover.dataset.run import ShearDataset
+from discover.dataset import ShearDataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of

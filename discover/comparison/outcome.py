@@ -9,7 +9,7 @@ from jaxtyping import Float, Real
 
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]

@@ -28,7 +28,7 @@ from discover.comparison.training import (
 )
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.comparison.unseen_runs import hold_against_unseen
-from discover.dataset.run import ShearDataset
+from discover.dataset import ShearDataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law

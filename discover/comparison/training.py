@@ -8,6 +8,7 @@ from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
 from discover.study.build import DeclaredModel
 from discover.study.schema import Study
@@ -54,7 +55,7 @@ def train(
     Parameters
     ----------
     learner
-        ``"tensor_sindy"`` or ``"tbnn_ude"``.
+        ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name.
     study
         The study, for the learner's settings.
     model
@@ -111,7 +112,8 @@ def train(
         )
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
-    raise InputError(f"Unknown learner {learner!r}; write tensor_sindy or tbnn_ude.")
+    asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
+    return learn_with(learner, asked)
 
 
 def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:

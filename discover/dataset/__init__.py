@@ -2,9 +2,14 @@
 
 from discover.dataset.check import check_folder
 from discover.dataset.finding import Finding, Findings
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.linear_viscoelasticity import (
+    LinearSweep,
+    RelaxationSpectrum,
+    relaxation_spectrum,
+)
 from discover.dataset.load import load_dataset
-from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
+from discover.dataset.run import ShearRun
+from discover.dataset.shear_dataset import ShearDataset
 
 __all__ = [
     "Finding",

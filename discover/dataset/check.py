@@ -14,7 +14,11 @@ from discover.dataset.check_run import doubts_of_run
 from discover.dataset.check_start import doubts_of_start, doubts_of_unseen_start
 from discover.dataset.finding import Finding, Findings
 from discover.dataset.kind_of_test import reason_to_set_aside
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.linear_viscoelasticity import (
+    LinearSweep,
+    RelaxationSpectrum,
+    relaxation_spectrum,
+)
 from discover.dataset.load import (
     SWEEP_FILE,
     find_sweep,
@@ -23,7 +27,7 @@ from discover.dataset.load import (
     resolve_folder,
 )
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.run import LinearSweep, ShearRun, require_signal
+from discover.dataset.run import ShearRun, require_signal
 from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
 

@@ -7,9 +7,9 @@ from jaxtyping import Float
 
 from discover.dataset.check_run import stress_noise
 from discover.dataset.finding import Finding
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
-from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.run import ShearRun
 from discover.dataset.sweep_inertia import sweep_inertia
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there

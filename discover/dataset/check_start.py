@@ -6,8 +6,8 @@ import numpy as np
 
 from discover.dataset.check_run import stress_noise
 from discover.dataset.finding import Finding
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
-from discover.dataset.run import LinearSweep, ShearRun
+from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
+from discover.dataset.run import ShearRun
 from discover.dataset.run_table import oscillation
 from discover.protocols.kinematics import kinematics_of
 

@@ -1,12 +1,13 @@
-"""A spectrum of relaxation modes from a linear frequency sweep."""
+"""A linear frequency sweep, and a spectrum of relaxation modes from it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from discover.dataset.run import LinearSweep
 from discover.errors import InputError
 
 MOST_MODES = 30
@@ -15,6 +16,54 @@ FLOOR = 0.01
 """A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
 
 MARGINS = (0.0, 0.25, 0.5)
+
+
+@dataclass(frozen=True)
+class LinearSweep:
+    """Small-amplitude oscillatory shear: G′ and G″ against frequency.
+
+    Attributes
+    ----------
+    angular_frequency
+        In rad/s, shape (n,), increasing.
+    storage_modulus, loss_modulus
+        In Pa, shape (n,).
+    thinned
+        How it was thinned when it was read, in words; empty if it was not.
+    """
+
+    angular_frequency: Float[np.ndarray, " n"]
+    storage_modulus: Float[np.ndarray, " n"]
+    loss_modulus: Float[np.ndarray, " n"]
+    thinned: str = ""
+
+    def __len__(self) -> int:
+        return self.angular_frequency.shape[0]
+
+    def __repr__(self) -> str:
+        omega = self.angular_frequency
+        span = f", {omega[0]:.4g} to {omega[-1]:.4g} rad/s" if len(self) else ""
+        return f"<LinearSweep: {len(self)} frequencies{span}>"
+
+    def relaxation_spectrum(self, **options: Any) -> "RelaxationSpectrum":
+        """Return the modes of this sweep.
+
+        Parameters
+        ----------
+        **options
+            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+        """
+        return relaxation_spectrum(self, **options)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the sweep, one line for each frequency, in the columns of ``lve.csv``."""
+        return pd.DataFrame(
+            {
+                "omega_rad_s": self.angular_frequency,
+                "Gp_Pa": self.storage_modulus,
+                "Gpp_Pa": self.loss_modulus,
+            }
+        )
 
 
 @dataclass(frozen=True)

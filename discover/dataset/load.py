@@ -9,9 +9,10 @@ from jaxtyping import Float
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW
 from discover.dataset.kind_of_test import reason_to_set_aside
+from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.run import LinearSweep, ShearDataset
 from discover.dataset.sequence import in_sequence
+from discover.dataset.shear_dataset import ShearDataset
 from discover.dataset.table import Table, read_bytes, read_table, shown
 from discover.dataset.thinning import thin_sweep
 from discover.errors import InputError

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from discover.dataset.linear_viscoelasticity import MARGINS
-from discover.dataset.run import LinearSweep
+from discover.dataset.linear_viscoelasticity import MARGINS, LinearSweep
 
 # Modes enough for any sweep of so many points; more would only fit its noise
 _POINTS_PER_MODE = 1.5

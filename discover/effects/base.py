@@ -1,15 +1,15 @@
 """What an effect is: something that a model may lack, with an amplitude that switches it on."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from tensor_library.algebra import Symmetric
+from tensor_library.terms import TermShare
 
 Kind = Literal["constitutive", "kinematic", "signal"]
 
@@ -100,14 +100,6 @@ class AbstractEffect(ABC):
     visible: str = ""
     complexity: int = 1
     kind: ClassVar[Kind]
-
-
-class TermShare(NamedTuple):
-    """A library term with the coefficient that an effect gives it."""
-
-    term: str
-    coefficient: float
-    inner: Mapping[str, float] = MappingProxyType({})
 
 
 @dataclass(frozen=True)

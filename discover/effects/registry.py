@@ -1,48 +1,56 @@
-"""All effects by name. A new file in one of the three folders is a new effect; nothing else.
+"""All effects by name.
 
-A program that uses this package registers effects of its own instead.
+A file in one of the three folders is an effect that is built in. Effects of a user's own are
+registered, by a program or by an installed package (see docs/adding-an-effect.md).
 """
 
 import importlib
 import pkgutil
 from collections.abc import Mapping
-from functools import cache
 from typing import TYPE_CHECKING
 
 from discover.effects import constitutive, kinematic, signal
 from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
 from discover.effects.library_term import library_term
 from discover.errors import InputError
-from discover.laws.registry import require_new_name
+from discover.new_names import require_new_name
+from tensor_library.registry import Registry
 from tensor_library.terms import parse_term
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_registered: dict[str, AbstractEffect] = {}
 
-
-@cache
-def named_effects() -> Mapping[str, AbstractEffect]:
-    """Return the effects that have a name: constitutive, kinematic, signal, then registered."""
+def _built_in() -> dict[str, AbstractEffect]:
     effects = {}
     for package in (constitutive, kinematic, signal):
         for module in pkgutil.iter_modules(package.__path__):
             effect = importlib.import_module(f"{package.__name__}.{module.name}").EFFECT
             effects[effect.name] = effect
-    return effects | _registered
+    return effects
+
+
+EFFECTS: Registry[AbstractEffect] = Registry("effect", "discover.effects", _built_in)
+"""Effects that have a name; a package's own by entry points of this group."""
+
+
+def named_effects() -> Mapping[str, AbstractEffect]:
+    """Return the effects that have a name: constitutive, kinematic, signal, then registered."""
+    return EFFECTS
 
 
 def effects_table() -> "pd.DataFrame":
     """Return the effects that are known by name, one line for each parameter, the amplitude first.
 
-    An amplitude of zero is no effect.
+    An amplitude of zero is no effect. `low` and `high` are in `unit` where `range_scale` is
+    ``one``, and else multiples of that property of the data.
     """
     import pandas as pd
 
     lines = [
         {"effect": effect.name, "kind": effect.kind, "parameter": p.name, "unit": p.unit or "1",
-         "low": p.low, "high": p.high, "visible": effect.visible, "source": effect.source}
+         "low": p.low, "high": p.high, "range_scale": p.range_scale,
+         "visible": effect.visible, "source": effect.source}
         for effect in named_effects().values()
         for p in effect.parameters
     ]  # fmt: skip
@@ -51,6 +59,8 @@ def effects_table() -> "pd.DataFrame":
 
 def register_effect(effect: AbstractEffect) -> AbstractEffect:
     """Make an effect of one's own known by name, to studies and loops in this process.
+
+    An installed package does so in every process: see docs/adding-an-effect.md.
 
     Parameters
     ----------
@@ -71,11 +81,10 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
             "An effect must be a ConstitutiveEffect, a KinematicEffect or a SignalEffect; got "
             f"{effect!r}. See docs/adding-an-effect.md."
         )
-    require_new_name(effect.name, list(named_effects()), "effect")
+    require_new_name(effect.name, list(EFFECTS.present), "effect")
     if not effect.parameters:
         raise InputError(f"The effect {effect.name!r} needs a parameter: its amplitude, first.")
-    _registered[effect.name] = effect
-    named_effects.cache_clear()
+    EFFECTS[effect.name] = effect
     return effect
 
 

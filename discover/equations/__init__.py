@@ -1,10 +1,11 @@
 """Laws as they leave this package: SymPy, LaTeX, JSON, Python, rheoTool; and back."""
 
-from discover.equations.equation import Box, Equation, EquationTerm, Tested
+from discover.equations.equation import Box, Equation, Tested
 from discover.equations.from_law import combined, effect_terms, law_terms
 from discover.equations.has_equation import HasEquation
 from discover.equations.json_format import equation_from_json, equation_to_json
 from discover.equations.rheotool_reader import read_rheotool
+from discover.equations.term import EquationTerm
 from discover.equations.write import FORMATS, write_equation
 
 __all__ = [

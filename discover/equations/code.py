@@ -7,9 +7,10 @@ serves both.
 
 from collections.abc import Sequence
 
-from discover.equations.equation import Equation, EquationTerm
-from discover.equations.latex import header_lines
-from tensor_library.spelling import Notation, spell
+from discover.equations.equation import Equation
+from discover.equations.latex_file import header_lines
+from discover.equations.term import EquationTerm
+from tensor_library.notation import Notation
 from tensor_library.terms import parse_term
 
 
@@ -194,7 +195,7 @@ def sympy_code(equation: Equation) -> str:
 def _sum(terms: Sequence[EquationTerm], notation: _CodeNotation, nothing: str) -> str:
     if not terms:
         return nothing
-    lines = [spell(parse_term(t.term), notation, t.coefficient, t.inner) for t in terms]
+    lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in terms]
     return "(\n        " + "\n        + ".join(lines) + "\n    )"
 
 

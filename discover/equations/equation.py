@@ -2,81 +2,21 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from discover.equations.latex import law_latex
+from discover.equations.mathml import law_element
+from discover.equations.term import EquationTerm, Interval
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion, law_of_terms
 from discover.laws.multimode import Fluid
 from discover.notebook_view import NotebookView
-from tensor_library.terms import parse_term
 
 if TYPE_CHECKING:
     import sympy
-
-Interval = tuple[float, float]
-
-
-@runtime_checkable
-class TermLike(Protocol):
-    """What a term of a law has, whether a learner found it or a file gave it."""
-
-    @property
-    def term(self) -> str:
-        """Canonical spelling."""
-        ...
-
-    @property
-    def coefficient(self) -> float:
-        """Its coefficient in h."""
-        ...
-
-    @property
-    def inner(self) -> Mapping[str, float]:
-        """Inner parameters by name."""
-        ...
-
-
-@dataclass(frozen=True)
-class EquationTerm:
-    """One term c·term of h.
-
-    Attributes
-    ----------
-    term
-        Canonical spelling, as `tensor_library.parse_term` reads it.
-    coefficient
-        c, dimensionless.
-    inner
-        Inner parameters by name; the form's default is put in where one is missing, so that every
-        format writes the same number.
-    ci95
-        95 % interval of c, or None where c was declared or the interval not computed.
-
-    Raises
-    ------
-    ValueError
-        If the spelling is not canonical, or the term has no such inner parameter.
-    """
-
-    term: str
-    coefficient: float
-    inner: Mapping[str, float] = field(default_factory=dict)
-    ci95: Interval | None = None
-
-    def __post_init__(self):
-        # what nobody could write out again is refused here
-        form = parse_term(self.term).form
-        values = {} if form is None else {form.inner_name: form.inner_default}
-        unknown = [name for name in self.inner if name not in values]
-        if unknown:
-            raise ValueError(
-                f"The term {self.term!r} has no inner parameter {unknown[0]!r}; it has "
-                f"{', '.join(values) or 'none'}."
-            )
-        object.__setattr__(self, "inner", values | dict(self.inner))
 
 
 @dataclass(frozen=True)
@@ -219,8 +159,6 @@ class Equation(NotebookView):
 
     def latex(self) -> str:
         """Return the dimensionless law as one LaTeX equation."""
-        from discover.equations.latex import law_latex
-
         return law_latex(self.terms, self.linear_relaxation)
 
     def modes_table(self) -> pd.DataFrame:
@@ -228,8 +166,6 @@ class Equation(NotebookView):
         return pd.DataFrame({"G_Pa": self.modulus, "lambda_s": self.relaxation_time})
 
     def _repr_html_(self) -> str:
-        from discover.equations.mathml import law_element
-
         # markup of this package, not a sentence to be escaped
         return law_element(self.terms, self.linear_relaxation) + super()._repr_html_()
 

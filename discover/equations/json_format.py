@@ -4,7 +4,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from discover.equations.equation import Box, Equation, EquationTerm, Tested
+from discover.equations.equation import Box, Equation, Tested
+from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.validation import Section, validated
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from discover.equations.equation import TermLike
-from tensor_library.spelling import Notation, spell
+from discover.equations.term import TermLike
+from tensor_library.notation import Notation
 from tensor_library.terms import parse_term
 
 _BOLD = '<mi mathvariant="normal" style="font-weight:bold">{}</mi>'
@@ -92,7 +92,7 @@ def term_mathml(
     coefficient
         Number in front.
     """
-    return spell(parse_term(name), MathmlNotation(), coefficient, inner)
+    return parse_term(name).spell(MathmlNotation(), coefficient, inner)
 
 
 def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:

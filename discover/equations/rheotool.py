@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.from_law import EXPONENTIAL, finitely_extensible_terms
-from discover.equations.latex import header_lines
+from discover.equations.from_law import EXPONENTIAL
+from discover.equations.latex_file import header_lines
 from discover.errors import InputError
+from discover.laws.fene_p import fene_p_terms
 from tensor_library.terms import parse_term
 
 TOLERANCE = 0.01
@@ -207,7 +208,7 @@ def _finitely_extensible(found: dict[str, float], tolerance: float) -> tuple[flo
     if growth <= 0.0:
         return None
     inverse = growth / (1.0 + 3.0 * growth)  # k = q/(1 − 3q)
-    wanted = {t.term: t.coefficient for t in finitely_extensible_terms(inverse)}
+    wanted = {share.term: share.coefficient for share in fene_p_terms(inverse)}
     if set(found) != set(wanted):
         return None
     deviation = max(abs(found[name] / value - 1.0) for name, value in wanted.items())

@@ -4,10 +4,12 @@ import math
 import re
 from typing import Any
 
-from discover.equations.equation import Equation, EquationTerm
-from discover.equations.from_law import EXPONENTIAL, finitely_extensible_terms
+from discover.equations.equation import Equation
+from discover.equations.from_law import EXPONENTIAL
 from discover.equations.rheotool import extension_factor
+from discover.equations.term import EquationTerm
 from discover.errors import InputError
+from discover.laws.fene_p import fene_p_terms
 
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 _TOKEN = re.compile(r"[{}()\[\];]|[^\s{}()\[\];]+")
@@ -69,7 +71,7 @@ def _mode(entries: dict[str, Any]) -> tuple[tuple[EquationTerm, ...], float, flo
     elif kind == "PTT":
         terms = _ptt(entries)
     elif limit is not None:
-        terms = finitely_extensible_terms(1.0 / limit)
+        terms = tuple(EquationTerm(*share) for share in fene_p_terms(1.0 / limit))
     else:
         raise InputError(
             f"The type {kind[:60]!r} is not one of Oldroyd-B, Giesekus, PTT, FENE-P, multiMode."

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import sympy
 
-from discover.equations.equation import TermLike
-from tensor_library.spelling import spell
+from discover.equations.term import TermLike
 from tensor_library.symbolic import SympyNotation
 from tensor_library.terms import parse_term
 
@@ -15,5 +14,5 @@ def extra_term_expression(terms: Sequence[TermLike]) -> sympy.Expr:
     total: sympy.Expr = sympy.Integer(0)
     notation = SympyNotation()
     for term in terms:
-        total = total + spell(parse_term(term.term), notation, term.coefficient, term.inner)
+        total = total + parse_term(term.term).spell(notation, term.coefficient, term.inner)
     return total

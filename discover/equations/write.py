@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from discover.equations.code import numpy_code, sympy_code
 from discover.equations.equation import Equation
 from discover.equations.json_format import equation_to_json
-from discover.equations.latex import equation_latex
+from discover.equations.latex_file import equation_latex
 from discover.equations.rheotool import rheotool_text
 from discover.errors import InputError
 

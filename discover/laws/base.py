@@ -13,6 +13,7 @@ from tensor_library.kinematics import (
     rate_of_deformation,
     upper_convected_production,
 )
+from tensor_library.terms import TermShare
 
 
 class AbstractConstitutiveLaw(eqx.Module):
@@ -32,6 +33,18 @@ class AbstractConstitutiveLaw(eqx.Module):
     @abstractmethod
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h(σ, γ̇), in the storage of `stress`."""
+
+    def as_terms(self) -> tuple[TermShare, ...] | None:
+        """Return h as a sum of library terms, so that the law can be written out.
+
+        None if it is no such sum, which is also what a law that does not say is taken to be.
+
+        Raises
+        ------
+        InputError
+            If it is none, and there is more to say of that.
+        """
+        return None
 
     def stress_rate(self, stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
         """Return dσ/dt.

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
 from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library.terms import TermShare, parse_term
 
 
 class LibraryExpansion(AbstractConstitutiveLaw):
@@ -38,6 +38,17 @@ class LibraryExpansion(AbstractConstitutiveLaw):
         terms = self.library.evaluate(stress, rate, self.inner)
         extra = jnp.tensordot(self.coefficients, terms, axes=1)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
+
+    def as_terms(self) -> tuple[TermShare, ...] | None:
+        """Return the terms whose coefficients differ from zero, behind those of the base law."""
+        inner = dict(zip(self.library.inner_names, map(float, self.inner), strict=True))
+        own = tuple(
+            TermShare(term.name, float(value), {name: inner[name] for name in term.inner_names})
+            for term, value in zip(self.library.terms, self.coefficients, strict=True)
+            if float(value) != 0.0
+        )
+        below = () if self.base is None else self.base.as_terms()
+        return None if below is None else below + own
 
 
 def law_of_terms(

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
+from tensor_library.terms import TermShare
 
 
 class FenePeterlin(AbstractConstitutiveLaw):
@@ -32,6 +33,23 @@ class FenePeterlin(AbstractConstitutiveLaw):
             limit - trace_of_conformation
         )
         return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
+
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        return fene_p_terms(1.0 / float(self.maximum_extension_squared))
+
+
+def fene_p_terms(inverse: float) -> tuple[TermShare, ...]:
+    """Return the extra term of FENE-P, with q = 1/L², multiplied out."""
+    growth = inverse / (1.0 - 3.0 * inverse)
+    return (
+        TermShare("tr(sigma)*sigma", inverse + growth),
+        TermShare("tr(sigma)^2*sigma", growth * inverse),
+        TermShare("tr(sigma.gammadot)*sigma", -growth),
+        TermShare("tr(sigma)*I", growth),
+        TermShare("tr(sigma)^2*I", growth * inverse),
+        TermShare("tr(sigma.gammadot)*I", -growth),
+    )
 
 
 NAMED = {

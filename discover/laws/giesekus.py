@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, square
+from tensor_library.terms import TermShare
 
 
 class Giesekus(AbstractConstitutiveLaw):
@@ -18,6 +19,10 @@ class Giesekus(AbstractConstitutiveLaw):
         """Return h = α σ·σ."""
         del rate  # this law has no explicit rate dependence
         return self.mobility * square(stress)
+
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        return (TermShare("sigma.sigma", float(self.mobility)),)
 
 
 NAMED = {

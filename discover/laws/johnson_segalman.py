@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, anticommutator
+from tensor_library.terms import TermShare
 
 
 class JohnsonSegalman(AbstractConstitutiveLaw):
@@ -17,6 +18,10 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
+
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        return (TermShare("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
 
 
 NAMED = {

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric
+from tensor_library.terms import TermShare
 
 
 class UpperConvectedMaxwell(AbstractConstitutiveLaw):
@@ -17,6 +18,10 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
         """Return h = 0."""
         del rate
         return jnp.zeros_like(stress)
+
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        return ()
 
 
 NAMED = {

@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, trace
+from tensor_library.terms import TermShare
 
 
 class LinearPhanThienTanner(AbstractConstitutiveLaw):
@@ -20,6 +21,10 @@ class LinearPhanThienTanner(AbstractConstitutiveLaw):
         del rate
         return self.extensibility * trace(stress) * stress
 
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        return (TermShare("tr(sigma)*sigma", float(self.extensibility)),)
+
 
 class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
     """Exponential PTT law: h = (exp(ε tr σ) − 1) σ   [Phan-Thien 1978, J. Rheol. 22, 259]."""
@@ -31,6 +36,11 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
         """Return h = (exp(ε tr σ) − 1) σ."""
         del rate
         return jnp.expm1(self.extensibility * trace(stress)) * stress
+
+    def as_terms(self) -> tuple[TermShare, ...]:
+        """Return h as a sum of library terms."""
+        inner = {"epsilon": float(self.extensibility)}
+        return (TermShare("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
 
 
 _RANGE = {"epsilon": (0.0, 10.0)}

@@ -1,7 +1,7 @@
 """Named laws, as study files and the command line spell them.
 
-A file in this folder that says ``NAMED = {...}`` is a law that can be asked for; nothing else has
-to be edited. A program that uses this package registers laws of its own instead.
+A file in this folder that says ``NAMED = {...}`` is a law that is built in. A user's own are
+registered, by a program or by an installed package: see docs/adding-a-law.md.
 """
 
 import importlib
@@ -19,6 +19,8 @@ import jax.numpy as jnp
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
+from discover.new_names import require_new_name
+from tensor_library.registry import Registry
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,8 +39,8 @@ def _named_laws() -> dict[str, NamedLaw]:
     return laws
 
 
-LAWS: dict[str, NamedLaw] = _named_laws()
-"""Named laws by the name in study files."""
+LAWS: Registry[NamedLaw] = Registry("law", "discover.laws", _named_laws)
+"""Named laws by the name in study files; a package's own by entry points of this group."""
 
 RESERVED = ("learned",)
 """What a study file may write in place of the name of a law."""
@@ -96,7 +98,9 @@ def register_law(
     title: str = "",
     source: str = "",
 ) -> NamedLaw:
-    """Make a law of one's own known by name, to studies and loops in this process.
+    """Make a law of one's own known by name, to studies, loops and exports in this process.
+
+    An installed package does so in every process: see docs/adding-a-law.md.
 
     Parameters
     ----------
@@ -114,7 +118,7 @@ def register_law(
     InputError
         If the name is taken or is none, a range is none, or `build` makes no law.
     """
-    require_new_name(name, [*LAWS, *RESERVED], "law")
+    require_new_name(name, [*LAWS.present, *RESERVED], "law")
     ranges = {}
     for key, ends in (parameters or {}).items():
         try:
@@ -130,26 +134,6 @@ def register_law(
     entry = NamedLaw(title or name.replace("_", " "), build, ranges, source=source)
     LAWS[name] = entry
     return entry
-
-
-def require_new_name(name: str, known: list[str], what: str) -> None:
-    """Check a name that is to be registered.
-
-    Raises
-    ------
-    InputError
-        If it is taken, or could not be written in a study file.
-    """
-    if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
-        raise InputError(
-            f"The name of a {what} must be lower-case letters, digits and underscores; got {name!r}"
-            f". Write it like {known[0]!r}."
-        )
-    if name in known:
-        raise InputError(
-            f"The {what} {name!r} is known already, and what was computed with it is kept under "
-            "that name. Choose another name, or start Python anew."
-        )
 
 
 def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) -> None:

@@ -2,12 +2,15 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
-from tensor_library.integrity_basis import integrity_basis
+from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
+from tensor_library.terms import TermShare
 
 N_COEFFICIENTS = 8
 
@@ -79,3 +82,24 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
             self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1
         )
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
+
+    def as_terms(self) -> tuple[TermShare, ...] | None:
+        """Return the constants as coefficients, behind the terms of the base law.
+
+        Raises
+        ------
+        InputError
+            If a coefficient varies with the invariants.
+        """
+        if np.any(np.asarray(self.network_mask) != 0):
+            raise InputError(
+                "The network's coefficients vary with the invariants, so it is no sum of terms. "
+                "Write out its projection on the library: the terms of its result."
+            )
+        own = tuple(
+            TermShare(name, float(value))
+            for name, value in zip(TENSOR_NAMES, self.constants, strict=True)
+            if float(value) != 0.0
+        )
+        below = () if self.base is None else self.base.as_terms()
+        return None if below is None else below + own

@@ -1,5 +1,7 @@
 """The two learners and the kind of result they share."""
 
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.registry import LearningTask, register_learner
+from discover.learners.result import LearnerResult
 
-__all__ = ["LearnerResult", "RecoveredTerm"]
+__all__ = ["LearnerResult", "LearningTask", "RecoveredTerm", "register_learner"]

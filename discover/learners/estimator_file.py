@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from discover import __version__
+from discover._version import __version__
 from discover.errors import InputError
 from discover.learners.plain_values import PlainReader, PlainWriter
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from discover import __version__
+from discover._version import __version__
 from discover.dataset.run import ShearRun
 
 

@@ -9,42 +9,8 @@ from jaxtyping import Float, Num
 
 from discover.equations import Equation, EquationTerm, HasEquation, combined, law_terms
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.term_tables import TermTables
-
-
-@dataclass(frozen=True)
-class RecoveredTerm:
-    """One term of a recovered law.
-
-    Attributes
-    ----------
-    term
-        Canonical spelling.
-    coefficient
-        Refitted without penalty (debiased).
-    coefficient_penalised
-        From the penalised or thresholded problem that selected it, or None where there was none.
-    ci95
-        95 % interval of `coefficient`, or None where not computed.
-    inner
-        Inner parameters by name.
-    latex
-        The term as LaTeX, without its coefficient.
-    inner_ci95
-        95 % intervals of the inner parameters.
-    inner_at_one
-        For a closed form whose coefficient may be one, as in the law that it is named after:
-        each inner parameter with its 95 % interval (value, low, high) if the coefficient is one.
-    """
-
-    term: str
-    coefficient: float
-    coefficient_penalised: float | None = None
-    ci95: tuple[float, float] | None = None
-    inner: Mapping[str, float] = field(default_factory=dict)
-    latex: str = ""
-    inner_ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    inner_at_one: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -62,7 +28,7 @@ class LearnerResult(HasEquation, TermTables):
     train_seconds
         Wall-clock time of `fit`.
     loss_history
-        Iterations and losses, both of shape (m,).
+        Iterations and losses, both of shape (m,); empty where there is nothing to show.
     details
         What else this learner can say; JSON-able.
     message
@@ -74,8 +40,10 @@ class LearnerResult(HasEquation, TermTables):
     learner: str
     law: AbstractConstitutiveLaw
     terms: tuple[RecoveredTerm, ...]
-    train_seconds: float
-    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]]
+    train_seconds: float = 0.0
+    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]] = field(
+        default_factory=lambda: (np.zeros(0), np.zeros(0))
+    )
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()

@@ -1,21 +1,19 @@
 """What a learner found and how it chose, as tables."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
+from discover.learners.recovered_term import RecoveredTerm
 from discover.notebook_view import NotebookView
-
-if TYPE_CHECKING:
-    from discover.learners.result import RecoveredTerm
 
 
 class TermTables(NotebookView):
     """Tables of a learner's `terms` and `details`, for a fresh result and for one that was kept."""
 
     learner: str
-    terms: "tuple[RecoveredTerm, ...]"
+    terms: tuple[RecoveredTerm, ...]
     details: Mapping[str, Any]
     message: str
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.equations.mathml import number, term_mathml
+from discover.learners.registry import learner_title
 from discover.report.page import render
-from discover.report.plots.style import LEARNER_TITLES
 from discover.report.wording import RULES, effect_title
 
 _SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
@@ -30,7 +30,7 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
         studies=studies,
         failed=[study for study in studies if study.status == "failed"],
         waiting=sum(study.status == "waiting" for study in studies),
-        learners=[LEARNER_TITLES.get(name, name) for name in learners],
+        learners=[learner_title(name) for name in learners],
         symbols=list(_SYMBOLS.values()),
         comparisons=[
             {

@@ -7,10 +7,10 @@ from typing import Any
 from markupsafe import Markup
 
 from discover.comparison.comparison import Comparison
+from discover.learners.registry import learner_title
 from discover.report import comparison_tables as tables
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
-from discover.report.plots.style import LEARNER_TITLES
 
 Content = Mapping[str, Any]
 
@@ -119,7 +119,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         }
 
     def errors() -> Content:
-        titles = ["before", *(LEARNER_TITLES[name] for name in comparison.outcomes)]
+        titles = ["before", *(learner_title(name) for name in comparison.outcomes)]
         return {"columns": titles, "error_rows": tables.error_rows(comparison)}
 
     def classical() -> Content | None:
@@ -142,7 +142,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
 
     def physics() -> Content | None:
         rows = tables.physics_rows(comparison)
-        titles = [LEARNER_TITLES[name] for name in comparison.physics]
+        titles = [learner_title(name) for name in comparison.physics]
         return {"physics_titles": titles, "physics_rows": rows} if rows else None
 
     return (

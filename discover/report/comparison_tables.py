@@ -10,9 +10,10 @@ from discover.comparison.identifiability import EXACT, Rival
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
-from discover.learners.result import RecoveredTerm
+from discover.learners import RecoveredTerm
+from discover.learners.registry import learner_title
 from discover.report.plots.flows import SYMBOLS
-from discover.report.plots.style import LEARNER_TITLES
+from discover.report.plots.style import learner_colour
 from discover.report.wording import (
     RULES,
     interval,
@@ -21,8 +22,6 @@ from discover.report.wording import (
     selection_sentence,
     significant,
 )
-
-_COLOURS = {"tensor_sindy": "--sparse", "tbnn_ude": "--network"}
 
 
 def selection(comparison: Comparison) -> dict[str, Any] | None:
@@ -125,7 +124,7 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
         sparse = name == "tensor_sindy"
         rows.append(
             {
-                "law": LEARNER_TITLES[name],
+                "law": learner_title(name),
                 "constants": "",
                 "number": sum(1 + len(t.inner) for t in outcome.terms) if sparse else None,
                 "misfit": None if left is None else left.misfit,
@@ -168,8 +167,8 @@ def network_interval(comparison: Comparison) -> bool:
 def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
     """Return a law found, as mathematics, with how its fit ended."""
     return {
-        "title": LEARNER_TITLES[outcome.learner],
-        "colour": _COLOURS[outcome.learner],
+        "title": learner_title(outcome.learner),
+        "colour": learner_colour(outcome.learner),
         "math": law_element(outcome.terms, linear_relaxation),
         "message": (outcome.message[:1].upper() + outcome.message[1:]).rstrip("."),
         "seconds": outcome.train_seconds,
@@ -179,7 +178,7 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
 def learner_columns(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the title of each learner, and whether its terms have intervals."""
     return [
-        {"title": LEARNER_TITLES[name], "intervals": any(term.ci95 for term in outcome.terms)}
+        {"title": learner_title(name), "intervals": any(term.ci95 for term in outcome.terms)}
         for name, outcome in comparison.outcomes.items()
     ]
 
@@ -211,12 +210,12 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
             )
             if term is not None:
                 inner += [
-                    f"{LEARNER_TITLES[learner]}: {readable(key)} = {significant(value)}"
+                    f"{learner_title(learner)}: {readable(key)} = {significant(value)}"
                     + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
                     for key, value in term.inner.items()
                 ]
                 inner += [
-                    f"{LEARNER_TITLES[learner]}, if the coefficient is one: {readable(key)} = "
+                    f"{learner_title(learner)}, if the coefficient is one: {readable(key)} = "
                     f"{significant(value)} ({interval((low, high))})"
                     for key, (value, low, high) in term.inner_at_one.items()
                 ]

@@ -6,8 +6,8 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.report.wording import (
-    LEARNERS,
     SYMBOLS,
+    learner_as_subject,
     percent,
     readable,
     sentence,
@@ -92,8 +92,13 @@ def _where_usable(comparison: Comparison) -> list[str]:
 
 
 def _law_of(learner: str) -> str:
-    name = LEARNERS[learner]
-    return f"{name[:1].lower()}{name[1:]}'s law"
+    return f"{_within(learner)}'s law"
+
+
+def _within(learner: str) -> str:
+    """Return a learner as it stands within a sentence."""
+    name = learner_as_subject(learner)
+    return name[:1].lower() + name[1:]
 
 
 def _left(one: LackOfFit) -> str:
@@ -136,7 +141,7 @@ def _how_sure(comparison: Comparison) -> str:
         failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
         if failed:
             parts.append(
-                f"{LEARNERS[name].lower()}'s law fails {len(failed)} of the checks of physical "
+                f"{_within(name)}'s law fails {len(failed)} of the checks of physical "
                 f"soundness ({', '.join(failed)})"
             )
     return sentence(parts)
@@ -159,7 +164,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
         ]
         if said:
             parts.append(f"{', '.join(said)} {where}")
-    law = LEARNERS[name].lower()
+    law = _within(name)
     told = [f"{law} misses, in flows that no fit saw, at most {' and '.join(parts)}"]
     return (told if parts else []) + (
         [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []

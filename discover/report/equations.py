@@ -2,7 +2,7 @@
 
 from discover.comparison.comparison import Comparison
 from discover.equations.latex import PREAMBLE, law_latex
-from discover.report.plots.style import LEARNER_TITLES
+from discover.learners.registry import learner_title
 
 
 def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
@@ -11,6 +11,6 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     for name, outcome in comparison.outcomes.items():
         equation = law_latex(outcome.terms, linear_relaxation)
         parts.append(
-            f"% {LEARNER_TITLES[name]}\n\\begin{{equation}}\n  {equation}\n\\end{{equation}}\n"
+            f"% {learner_title(name)}\n\\begin{{equation}}\n  {equation}\n\\end{{equation}}\n"
         )
     return "\n".join(parts)

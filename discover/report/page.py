@@ -10,7 +10,7 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from discover import __version__
+from discover._version import __version__
 from discover.report.palette import style_sheet
 from discover.report.wording import (
     estimate,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from discover.closed_loop.result import LoopResult, RunRecord
+from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.study.run_folder import RunFolder

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from discover.comparison.outcome import LearnerOutcome
+from discover.learners.registry import learner_title
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
@@ -20,7 +21,12 @@ def recorded_symbol(flows: Iterable[str]) -> str:
     return TENSILE if kinds == {False} else "σ₁₂"
 
 
-LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+_LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+
+
+def learner_as_subject(name: str) -> str:
+    """Return a learner as a sentence begins with it."""
+    return _LEARNERS.get(name, f"The learner “{learner_title(name)}”")
 
 
 def sentence(parts: Iterable[str]) -> str:

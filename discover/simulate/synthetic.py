@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.run import LinearSweep, ShearDataset, ShearRun
+from discover.dataset import LinearSweep, ShearDataset, ShearRun
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discover.dataset import LinearSweep, ShearDataset
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
-from discover.dataset.run import SLOWEST_RATE, LinearSweep, ShearDataset, require_signal
+from discover.dataset.run import SLOWEST_RATE, require_signal
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid

@@ -6,8 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from discover.dataset import ShearDataset, ShearRun
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
-from discover.dataset.run import ShearDataset, ShearRun, require_signal
+from discover.dataset.run import require_signal
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of

@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from discover import __version__
+from discover._version import __version__
 from discover.dataset.load import folder_roots, resolve_folder
 from discover.dataset.table import read_bytes
 from discover.dataset.toml_file import read_toml

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 
 from discover.laws.registry import LAWS
+from discover.learners.registry import learner_names
 from discover.validation import Section
 
 
@@ -19,6 +20,15 @@ def _known_or_learned(name: str) -> str:
     return name if name == "learned" else _known_law(name)
 
 
+def _known_learner(name: str) -> str:
+    if name not in learner_names():
+        raise ValueError(
+            f"unknown learner {name[:60]!r}; write one of {', '.join(learner_names())}"
+        )
+    return name
+
+
+LearnerName = Annotated[str, AfterValidator(_known_learner)]
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
 LawName = Annotated[str, AfterValidator(_known_or_learned)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
@@ -150,7 +160,7 @@ class NextExperiment(Section):
 class Compare(Section):
     """Which learners, which candidate terms, which flows they are judged on."""
 
-    learners: tuple[Literal["tensor_sindy", "tbnn_ude"], ...] = ("tensor_sindy", "tbnn_ude")
+    learners: tuple[LearnerName, ...] = ("tensor_sindy", "tbnn_ude")
     library: Library = Library()
     test: Literal["paper"] = "paper"
     optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.errors import InputError
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners import LearnerResult, RecoveredTerm
 
 STUDY = """
 [data]

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from discover.closed_loop import RunRecord
 from discover.closed_loop.reading import read_residual
-from discover.closed_loop.result import RunRecord
 from discover.closed_loop.waves import oscillation, read_wave
 
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)

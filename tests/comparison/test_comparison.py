@@ -16,7 +16,7 @@ from discover.comparison.truth import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.study import RunFolder, parse_study
 from discover.study.build import declared_model, load_study_data
 from tensor_library.library import build_library

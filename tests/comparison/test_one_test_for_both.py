@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from discover.closed_loop import DeclaredModel
+from discover.closed_loop import DeclaredModel, RunRecord
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.judgement import judge
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.result import RunRecord
 from discover.closed_loop.run_batch import make_batch
 from discover.closed_loop.silence import records_are_silent
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.closed_loop.loop import _candidates
 from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
-from discover.effects.registry import _registered, make_effect, named_effects
+from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, name_of
 from discover.study.build import declared_model, load_study_data
@@ -50,8 +50,7 @@ def registered():
     dc.register_effect(CREAK)
     yield
     del LAWS["steep"]
-    _registered.clear()
-    named_effects.cache_clear()
+    del EFFECTS["creak"]
 
 
 def test_a_study_uses_a_law_and_an_effect_from_outside(registered):

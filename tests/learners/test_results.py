@@ -6,7 +6,7 @@ import sympy
 
 from discover.laws.expansion import law_of_terms
 from discover.laws.giesekus import Giesekus
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners import LearnerResult, RecoveredTerm
 from tensor_library.symbolic import STRESS, Trace
 
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"

@@ -12,7 +12,7 @@ from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.explanation import Explanation
 from discover.comparison.identifiability import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement
-from discover.learners.result import RecoveredTerm
+from discover.learners import RecoveredTerm
 from discover.protocols.shear import oscillatory_shear
 from discover.report.comparison_report import write_comparison
 from discover.report.comparison_tables import error_rows

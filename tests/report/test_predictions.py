@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from discover.closed_loop.result import ErrorPair, LoopResult, RunRecord
+from discover.closed_loop import ErrorPair, LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import Flow
 from discover.comparison.next_measurement import NextMeasurement

@@ -20,7 +20,7 @@ from discover.effects.library_term import library_term
 from discover.equations.mathml import law_element, term_element
 from discover.identify.bands import PredictionBand
 from discover.laws import Fluid, make_law
-from discover.learners.result import LearnerResult, RecoveredTerm
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import safe_name, write_comparison
 from discover.report.comparison_tables import error_rows
 from discover.report.comparison_verdict import comparison_verdict

@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from discover.dataset.importing.mapping import Geometry, Mapping, Source
 from discover.dataset.importing.quantities import QUANTITIES, factor_to_si, guess_columns
+from discover.dataset.importing.registry import blocks_of_importer
 from discover.dataset.importing.text_export import Block, is_number, read_blocks
 from discover.dataset.load import INDEX_FILE, SWEEP_FILE
 from discover.dataset.table import read_bytes, shown
@@ -120,12 +121,12 @@ def import_files(
 
 def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     layout = mapping.layout
-    blocks = list(
-        enumerate(
-            read_blocks(path, layout.delimiter, layout.decimal, layout.header_row, layout.encoding),
-            start=1,
+    found = blocks_of_importer(path, layout.format)
+    if found is None:
+        found = read_blocks(
+            path, layout.delimiter, layout.decimal, layout.header_row, layout.encoding
         )
-    )
+    blocks = list(enumerate(found, start=1))
     if mapping.blocks is None:
         return blocks
     chosen = [pair for pair in blocks if pair[0] in mapping.blocks]

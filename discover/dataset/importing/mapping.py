@@ -74,8 +74,12 @@ class Geometry(Section):
 
 
 class Layout(Section):
-    """How the text is laid out; whatever is left out is found from the file."""
+    """How the text is laid out; whatever is left out is found from the file.
 
+    `format` names the importer of a file that is no text.
+    """
+
+    format: str | None = None
     delimiter: Literal["tab", "semicolon", "comma"] | None = None
     decimal: Literal[".", ","] | None = None
     header_row: Annotated[int, Field(ge=1)] | None = None

@@ -12,9 +12,13 @@ import codecs
 import csv
 import io
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
@@ -48,6 +52,34 @@ class Block:
     columns: tuple[tuple[str, str], ...]
     cells: tuple[tuple[str, ...], ...]
     line: int
+
+    @classmethod
+    def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
+        """Return columns of numbers as a block, as if a file had held them as text.
+
+        Parameters
+        ----------
+        columns
+            Unit, empty for a pure number, and values of each column, by its name. All have the same
+            shape (n,); a value that is nan is an empty cell.
+        name
+            What the file calls the block.
+
+        Raises
+        ------
+        InputError
+            If a column is no list of numbers, or they differ in length.
+        """
+        values = [np.asarray(numbers, dtype=float) for _, numbers in columns.values()]
+        if not values or {one.shape for one in values} != {(values[0].size,)}:
+            shapes = ", ".join(f"{n}: {v.shape}" for n, v in zip(columns, values, strict=True))
+            raise InputError(
+                f"The columns of a block must have one length; got {shapes or 'none'}."
+            )
+        heads = tuple((str(key), str(unit)) for key, (unit, _) in columns.items())
+        rows = np.stack(values, axis=1).tolist()
+        cells = tuple(tuple("" if x != x else repr(x) for x in row) for row in rows)
+        return cls(name, heads, cells, 1)
 
 
 def read_blocks(

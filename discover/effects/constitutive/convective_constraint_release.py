@@ -1,7 +1,8 @@
 """Release of entanglements by the flow."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import identity_like, inner
+from tensor_library.terms import TermShare
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):

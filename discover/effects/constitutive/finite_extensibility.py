@@ -1,6 +1,7 @@
 """Chains that cannot be stretched without end."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
+from discover.laws.fene_p import fene_p_terms
 from tensor_library.algebra import identity_like, inner, trace
 
 
@@ -23,20 +24,7 @@ class FiniteExtensibility(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return the six terms of FENE-P."""
-        return shares_of_fene_p(values[0])
-
-
-def shares_of_fene_p(inverse: float) -> tuple[TermShare, ...]:
-    """Return the extra term of FENE-P, with q = 1/L², multiplied out."""
-    growth = inverse / (1.0 - 3.0 * inverse)
-    return (
-        TermShare("tr(sigma)*sigma", inverse + growth),
-        TermShare("tr(sigma)^2*sigma", growth * inverse),
-        TermShare("tr(sigma.gammadot)*sigma", -growth),
-        TermShare("tr(sigma)*I", growth),
-        TermShare("tr(sigma)^2*I", growth * inverse),
-        TermShare("tr(sigma.gammadot)*I", -growth),
-    )
+        return fene_p_terms(values[0])
 
 
 EFFECT = FiniteExtensibility(

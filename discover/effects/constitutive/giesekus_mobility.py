@@ -1,7 +1,8 @@
 """Anisotropic mobility of the chains."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import square
+from tensor_library.terms import TermShare
 
 
 class GiesekusMobility(ConstitutiveEffect):

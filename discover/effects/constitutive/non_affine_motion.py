@@ -1,7 +1,8 @@
 """Slip of the network against the flow."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import anticommutator
+from tensor_library.terms import TermShare
 
 
 class NonAffineMotion(ConstitutiveEffect):

@@ -2,8 +2,9 @@
 
 import jax.numpy as jnp
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import trace
+from tensor_library.terms import TermShare
 
 
 class ExponentialNetworkLoss(ConstitutiveEffect):

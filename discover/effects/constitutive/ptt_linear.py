@@ -1,7 +1,8 @@
 """Loss of network junctions in proportion to their stretch."""
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, TermShare
+from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import trace
+from tensor_library.terms import TermShare
 
 
 class LinearNetworkLoss(ConstitutiveEffect):

@@ -18,9 +18,9 @@ from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.least_squares import law_misfit

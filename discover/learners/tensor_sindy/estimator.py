@@ -13,9 +13,9 @@ from discover.dataset.run import ShearRun
 from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
+from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.result import LearnerResult, RecoveredTerm
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty

@@ -4,11 +4,10 @@ import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
+from discover.learners.registry import learner_title
 from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.style import (
     BEFORE_STYLE,
-    LEARNER_STYLES,
-    LEARNER_TITLES,
     MEASURED,
     NETWORK,
     SHADE,
@@ -16,6 +15,7 @@ from discover.report.plots.style import (
     TRUTH_STYLE,
     Picture,
     figure,
+    learner_style,
     legend_above,
     literal,
     make_logarithmic,
@@ -47,7 +47,7 @@ def curves(comparison: Comparison, flow: Flow):
     for name, outcome in comparison.outcomes.items():
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
-            yield LEARNER_TITLES[name], LEARNER_STYLES[name], prediction
+            yield learner_title(name), learner_style(name), prediction
 
 
 def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
@@ -128,9 +128,9 @@ def training_picture(comparison: Comparison) -> Picture:
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
-                    style = LEARNER_STYLES[name]
+                    style = learner_style(name)
                     panel.plot(
-                        flow.times, prediction["sigma12"], label=LEARNER_TITLES[name], **style
+                        flow.times, prediction["sigma12"], label=learner_title(name), **style
                     )
             panel.set_title(literal(flow.title), fontsize=8)
             if runs_through_decades(flow.times, flow.shear_rate):

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import EngFormatter
 
+from discover.closed_loop import LoopResult, RunRecord
 from discover.closed_loop.reading import differences
-from discover.closed_loop.result import LoopResult, RunRecord
 from discover.report.plots.style import (
     BEFORE,
     GREEN,

@@ -11,11 +11,11 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES
 from discover.comparison.identifiability import EXACT
 from discover.comparison.next_measurement import IdentifiabilityCell
+from discover.learners.registry import learner_title
 from discover.report.plots.flows import SYMBOLS
 from discover.report.plots.style import (
     GREEN,
     INK,
-    LEARNER_TITLES,
     NETWORK,
     SPARSE,
     TRUTH,
@@ -37,7 +37,7 @@ def error_map_picture(comparison: Comparison) -> Picture | None:
     """Return the error of the known part and of each learner over Wi and De."""
     if not comparison.flows_of("pipkin"):
         return None
-    rows = {"before": "before", **{n: LEARNER_TITLES[n] for n in comparison.outcomes}}
+    rows = {"before": "before", **{n: learner_title(n) for n in comparison.outcomes}}
     with figure(len(rows), 3, width=10.0, height=2.5) as (drawing, axes):
         for row, (who, title) in zip(axes, rows.items(), strict=True):
             table = comparison.error_map(who)

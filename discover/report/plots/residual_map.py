@@ -9,11 +9,11 @@ from matplotlib.patches import Patch
 
 from discover.closed_loop.result import LoopResult
 from discover.comparison.comparison import Comparison
+from discover.learners.registry import learner_title
 from discover.report.plots.flows import units
 from discover.report.plots.loop import shortened
 from discover.report.plots.style import (
     INK,
-    LEARNER_TITLES,
     NETWORK,
     SPARSE,
     Picture,
@@ -69,7 +69,7 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
     """Return the residual of σ12 in the training runs: of the known part, and of each learner."""
     flows = [flow for flow in comparison.flows_of("training") if flow.measured is not None]
     everyone = {"before": comparison.before}
-    everyone |= {LEARNER_TITLES[n]: o.predictions for n, o in comparison.outcomes.items()}
+    everyone |= {learner_title(n): o.predictions for n, o in comparison.outcomes.items()}
     panels = {}
     for title, predictions in everyone.items():
         rows = []

@@ -3,12 +3,12 @@
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.learners.registry import learner_title
 from discover.report.plots.flows import curves, units
 from discover.report.plots.style import (
-    LEARNER_STYLES,
-    LEARNER_TITLES,
     Picture,
     figure,
+    learner_style,
     legend_above,
     picture,
 )
@@ -22,8 +22,8 @@ def loss_picture(comparison: Comparison) -> Picture:
         for panel, (name, outcome) in zip(axes[0], outcomes.items(), strict=False):
             iterations, losses = outcome.loss_history
             positive = np.where(np.isfinite(losses), np.maximum(losses, 1e-30), np.nan)
-            panel.semilogy(iterations, positive, color=LEARNER_STYLES[name]["color"])
-            panel.set_title(LEARNER_TITLES[name])
+            panel.semilogy(iterations, positive, color=learner_style(name)["color"])
+            panel.set_title(learner_title(name))
             panel.set_xlabel(
                 "support refitted" if name == "tensor_sindy" else "optimiser iteration"
             )
@@ -101,8 +101,8 @@ def sweep_picture(comparison: Comparison) -> Picture | None:
                         panel.plot(
                             rate,
                             prediction["sigma12"][late],
-                            label=LEARNER_TITLES[name],
-                            **LEARNER_STYLES[name],
+                            label=learner_title(name),
+                            **learner_style(name),
                         )
                 panel.set_title(f"{readable(point.parameter)} = {point.value:g}")
                 panel.set_xlabel(rate_label)
@@ -115,9 +115,9 @@ def sweep_picture(comparison: Comparison) -> Picture | None:
                         [np.nan if e is None else 100.0 * max(e, 1e-8) for e in errors],
                         marker=marker,
                         markersize=4,
-                        color=LEARNER_STYLES[name]["color"],
+                        color=learner_style(name)["color"],
                         label=f"error, {'σ₁₂' if quantity == 'sigma12' else 'N₁'}, "
-                        f"{LEARNER_TITLES[name]}",
+                        f"{learner_title(name)}",
                     )
             row[-1].set_title("error in this flow (%)")
             row[-1].set_xlabel(readable(points[0].parameter))

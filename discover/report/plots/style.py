@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -14,6 +15,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from discover.learners.registry import LEARNERS
 from discover.report.palette import style_sheet
 
 # Stand-ins, each a value of its own: CSS variables of the palette take their place where a picture
@@ -45,11 +47,13 @@ _VARIABLES = {
 }
 _DECADES = 30.0
 
-LEARNER_STYLES = {
+_LEARNER_STYLES: dict[str, dict[str, Any]] = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
     "tbnn_ude": {"color": NETWORK, "linestyle": ":", "linewidth": 2.2},
 }
-LEARNER_TITLES = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
+_OTHERS = (GREEN, PURPLE, YELLOW)
+"""Colours of learners of users' own, in their order."""
+
 TRUTH_STYLE = {"color": TRUTH, "linewidth": 1.3}
 BEFORE_STYLE = {"color": BEFORE, "linewidth": 1.0, "linestyle": "-."}
 
@@ -77,6 +81,20 @@ _SETTINGS = {
     "legend.frameon": False,
     "axes.unicode_minus": True,
 }
+
+
+def learner_style(name: str) -> dict[str, Any]:
+    """Return how the curves of a learner are drawn."""
+    if name in _LEARNER_STYLES:
+        return _LEARNER_STYLES[name]
+    place = list(LEARNERS).index(name) if name in LEARNERS else 0
+    colour = _OTHERS[place % len(_OTHERS)]
+    return {"color": colour, "linestyle": (0, (5, 1, 1, 1)), "linewidth": 1.8}
+
+
+def learner_colour(name: str) -> str:
+    """Return the CSS variable that holds the colour of a learner."""
+    return f"--{_VARIABLES[learner_style(name)['color']]}"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,63 @@
+"""One run as a closed loop leaves it: measured, and predicted by every model on the way."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.protocols.kinematics import FlowKind
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One run in the window of the loop, measured and predicted.
+
+    Attributes
+    ----------
+    name, held_out
+        The run, and whether it was held out.
+    time, strain, instrument_time
+        In s, dimensionless, and in s on the instrument's clock, shape (n,).
+    shear_rate
+        Commanded, in 1/s, shape (n,); in extension the Hencky rate.
+    measured
+        Recorded stress in Pa, shape (n,): σ12 in shear, σ11 − σ22 in extension.
+    predicted
+        Recorded stress in Pa by the declared model and after each stage, shape (stages + 1, n).
+    errors
+        Relative error of each of these, shape (stages + 1,).
+    conditions
+        Numbers that the source gives of the run, such as its temperature, and its place in the
+        order of the runs.
+    flow
+        Which flow it is.
+    """
+
+    name: str
+    held_out: bool
+    time: Float[np.ndarray, " n"]
+    strain: Float[np.ndarray, " n"]
+    instrument_time: Float[np.ndarray, " n"]
+    shear_rate: Float[np.ndarray, " n"]
+    measured: Float[np.ndarray, " n"]
+    predicted: Float[np.ndarray, "stages n"]
+    errors: Float[np.ndarray, " stages"]
+    conditions: dict[str, float] = field(default_factory=dict)
+    flow: FlowKind = "shear"
+
+    def line(self) -> dict[str, Any]:
+        """Return the run as one line of a table: its errors, the declared model's first."""
+        stages = ["declared", *(f"stage_{i}" for i in range(1, len(self.errors)))]
+        errors = dict(zip(stages, map(float, self.errors), strict=True))
+        return {"run": self.name, "held_out": self.held_out, **errors}
+
+    @property
+    def residual(self) -> Float[np.ndarray, "stages n"]:
+        """Prediction minus measurement in Pa, for each model."""
+        return self.predicted - self.measured
+
+    @property
+    def relative_residual(self) -> Float[np.ndarray, "stages n"]:
+        """The residual over the root-mean-square stress."""
+        return self.residual / (float(np.sqrt(np.mean(self.measured**2))) or 1.0)

@@ -1,0 +1,206 @@
+"""A data set: runs on one fluid, and its linear sweep."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, overload
+
+import numpy as np
+import pandas as pd
+
+from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.dataset.run import ShearRun
+from discover.dataset.run_table import run_line
+from discover.errors import InputError
+from discover.notebook_view import NotebookView
+
+
+@dataclass(frozen=True)
+class ShearDataset(NotebookView):
+    """Runs on one fluid: a sequence of runs, for Python and for scikit-learn.
+
+    ``data["a.csv"]`` and ``data[0]`` are a run; ``data[:3]``, ``data[[0, 2]]`` and
+    ``data[["a.csv", "b.csv"]]`` are data sets, and so is what a boolean array chooses.
+
+    Attributes
+    ----------
+    name
+        Name of the folder, or of the synthetic study.
+    runs
+        The runs.
+    linear_sweep
+        Small-amplitude data on the same fluid, where there are any.
+    provenance
+        Where the data come from, in words.
+    set_aside
+        Runs of the folder that cannot be fitted, by name, with the reason.
+    """
+
+    name: str
+    runs: tuple[ShearRun, ...]
+    linear_sweep: LinearSweep | None = None
+    provenance: str = ""
+    set_aside: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        names = [run.name for run in self.runs]
+        repeated = {name for name in names if names.count(name) > 1}
+        if repeated:
+            raise InputError(
+                f"The data set {self.name!r} holds the run {sorted(repeated)[0]!r} twice."
+            )
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __iter__(self) -> Iterator[ShearRun]:
+        return iter(self.runs)
+
+    def __repr__(self) -> str:
+        sweep = "" if self.linear_sweep is None else ", linear sweep"
+        samples = sum(len(run) for run in self.runs)
+        kind = type(self).__name__
+        return f"<{kind} {self.name!r}: {len(self)} runs, {samples} samples{sweep}>"
+
+    @overload
+    def __getitem__(self, which: str | int | np.integer) -> ShearRun: ...
+
+    @overload
+    def __getitem__(self, which: slice | Sequence[Any] | np.ndarray) -> "ShearDataset": ...
+
+    def __getitem__(self, which: Any) -> "ShearRun | ShearDataset":
+        if isinstance(which, str):
+            return self._named(which)
+        if isinstance(which, slice):
+            return replace(self, runs=self.runs[which])
+        chosen = np.asarray(which)
+        if chosen.ndim == 0 and np.issubdtype(chosen.dtype, np.integer):
+            return self._numbered(int(chosen))
+        if chosen.ndim == 1 and (chosen.size == 0 or chosen.dtype.kind in "iu"):
+            return replace(self, runs=tuple(self._numbered(int(i)) for i in chosen))
+        if chosen.ndim == 1 and chosen.dtype.kind == "U":
+            return self.select([str(name) for name in chosen])
+        if chosen.dtype == bool and chosen.shape == (len(self),):
+            return replace(self, runs=tuple(self.runs[i] for i in np.flatnonzero(chosen)))
+        raise InputError(
+            f"A run of the data set {self.name!r} is chosen by its name or number, several by a "
+            f"slice, by names, by numbers, or by {len(self)} booleans; got {which!r}."
+        )
+
+    def _named(self, name: str) -> ShearRun:
+        for run in self.runs:
+            if run.name == name:
+                return run
+        if name in self.set_aside:
+            raise InputError(
+                f"The run {name!r} of {self.name!r} cannot be used: {self.set_aside[name]}. Name "
+                "another."
+            )
+        raise InputError(
+            f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
+        )
+
+    def _numbered(self, number: int) -> ShearRun:
+        if not -len(self) <= number < len(self):
+            # an IndexError: it ends a loop over the numbers of a sequence
+            raise IndexError(
+                f"The data set {self.name!r} has {len(self)} runs; there is no number {number}."
+            )
+        return self.runs[number]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(run.name for run in self.runs)
+
+    @property
+    def thinned(self) -> str:
+        """What was thinned when it was read, in sentences; empty if nothing was."""
+        said = [
+            (run.name, run.metadata["thinned"]) for run in self.runs if "thinned" in run.metadata
+        ]
+        if self.linear_sweep is not None and self.linear_sweep.thinned:
+            said.append(("the linear sweep", self.linear_sweep.thinned))
+        return " ".join(f"{name}: {text}." for name, text in said)
+
+    @property
+    def left_out(self) -> str:
+        """Which runs were set aside and why, in sentences, one for each reason."""
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.set_aside.items():
+            reasons.setdefault(reason, []).append(name)
+        return " ".join(
+            f"{names[0]} is set aside: {reason}."
+            if len(names) == 1
+            else f"{names[0]} and {len(names) - 1} more runs like it are set aside: {reason}."
+            for reason, names in reasons.items()
+        )
+
+    def table(self) -> pd.DataFrame:
+        """Return the runs as a table, one line each; units are in the names of the columns."""
+        return pd.DataFrame([run_line(run) for run in self.runs])
+
+    def _shown(self) -> Iterable[Any]:
+        sweep = self.linear_sweep
+        points = 0 if sweep is None else len(sweep.angular_frequency)
+        linear = f"a linear sweep of {points} points" if points else "no linear sweep"
+        first = next(iter(self.provenance.splitlines()), "")
+        yield f"{self.name}: {len(self)} runs, {linear}. {first}".strip()
+        table = self.table()
+        for name in ("N1", "N2") if len(self) else ():
+            table[name] = ["measured" if there else None for there in table[name]]
+        yield table
+        yield self.thinned
+        yield self.left_out
+
+    def select(self, names: Sequence[str]) -> "ShearDataset":
+        """Return the data set of the named runs, in the order given.
+
+        Raises
+        ------
+        InputError
+            If a run does not exist.
+        """
+        return replace(self, runs=tuple(self._named(name) for name in names))
+
+    def split(
+        self, held_out: Sequence[str], fit: Sequence[str] | None = None
+    ) -> "tuple[ShearDataset, ShearDataset]":
+        """Return the runs to fit and those that only judge, as two data sets.
+
+        Parameters
+        ----------
+        held_out
+            Names of the runs that no fit may see.
+        fit
+            Names of the runs to fit; by default all others.
+
+        Raises
+        ------
+        InputError
+            If a run does not exist or is in both, or one of the two would be empty.
+        """
+        for label, names in (("held_out", held_out), ("fit", fit)):
+            if isinstance(names, str):
+                raise InputError(
+                    f"{label} must be a list of names; got {names!r}. Write [{names!r}]."
+                )
+        test = self.select(list(held_out))
+        train = self.select([n for n in self.names if n not in held_out] if fit is None else fit)
+        both = set(train.names) & set(test.names)
+        if both:
+            raise InputError(f"The run {sorted(both)[0]!r} is both in fit and in held_out.")
+        if not len(train) or not len(test):
+            empty = "fit" if not len(train) else "hold out"
+            raise InputError(
+                f"No run is left to {empty}; the data set {self.name!r} has "
+                f"{', '.join(self.names)}. Divide them."
+            )
+        return train, test
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all samples, one line each: the column ``run``, then those of its file."""
+        table = pd.concat(
+            [run.to_dataframe().assign(run=run.name) for run in self.runs], ignore_index=True
+        )
+        table.insert(0, "run", table.pop("run"))
+        return table

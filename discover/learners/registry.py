@@ -1,0 +1,127 @@
+"""Learners by name: the two that are built in, and a user's own."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+from discover.dataset import ShearRun
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.learners.result import LearnerResult
+from discover.new_names import require_new_name
+from tensor_library.library import TermLibrary
+from tensor_library.registry import Registry
+
+BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
+"""Titles of the learners of this package."""
+
+
+@dataclass(frozen=True)
+class LearningTask:
+    """What a learner of a user's own is given.
+
+    Attributes
+    ----------
+    runs
+        Runs to learn from; stresses in Pa, times in s.
+    base
+        The known fluid, whose law the learner adds to: its modes and its solvent stay.
+    library
+        The candidate terms of the study.
+    seed
+        Of whatever is random in the learner.
+    progress
+        To be called with what is going on and the fraction done, 0 to 1.
+    """
+
+    runs: tuple[ShearRun, ...]
+    base: Fluid
+    library: TermLibrary
+    seed: int
+    progress: Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class NamedLearner:
+    """A learner of a user's own.
+
+    Attributes
+    ----------
+    learn
+        Takes a `LearningTask` and returns a `LearnerResult` whose law holds the known one.
+    title
+        Name for readers.
+    """
+
+    learn: Callable[[LearningTask], LearnerResult]
+    title: str
+
+
+LEARNERS: Registry[NamedLearner] = Registry("learner", "discover.learners", dict)
+"""Learners of users' own by name; a package's by entry points of this group."""
+
+
+def register_learner(
+    name: str, learn: Callable[[LearningTask], LearnerResult], title: str = ""
+) -> NamedLearner:
+    """Make a learner of one's own known by name to studies and comparisons in this process.
+
+    An installed package does so in every process: see docs/adding-a-learner.md.
+
+    Parameters
+    ----------
+    name
+        As ``[compare] learners`` is to spell it: lower-case letters, digits and underscores.
+    learn
+        Takes a `LearningTask` and returns a `LearnerResult`.
+    title
+        Name for readers, by default `name` in words.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or is none, or `learn` cannot be called.
+    """
+    require_new_name(name, [*BUILT_IN, *LEARNERS.present], "learner")
+    if not callable(learn):
+        raise InputError(
+            f"The learner {name!r} must be a function of a LearningTask; got {learn!r}. See "
+            "docs/adding-a-learner.md."
+        )
+    LEARNERS[name] = NamedLearner(learn, title or name.replace("_", " "))
+    return LEARNERS.present[name]
+
+
+def learner_names() -> list[str]:
+    """Return the names of all learners, those that are built in first."""
+    return [*BUILT_IN, *LEARNERS]
+
+
+def learner_title(name: str) -> str:
+    """Return what a learner is called; its name if it is not known here."""
+    own = LEARNERS.get(name)
+    return BUILT_IN.get(name, name) if own is None else own.title
+
+
+def learn_with(name: str, task: LearningTask) -> tuple[LearnerResult, Fluid]:
+    """Return what a learner of a user's own finds, and the fluid that it makes.
+
+    Raises
+    ------
+    InputError
+        If there is no such learner, or it returns something else than a result.
+    """
+    if name not in LEARNERS:
+        raise InputError(f"Unknown learner {name!r}; write one of {', '.join(learner_names())}.")
+    start = perf_counter()
+    found = LEARNERS[name].learn(task)
+    if not isinstance(found, LearnerResult):
+        raise InputError(
+            f"The learner {name!r} must return a LearnerResult; got a {type(found).__name__}. See "
+            "docs/adding-a-learner.md."
+        )
+    found = replace(
+        found, learner=name, train_seconds=found.train_seconds or perf_counter() - start
+    )
+    base = task.base
+    return found, Fluid(found.law, base.modulus, base.relaxation_time, base.solvent_viscosity)

@@ -1,0 +1,55 @@
+"""What a notation has to say, so that terms can be written in it: LaTeX, MathML, Python, SymPy.
+
+`CandidateTerm.spell` decides once what a term is made of, in which order, and where a sum needs
+brackets. A notation only says how it writes a tensor, a product or a bracket.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Notation(ABC, Generic[T]):
+    """How one format writes the parts of a term."""
+
+    @abstractmethod
+    def tensor(self, name: str) -> T:
+        """Return the tensor ``I``, ``sigma`` or ``gammadot``."""
+
+    @abstractmethod
+    def contraction(self, tensors: Sequence[T]) -> T:
+        """Return the tensors contracted in this order, a·b·c."""
+
+    @abstractmethod
+    def sum(self, summands: Sequence[T]) -> T:
+        """Return a sum that may stand as a factor: in text, with its brackets."""
+
+    @abstractmethod
+    def trace(self, tensor: T) -> T:
+        """Return the trace of a contraction."""
+
+    @abstractmethod
+    def power(self, scalar: T, exponent: int) -> T:
+        """Return a trace raised to a power of 2 or more."""
+
+    @abstractmethod
+    def number(self, value: float) -> T:
+        """Return a number that may stand as a factor: in text, bracketed if it is negative."""
+
+    @abstractmethod
+    def letter(self, name: str) -> T:
+        """Return the letter of an inner parameter."""
+
+    @abstractmethod
+    def exponential(self, rate: T, trace: T) -> T:
+        """Return exp(rate · trace) − 1, as a factor."""
+
+    @abstractmethod
+    def saturating(self, level: T, trace: T) -> T:
+        """Return trace/(1 + level |trace|), as a factor."""
+
+    @abstractmethod
+    def product(self, factors: Sequence[T]) -> T:
+        """Return scalars times one tensor, in this order."""

@@ -1,0 +1,71 @@
+"""A package that cannot be used is left out with one warning that names it."""
+
+import pytest
+from user_packages import install, project
+
+LOUD = 'import sys\nprint("imported", file=sys.stderr)\n'
+LAW = """
+import discover as dc
+from discover.laws import Giesekus
+dc.register_law({name!r}, Giesekus, {{"alpha": (0.0, 1.0)}})
+"""
+
+
+@pytest.mark.parametrize(
+    ("code", "entry", "why"),
+    [
+        ("import nowhere_to_be_found", {"mine": "mine"}, "ModuleNotFoundError: No module named"),
+        ("1 / 0", {"mine": "mine"}, "ZeroDivisionError: division by zero"),
+        ("def f(:", {"mine": "mine"}, "SyntaxError"),
+        ("", {"mine": "elsewhere"}, "ModuleNotFoundError: No module named 'elsewhere'"),
+        ("", {"mine": "mine:law"}, "AttributeError"),
+        ("", {"mine": "mine"}, "mine registers no law of that name"),
+        (LAW.format(name="giesekus"), {"giesekus": "mine"}, "the name is taken"),
+        (LAW.format(name="giesekus"), {"mine": "mine"}, "'giesekus' is known already"),
+        (LAW.format(name="Mine"), {"mine": "mine"}, "must be lower-case"),
+        ("import sys; sys.exit(3)", {"mine": "mine"}, "SystemExit: 3"),
+    ],
+)
+def test_a_broken_package_is_one_warning_and_all_else_works(workplace, code, entry, why):
+    install(workplace.packages, "mine", code, project("laws", **entry))
+    done = workplace.run("laws")
+    assert "giesekus " in done.stdout
+    assert len(done.stdout.splitlines()) == 6
+    (said,) = done.stderr.splitlines()
+    assert said.startswith(f"discover: warning: The law {next(iter(entry))!r} of mine 2.5 is left")
+    assert why in said
+
+
+def test_of_two_packages_with_the_same_name_the_second_is_left_out(workplace):
+    install(workplace.packages, "one", LAW.format(name="ours"), project("laws", "one", ours="one"))
+    install(workplace.packages, "two", LAW.format(name="ours"), project("laws", "two", ours="two"))
+    done = workplace.run("laws")
+    assert "ours " in done.stdout
+    (said,) = done.stderr.splitlines()
+    assert "'ours' is known already" in said
+
+
+def test_a_sound_package_gives_no_warning(workplace):
+    # negative control of the tests above; two laws of one module are one import
+    code = LOUD + LAW.format(name="one") + LAW.format(name="two")
+    install(workplace.packages, "mine", code, project("laws", one="mine", two="mine"))
+    done = workplace.run("laws")
+    assert done.stderr == "imported\n"
+    assert len(done.stdout.splitlines()) == 8
+
+
+def test_help_loads_no_package(workplace):
+    install(
+        workplace.packages, "mine", LOUD + LAW.format(name="mine"), project("laws", mine="mine")
+    )
+    assert workplace.run("--help").stderr == ""
+    assert workplace.run("effects").stderr == ""
+    assert workplace.run("laws").stderr == "imported\n"
+
+
+def test_a_package_that_the_program_has_imported_itself_is_registered_once(workplace):
+    install(workplace.packages, "mine", LAW.format(name="mine"), project("laws", mine="mine"))
+    script = "import mine, discover as dc; print(dc.laws().loc['mine', 'parameter'])"
+    done = workplace.run(script=script)
+    assert done.stdout == "alpha\n"
+    assert done.stderr == ""
