@@ -1,4 +1,4 @@
-"""`discover compare` on every set of measured shear data: seconds, exit code and verdict.
+"""`discover compare` on every set of measured shear data: exit code 0, a whole page, a verdict.
 
 The default learners on whole records. A study that is done already, in the folder of results, is
 not run again, and one that was stopped goes on where it stopped. The data are not part of this
@@ -55,7 +55,9 @@ def main() -> None:
     print(f"{'data set':15} {'exit':>4} {'seconds':>8}  verdict")
     for row in rows:
         print(f"{row['name']:15} {row['exit']:4d} {row['seconds']:8.0f}  {row['verdict']}")
-    sys.exit(any(row["exit"] for row in rows))
+        for text in row.get("missing", ()):
+            print(f"{'':15} missing: {text}")
+    sys.exit(any(row["exit"] or row.get("missing") for row in rows))
 
 
 def compare(name: str, out: Path, learners: Sequence[str]) -> dict:
@@ -77,6 +79,7 @@ def compare(name: str, out: Path, learners: Sequence[str]) -> dict:
         "exit": ended.returncode,
         "seconds": time.perf_counter() - before,
         "verdict": verdict(folder / "comparison.json") if ended.returncode == 0 else "–",
+        "missing": what_is_missing(folder) if ended.returncode == 0 else [],
     }
     kept.write_text(json.dumps(row), encoding="utf-8")
     return row
@@ -90,6 +93,25 @@ def verdict(file: Path) -> str:
         for learner, one in content["lack_of_fit"].items()
     )
     return f"{content['verdict']} ({left})"
+
+
+def what_is_missing(folder: Path) -> list[str]:
+    """Return what a finished comparison should hold and does not; nothing where it is whole."""
+    content = json.loads((folder / "comparison.json").read_text("utf-8"))
+    missing = []
+    if content["verdict"] not in ("explained", "unexplained", "no_signal"):
+        missing.append(f"a verdict: {content['verdict']}")
+    for learner in LEARNERS:
+        told = content["lack_of_fit"].get(learner)
+        if told is None and learner not in content["learners"]:
+            continue
+        asked = {"misfit", "noise", "lag_one_correlation", "probability"}
+        missing += [f"{key} of {learner}" for key in sorted(asked - set(told or ()))]
+    if not content["lack_of_fit"]:
+        missing.append("a test of what any learner leaves")
+    if "could not be drawn" in (folder / "report.html").read_text("utf-8"):
+        missing.append("a picture")
+    return missing
 
 
 if __name__ == "__main__":

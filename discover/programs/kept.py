@@ -15,6 +15,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 import equinox as eqx
 import jax
 import jax.export
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
@@ -132,7 +133,9 @@ class Compiled(Generic[P, R]):
             return exported.call(*arrays)
 
         run.__name__ = self._function.__name__  # by which JAX files it
-        call = jax.jit(run)
+        # what an exported program returns is bound to its device, and JAX compiles once more for
+        # bound arguments than for others, unless it is told beforehand where all of them are
+        call = jax.jit(run, in_shardings=jnp.zeros(()).sharding)
 
         def found(args, kwargs, arrays):
             return put_together(nesting, iter(call(*arrays)))

@@ -153,6 +153,6 @@ def test_an_effect_that_stood_in_for_another_gives_way_to_it(planter, monkeypatc
 
     monkeypatch.setattr(Search, "_exchange", watched)
     case = planter.plant(["stress_offset"], size=0.12, noise=Noise(0.01), seed=1)
-    result = run_loop(case.dataset, case.declared, held_out=case.held_out, max_effects=3)
+    result = loop(case)
     assert ("bearing_friction", True) in exchanged  # on runs of one sign alone they are alike
     assert [stage.effect for stage in result.stages] == ["stress_offset"]

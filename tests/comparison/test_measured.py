@@ -1,9 +1,13 @@
-"""Comparisons of measured data: each set ends with exit 0, a whole page and a verdict."""
+"""Comparisons of measured data: each set ends with exit 0, a whole page and a verdict.
+
+All five sets, whole, are compared by `benchmarks/measured_comparisons.py`, which asks the same.
+"""
 
 import json
 from pathlib import Path
 
 import pytest
+from measured_comparisons import what_is_missing
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -13,36 +17,20 @@ pytestmark = pytest.mark.measured
 SWEEP = 'law = "ucm"\nmodes = "lve"'
 ONE_MODE = 'law = "ucm"\nmodulus_Pa = {}\nrelaxation_time_s = {}'
 
-# data set: runs fitted, runs held out, one row kept of so many, other data options, model
+# data set: runs fitted, runs held out, one row kept of so many, model: one set with a spectrum from
+# its sweep, one of a single mode
 SETS = {
-    "ldpe150r": (["shear_0p03.csv", "shear_3.csv"], ["shear_0p3.csv"], 3, "", SWEEP),
-    "pi95k-startup": (
-        ["pi_Tm10_rate0p1.csv", "pi_Tm10_rate3.csv"],
-        ["pi_Tm23_rate1.csv"],
-        12,
-        "",
-        SWEEP,
-    ),
     "gel-laos": (
         ["gel_laos_1rads_1000Pa.csv", "gel_laos_1rads_4000Pa.csv"],
         ["gel_laos_1rads_3000Pa.csv"],
         50,
-        'rate = "measured"',
         f"{SWEEP}\nsweep_rad_s = [0.1, 16.0]",
     ),
     "blood-steps": (
         ["blood_up_0p1_5p0.csv", "blood_up_0p1_20p0.csv"],
         ["blood_up_0p1_10p0.csv"],
         2,
-        'rate = "measured"',
         ONE_MODE.format(1.0, 0.1),
-    ),
-    "cpycl-laos": (
-        ["cpycl_laos_0.3rads_3.16.csv"],
-        [],
-        6,
-        "",
-        ONE_MODE.format(10.0, 1.0),
     ),
 }
 
@@ -62,23 +50,17 @@ def stand_in(source: Path, folder: Path, runs, every: int) -> None:
 
 @pytest.mark.parametrize("name", SETS)
 def test_a_comparison_of_measured_data_ends_with_a_verdict(name, measured_data, tmp_path):
-    fit, held_out, every, options, model = SETS[name]
+    fit, held_out, every, model = SETS[name]
     stand_in(measured_data / name, tmp_path / name, [*fit, *held_out], every)
     study = tmp_path / "study.toml"
     study.write_text(
-        f'[data]\nfolder = "{name}"\nheld_out = {held_out}\n{options}\n[model]\n{model}\n'
+        f'[data]\nfolder = "{name}"\nheld_out = {held_out}\nrate = "measured"\n[model]\n{model}\n'
         '[compare]\nlearners = ["tensor_sindy"]\nlibrary = { degree = 0 }\nmax_terms = 2\n'
         'next = { flows = ["start_up"] }\n'
     )
     out = tmp_path / "out"
     ended = CliRunner().invoke(app, ["compare", str(study), "--out", str(out)])
     assert ended.exit_code == 0, ended.output
+    assert not what_is_missing(out)
     content = json.loads((out / "comparison.json").read_text("utf-8"))
-    assert content["verdict"] in ("explained", "unexplained", "no_signal")
-    assert set(content["lack_of_fit"]["tensor_sindy"]) >= {
-        "misfit", "noise", "lag_one_correlation", "probability",
-    }  # fmt: skip
-    page = (out / "report.html").read_text("utf-8")
-    assert "could not be drawn" not in page
-    verdict = content["verdict"].replace("_", " ")
-    assert verdict in ended.output.lower()
+    assert content["verdict"].replace("_", " ") in ended.output.lower()

@@ -76,9 +76,9 @@ def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, o
 
 @pytest.fixture(scope="module")
 def constant():
-    flows = {f"{wi} {de}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}
+    # runs of the same shape as those of `problem`, for which the programs are there
     data = synthetic_dataset(
-        "giesekus", {"alpha": 0.3}, flows, noise=0.005, duration=8.0, n_samples=65
+        "giesekus", {"alpha": 0.3}, FLOWS, noise=0.005, duration=8.0, n_samples=41
     )
     return TBNNUDE(recipe=RECIPE).fit(data.runs)
 

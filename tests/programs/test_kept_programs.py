@@ -109,6 +109,24 @@ def _double(x):
     return 2.0 * x
 
 
+def test_what_a_program_returned_is_taken_by_it_without_compiling_again(folder):
+    built = []
+
+    def listen(event, duration, fun_name=None, **kwargs):
+        if event.endswith("backend_compile_duration") and "_double" in str(fun_name):
+            built.append(fun_name)
+
+    double = compiled(_double, made_from="another test")
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        once = double(jnp.arange(3.0))
+        np.testing.assert_array_equal(double(double(once)), [0.0, 8.0, 16.0])
+        double(np.arange(3.0))
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    assert len(built) == 1
+
+
 def _times(factor):
     return lambda x: factor * x
 
