@@ -2,8 +2,10 @@
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
 
@@ -20,6 +22,21 @@ sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 enable_x64()
 # shared by the workers of one test run, and by the next run
 enable_compilation_cache(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
+
+
+# whole commands and studies, where shapes are checked some hundred thousand times; what they call
+# is checked in the tests of each part
+_END_TO_END = {
+    "test_measured.py", "test_commands.py", "test_contract_script.py", "test_planting.py",
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _shapes(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Check shapes in all files but those of whole commands and studies."""
+    jaxtyping.config.update("jaxtyping_disable", request.path.name in _END_TO_END)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 # files of a minute and more

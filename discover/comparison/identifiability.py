@@ -125,15 +125,22 @@ def find_rivals(
     library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    flows = [*seen, *unseen]
     reference = predictions
     if reference is None:
-        reference = _simulate(chosen.coefficients, chosen.inner, model, [*seen, *unseen])
+        reference = _simulate(chosen.coefficients, chosen.inner, model, flows)
     candidates: dict[frozenset[str], Rival] = {}
-    for twin in find_twins(library, chosen, model.law):
-        if not _concerns_shear(twin, len(chosen.coefficients)):
-            continue
+    twins = find_twins(library, chosen, model.law)
+    twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
+    met = list(met)
+    # all of them in one program, each with zeros for the terms of the others
+    supports = [*(twin.law.coefficients for twin in twins), *(row["support"] for row in met)]
+    names = list(dict.fromkeys(name for support in supports for name in support))
+    for twin in twins:
         beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
-        rival = _judge(_rival_of(twin, beyond if searched else []), reference, model, seen, unseen)
+        rival = _rival_of(twin, beyond if searched else [])
+        predictions = _simulate(rival.terms, rival.inner, model, flows, names)
+        rival = _judge(rival, reference, predictions, seen, unseen)
         if rival is not None and (rival.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
             candidates.setdefault(frozenset(twin.law.coefficients), rival)
     for row in met:
@@ -141,7 +148,8 @@ def find_rivals(
         if frozenset(other) in candidates or len(candidates) >= MOST_RIVALS:
             continue
         reason = row.get("text") or "The data fit it as well within their noise."
-        rival = _judge(Rival(other, row["inner"], reason), reference, model, seen, unseen)
+        predictions = _simulate(other, row["inner"], model, flows, names)
+        rival = _judge(Rival(other, row["inner"], reason), reference, predictions, seen, unseen)
         if rival is not None:
             candidates[frozenset(other)] = rival
     return list(candidates.values())
@@ -172,16 +180,19 @@ def _rival_of(twin: Twin, beyond: Sequence[str]) -> Rival:
     return Rival(twin.law.coefficients, twin.law.inner, reason, separated_by=place)
 
 
-def _simulate(terms, inner, model: DeclaredModel, flows) -> dict[str, Stresses | None]:
+def _simulate(
+    terms, inner, model: DeclaredModel, flows, names: Iterable[str] = ()
+) -> dict[str, Stresses | None]:
+    """Return what a law does in each flow, in a program for all laws of terms of these names."""
+    whole = dict.fromkeys(names or terms, 0.0) | dict(terms)
     law = law_of_terms(
-        list(terms), list(terms.values()), inner, model.law.linear_relaxation, model.law
+        list(whole), list(whole.values()), inner, model.law.linear_relaxation, model.law
     )
     fluid = Fluid(law, model.modulus, model.relaxation_time, model.solvent_viscosity)
     return {flow.key: predict(fluid, flow) for flow in flows}
 
 
-def _judge(rival: Rival, reference, model, seen, unseen) -> Rival | None:
-    predictions = _simulate(rival.terms, rival.inner, model, [*seen, *unseen])
+def _judge(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
     worst: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     separation, place = 0.0, None
     for flow in [*seen, *unseen]:

@@ -2,7 +2,6 @@
 
 from discover.identify.evidence import Evidence, compare_residuals
 from discover.identify.exact_series import Agreement, compare_series, stress_series
-from discover.identify.fitted_twins import fit_twins
 from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.identify.histories import Difference, differences, random_histories
 from discover.identify.laws_side_by_side import LawTerms
@@ -11,7 +10,7 @@ from discover.identify.relations import TermRelation, term_relations
 from discover.identify.rivals import FittedRival, RivalTable, find_rivals
 from discover.identify.separation import Separation, separations
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure, analyse_structure
-from discover.identify.twins import Twin, find_twins, same_in_every_shear
+from discover.identify.twins import Twin, find_twins
 
 __all__ = [
     "Agreement",
@@ -36,10 +35,8 @@ __all__ = [
     "differences",
     "find_rivals",
     "find_twins",
-    "fit_twins",
     "hidden_stresses",
     "random_histories",
-    "same_in_every_shear",
     "separations",
     "stress_series",
     "term_relations",

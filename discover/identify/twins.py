@@ -1,6 +1,6 @@
 """Twins: laws with the same σ12, or σ12 and N1, in every simple-shear history.
 
-Three sources, the first two exact:
+Two sources, both exact:
 
 relations
     Combinations of terms that vanish in shear or live on σ33 (`term_relations`).
@@ -9,8 +9,6 @@ changes of the hidden stresses
     long as σ12 stays. Whether the outcome is again a law of the library is decided in exact
     arithmetic on the Taylor series (`solve_for_coefficient`), and the change itself is read off
     the two series afterwards.
-histories
-    Any other candidate is fitted to a law's σ12 in random shear histories (`fit_twins`).
 
 Every twin is also simulated in random histories before it is reported.
 """
@@ -22,7 +20,6 @@ from typing import Any, Literal
 
 from discover.identify.exact_series import (
     DEFAULT_ORDER,
-    compare_series,
     hidden_change,
     solve_for_coefficient,
 )
@@ -265,27 +262,3 @@ def _added(law: LawTerms, relation: Mapping[str, int], factor: float) -> LawTerm
         total[name] = total.get(name, 0.0) + factor * value
     # what cancels, cancels exactly: the factor was made from the same coefficient
     return LawTerms({n: v for n, v in total.items() if abs(v) > 1e-14}, law.inner)
-
-
-def same_in_every_shear(
-    first: LawTerms, second: LawTerms, order: int = DEFAULT_ORDER
-) -> tuple[bool, bool, bool]:
-    """Return whether σ12, N1 and N2 of two polynomial laws agree in every history, by series.
-
-    Parameters
-    ----------
-    first, second
-        Laws beyond UCM. Coefficients are taken as the nearest fractions with denominators up to
-        100,000.
-    order
-        Of the Taylor series.
-    """
-    exact = [
-        {
-            n: Fraction(v).limit_denominator(_LARGEST_DENOMINATOR)
-            for n, v in law.coefficients.items()
-        }
-        for law in (first, second)
-    ]
-    agreement = compare_series(exact[0], exact[1], order)
-    return agreement.sigma12 is None, agreement.N1 is None, agreement.N2 is None

@@ -9,7 +9,7 @@ import pytest
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
 from discover.comparison.explanation import Explanation
-from discover.comparison.flows import comparison_flows
+from discover.comparison.flows import comparison_flows, predict
 from discover.comparison.identifiability import find_rivals
 from discover.comparison.statements import make_statements
 from discover.comparison.truth import true_terms
@@ -153,6 +153,32 @@ def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     # N1 is the same in both laws, but nothing says that the fluid is either
     assert [s.quantity for s in statements if s.undetermined] == ["N2", "N1"]
     assert "Checked by simulation" in statements[0].text
+
+
+def test_rivals_of_other_terms_are_simulated_in_one_program(slip_case, monkeypatch):
+    model, flows = slip_case
+    chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
+    exponential = "(exp(epsilon*tr(sigma))-1)*sigma"
+    met = [
+        {"support": ["sigma.sigma"], "coefficients": [0.3], "inner": {}},
+        {"support": [exponential], "coefficients": [1.0], "inner": {"epsilon": 0.2}},
+    ]
+    simulated = []
+
+    def watched(fluid, flow):
+        simulated.append((fluid, flow, predict(fluid, flow)))
+        return simulated[-1][-1]
+
+    monkeypatch.setattr("discover.comparison.identifiability.predict", watched)
+    known = {flow.key: predict(model.fluid, flow) for flow in flows}
+    rivals = find_rivals(chosen, met, model, flows, build_library(degree=0), known)
+    assert {frozenset(r.terms) for r in rivals} >= {frozenset(row["support"]) for row in met}
+    assert len({fluid.law.library for fluid, _, _ in simulated}) == 1
+    # the zeros for the others' terms change nothing
+    _, flow, together = simulated[-1]
+    law = law_of_terms([exponential], [1.0], {"epsilon": 0.2}, True, model.law)
+    alone = predict(Fluid(law, model.modulus, model.relaxation_time), flow)
+    np.testing.assert_allclose(together["N1"], alone["N1"], rtol=1e-9, atol=1e-9)
 
 
 def test_a_pair_on_33_is_no_rival_where_the_trace_feels_it(slip_case):

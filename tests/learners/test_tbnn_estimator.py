@@ -10,9 +10,8 @@ from sklearn.model_selection import KFold, cross_val_score
 import tensor_library as tl
 from discover.dataset.run import ShearRun
 from discover.errors import InputError
-from discover.laws import Fluid, Giesekus, TensorBasisNetwork, UpperConvectedMaxwell
-from discover.learners.distillation import MaxwellSurrogate
-from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe, load_law, save_law
+from discover.laws import Fluid, Giesekus
+from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe
 from discover.learners.tbnn_ude.prior import sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.projection import project
@@ -157,40 +156,3 @@ def test_projection_finds_the_two_tensors_of_a_known_network(cloud):
 
 def test_projection_of_nothing_is_nothing(cloud):
     assert project(constant_law(np.zeros(8)), cloud, tl.build_library(degree=1)).library is None
-
-
-def test_a_stored_network_comes_back_the_same(tmp_path):
-    law = initial_law(jax.random.key(4), 6, False, jnp.arange(1.0, 9.0))
-    save_law(law, tmp_path / "law.net")
-    back = load_law(tmp_path / "law.net")
-    assert isinstance(back, TensorBasisNetwork)
-    assert back.linear_relaxation is False
-    for one, two in zip(jax.tree.leaves(law), jax.tree.leaves(back), strict=True):
-        np.testing.assert_array_equal(one, two)
-
-
-@pytest.mark.parametrize("base", [Giesekus(0.1), UpperConvectedMaxwell(), "network"])
-def test_a_stored_network_keeps_the_law_beneath_it(tmp_path, base):
-    if base == "network":
-        base = initial_law(jax.random.key(5), 3, True, jnp.ones(8), Giesekus(0.3))
-    law = initial_law(jax.random.key(4), 6, True, jnp.ones(8), base)
-    save_law(law, tmp_path / "law.net")
-    back = load_law(tmp_path / "law.net")
-    assert jax.tree.structure(back) == jax.tree.structure(law)
-    for one, two in zip(jax.tree.leaves(law), jax.tree.leaves(back), strict=True):
-        np.testing.assert_array_equal(one, two)
-
-
-def test_a_base_law_without_a_name_is_not_stored(tmp_path):
-    base = MaxwellSurrogate(1.0, 1.0)
-    with pytest.raises(InputError, match="on top of MaxwellSurrogate cannot be stored"):
-        save_law(initial_law(jax.random.key(4), 6, True, jnp.ones(8), base), tmp_path / "law.net")
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("content", [b"", b"{}\n", b"not json", b'{"format": 3}\nxx'])
-def test_another_file_is_refused_and_never_unpickled(tmp_path, content):
-    path = tmp_path / "law.net"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match="does not hold a trained network"):
-        load_law(path)

@@ -3,6 +3,5 @@
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tbnn_ude.recipe_default import DefaultRecipe
 from discover.learners.tbnn_ude.recipe_paper import PaperRecipe
-from discover.learners.tbnn_ude.storage import load_law, save_law
 
-__all__ = ["TBNNUDE", "DefaultRecipe", "PaperRecipe", "load_law", "save_law"]
+__all__ = ["TBNNUDE", "DefaultRecipe", "PaperRecipe"]
