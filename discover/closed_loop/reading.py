@@ -10,6 +10,7 @@ from scipy.stats import permutation_test, rankdata
 
 from discover.closed_loop.run_record import RunRecord
 from discover.closed_loop.waves import Wave, oscillation, read_wave
+from discover.protocols.kinematics import KINDS
 
 _BINS = 24
 _DECADES = 30.0
@@ -176,6 +177,9 @@ def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
     model
         Which prediction: 0 for the declared model, −1 for the augmented one.
     """
+    # strains, rates and stresses of a shear and of an extension have no scale in common
+    commonest = max(KINDS, key=lambda kind: sum(r.flow == kind for r in records))
+    records = [r for r in records if r.flow == commonest]
     waves = tuple(w for r in records if (w := read_wave(r, model)) is not None)
     return Reading(_collapses(records, model), _trends(records, model), waves)
 

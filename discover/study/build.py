@@ -1,5 +1,6 @@
 """From a study to its data, its split and its declared fluid."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,8 +118,8 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out
+    named, fit_names = _by_observation(dataset, data.observe, named, data.fit)
     held_out = dataset.select(named)
-    fit_names = data.fit or tuple(name for name in dataset.names if name not in named)
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
     if each and len(fit_names) < 2:
@@ -129,6 +130,29 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     fit = dataset.select(fit_names)
     require_signal(fit.runs)
     return StudyData(dataset, fit, held_out, each)
+
+
+def _by_observation(
+    dataset: ShearDataset,
+    observe: Sequence[str] | None,
+    held_out: Sequence[str],
+    fit: Sequence[str] | None,
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the runs held out and those fitted; what is recorded and not observed only judges."""
+    judges = [
+        run.name
+        for run in dataset
+        if observe is not None
+        and ("sigma12" if run.flow == "shear" else "tensile_stress") not in observe
+    ]
+    both = [name for name in judges if name in (fit or ())]
+    if both:
+        raise InputError(
+            f"[data] fit names {both[0]!r}, whose stress is not in observe = "
+            f"{list(observe or ())}. Leave the run out of fit, or add its stress to observe."
+        )
+    held_out = (*held_out, *(name for name in judges if name not in held_out))
+    return held_out, tuple(fit or (name for name in dataset.names if name not in held_out))
 
 
 def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:

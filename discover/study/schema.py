@@ -66,12 +66,15 @@ class Data(Section):
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
     rate_before: str | None = None
+    observe: tuple[Literal["sigma12", "tensile_stress"], ...] | None = None
     sequence: str | None = None
 
     @model_validator(mode="after")
     def _one_source(self):
         if (self.folder is None) == (self.synthetic is None):
             raise ValueError('write either folder = "..." or synthetic = {...}, not both or none')
+        if self.observe == ():
+            raise ValueError("observe must name what is fitted; leave it out to fit every stress")
         if self.fit == ():
             raise ValueError("fit names no run; name some, or leave it out to fit all not held out")
         both = set(self.fit or ()) & set(() if self.held_out == "each" else self.held_out)

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from independent.homogeneous import UNIT, GiesekusFluid
 
 from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.declared import DeclaredModel
@@ -27,42 +27,11 @@ from discover.simulate import make_grids, simulate, solve_batch
 
 MODULUS, TIME, SOLVENT, MOBILITY = np.array([100.0, 20.0]), np.array([0.2, 3.0]), 5.0, 0.3
 TIMES = np.linspace(0.05, 4.0, 30)
-# L at unit rate, and the tensor component that is recorded, written by hand
-UNIT = {
-    "shear": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
-    "uniaxial": np.diag([1.0, -0.5, -0.5]),
-    "planar": np.diag([1.0, -1.0, 0.0]),
-    "biaxial": np.diag([1.0, -2.0, 1.0]),
-}
+BY_SCIPY = GiesekusFluid((100.0, 20.0), (0.2, 3.0), MOBILITY, SOLVENT)
 
 
 def fluid():
     return Fluid(make_law("giesekus", {"alpha": MOBILITY}), MODULUS, TIME, SOLVENT)
-
-
-def recorded_by_scipy(kind, rate, times, begins=0.0, jumps=()):
-    """Return the recorded stress of a two-mode Giesekus fluid with solvent, in Pa."""
-
-    def slope(t, y):
-        gradient = UNIT[kind] * rate(t)
-        out = []
-        for stress, modulus, time in zip(y.reshape(2, 3, 3), MODULUS, TIME, strict=True):
-            change = modulus * (gradient + gradient.T) + gradient @ stress + stress @ gradient.T
-            out.append(change - stress / time - MOBILITY / modulus / time * stress @ stress)
-        return np.ravel(out)
-
-    y, t, found = np.zeros(18), begins, {}
-    for end in [*sorted(jumps), times[-1]]:
-        inside = times[(times > t) & (times <= end)]
-        solution = solve_ivp(
-            slope, (t, end), y, t_eval=np.unique([*inside, end]), rtol=1e-9, atol=1e-9
-        )
-        found |= dict(zip(solution.t, solution.y.T, strict=True))
-        y, t = solution.y[:, -1], end
-    total = np.array([found[t].reshape(2, 3, 3).sum(axis=0) for t in times])
-    gradients = np.array([UNIT[kind] * rate(t) for t in times])
-    total = total + SOLVENT * (gradients + np.swapaxes(gradients, 1, 2))
-    return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
 
 
 def in_the_loop(protocols, times=TIMES):
@@ -81,7 +50,7 @@ def in_the_loop(protocols, times=TIMES):
 @pytest.mark.parametrize("kind", ["uniaxial", "planar", "biaxial"])
 def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     protocol = in_flow(start_up(0.6), kind)
-    exact = recorded_by_scipy(kind, lambda _: 0.6, TIMES)
+    exact = BY_SCIPY.recorded(kind, lambda _: 0.6, TIMES)
     adaptive = recorded_at(protocol, simulate(fluid(), protocol, TIMES).components)
     grids = make_grids([protocol], [TIMES])
     fixed = np.asarray(solve_batch(fluid(), stack_protocols([protocol]), grids))[0]
@@ -103,7 +72,7 @@ def test_relaxation_after_a_step_of_strain_is_that_of_scipy():
     held = after_step_strain(start_up(0.0), 2.0, TIMES[0])
     begins, length = float(held.begins), -float(held.begins)
     assert length < 2e-3 * TIMES[0]
-    exact = recorded_by_scipy(
+    exact = BY_SCIPY.recorded(
         "shear", lambda t: 2.0 / length if t < 0.0 else 0.0, TIMES, begins, jumps=[0.0]
     )
     found = recorded_at(held, simulate(fluid(), held, TIMES).components)

@@ -1,0 +1,82 @@
+"""A fluid of several modes in any homogeneous flow, on full tensors, by scipy.
+
+The material here shares nothing with the laws, the algebra or the integrator of the package.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+# Velocity gradients at unit rate, written out   [Bird, Armstrong & Hassager 1987, section 3.1]
+UNIT = {
+    "shear": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
+    "uniaxial": np.diag([1.0, -0.5, -0.5]),
+    "planar": np.diag([1.0, -1.0, 0.0]),
+    "biaxial": np.diag([1.0, -2.0, 1.0]),
+}
+
+
+@dataclass(frozen=True)
+class GiesekusFluid:
+    """Giesekus modes with one mobility, and a solvent   [Giesekus 1982, JNNFM 11, 69].
+
+    Attributes
+    ----------
+    modulus, relaxation_time
+        Of each mode, in Pa and s.
+    mobility
+        α of every mode; 0 is upper convected Maxwell.
+    solvent_viscosity
+        In Pa s.
+    """
+
+    modulus: tuple[float, ...]
+    relaxation_time: tuple[float, ...]
+    mobility: float
+    solvent_viscosity: float = 0.0
+
+    def recorded(
+        self,
+        kind: str,
+        rate: Callable[[float], float],
+        times: np.ndarray,
+        begins: float = 0.0,
+        jumps: Sequence[float] = (),
+    ) -> np.ndarray:
+        """Return σ12 in shear, σ11 − σ22 in extension, in Pa.
+
+        Parameters
+        ----------
+        kind
+            One of `UNIT`.
+        rate
+            In 1/s, of time in s.
+        times
+            Increasing, after `begins`, when the fluid is at rest.
+        jumps
+            Times at which the rate jumps.
+        """
+        modes = len(self.modulus)
+
+        def slope(t, y):
+            gradient = UNIT[kind] * rate(t)
+            out = []
+            for stress, modulus, time in zip(
+                y.reshape(modes, 3, 3), self.modulus, self.relaxation_time, strict=True
+            ):
+                made = modulus * (gradient + gradient.T) + gradient @ stress + stress @ gradient.T
+                out.append(made - (stress + self.mobility / modulus * stress @ stress) / time)
+            return np.ravel(out)
+
+        y, t, found = np.zeros(9 * modes), begins, {}
+        for end in [*sorted(jumps), times[-1]]:
+            inside = np.unique([*times[(times > t) & (times <= end)], end])
+            solution = solve_ivp(slope, (t, end), y, t_eval=inside, rtol=1e-9, atol=1e-9)
+            found |= dict(zip(solution.t, solution.y.T, strict=True))
+            y, t = solution.y[:, -1], end
+        total = np.array([found[t].reshape(modes, 3, 3).sum(axis=0) for t in times])
+        gradients = np.array([UNIT[kind] * rate(t) for t in times])
+        total = total + self.solvent_viscosity * (gradients + np.swapaxes(gradients, 1, 2))
+        return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
