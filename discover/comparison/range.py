@@ -26,12 +26,15 @@ class Placement:
         oscillate, for a step of the rate excites every frequency.
     new_flow
         Which flow it is, where no fitted one is of that kind; empty otherwise.
+    rate_name
+        What the rate is called in this flow.
     """
 
     rate: float
     strain: float
     frequency: float | None
     new_flow: str = ""
+    rate_name: str = "shear rate"
 
     @property
     def inside(self) -> bool:
@@ -42,7 +45,7 @@ class Placement:
     def beyond(self) -> dict[str, float]:
         """What exceeds the fitted flows, by which factor."""
         factors = {
-            "shear rate": self.rate,
+            self.rate_name: self.rate,
             "strain": self.strain,
             "frequency": self.frequency or 0.0,
         }
@@ -87,6 +90,7 @@ def place(flow: Flow, training: Sequence[Flow]) -> Placement:
         _ratio(_largest(flow.strain), [_largest(f.strain) for f in alike or training]),
         _ratio(flow.frequency or 0.0, frequencies) if oscillates else None,
         "" if alike else kind,
+        "shear rate" if kind == "shear" else "Hencky rate",
     )
 
 

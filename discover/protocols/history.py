@@ -9,8 +9,9 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.protocols.shear import ShearProtocol
 
-STEADY_LENGTH = 2.0
-"""A steady flow before a run is computed over this multiple of the run's length."""
+STEADY_LENGTH = 20.0
+"""A steady flow before a run is computed over this multiple of the run's length, at most: what
+relaxes in the time of the run has become steady by then."""
 
 STEADY_STRAIN = 300.0
 """Strain after which any fluid is taken to be steady."""

@@ -4,6 +4,7 @@ All of them share their principal third axis, so that the stress has four compon
 12, and the velocity gradient the same four. A rate times a fixed gradient is the whole flow.
 """
 
+from collections.abc import Iterable
 from typing import Literal
 
 import equinox as eqx
@@ -84,4 +85,12 @@ def kinematics_of(kind: str) -> Kinematics:
     intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
     return Kinematics(
         *(jnp.asarray(part) for part in (gradient, recorded, intensity, recorded @ rate))
+    )
+
+
+def recorded_quantity(kinds: Iterable[str]) -> str:
+    """Return in words what is recorded in flows of these kinds."""
+    shear = {kind == "shear" for kind in kinds}
+    return " and ".join(
+        name for name, here in (("σ12", True in shear), ("tensile stress", False in shear)) if here
     )

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
+from discover.protocols.kinematics import recorded_quantity
 from discover.report import comparison_tables as tables
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
@@ -120,7 +121,13 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
 
     def errors() -> Content:
         titles = ["before", *(learner_title(name) for name in comparison.outcomes)]
-        return {"columns": titles, "error_rows": tables.error_rows(comparison)}
+        flows = (*comparison.flows_of("training"), *comparison.judged)
+        return {
+            "columns": titles,
+            "error_rows": tables.error_rows(comparison),
+            "recorded": recorded_quantity(f.protocol.flow for f in comparison.flows_of("training")),
+            "extension": not all(flow.in_shear for flow in flows),
+        }
 
     def classical() -> Content | None:
         rows = tables.law_rows(comparison) if comparison.classical else []

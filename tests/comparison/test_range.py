@@ -1,11 +1,13 @@
 """Inside the fitted range or beyond it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from discover.comparison.flows import Flow
 from discover.comparison.range import place
-from discover.protocols.shear import oscillatory_shear, start_up
+from discover.protocols.shear import in_flow, oscillatory_shear, start_up
 
 TIME = np.linspace(0.0, 20.0, 201)
 
@@ -49,3 +51,17 @@ def test_a_step_of_the_rate_excites_every_frequency():
 def test_runs_at_rest_leave_every_flow_beyond():
     placed = place(started(1.0), [started(0.0)])
     assert set(placed.beyond) == {"shear rate", "strain"}
+
+
+def test_an_extension_is_beyond_wherever_only_shear_was_fitted():
+    pull = replace(started(0.1), protocol=in_flow(start_up(0.1), "uniaxial"))
+    placed = place(pull, [started(2.0)])
+    assert not placed.inside
+    assert placed.text == (
+        "beyond the fitted range: uniaxial extension, of which nothing was fitted"
+    )
+    assert placed.to_json()["new_flow"] == "uniaxial"
+    # among extensions of its own kind it is held against those, whatever the shear was
+    faster = replace(started(0.3), protocol=in_flow(start_up(0.3), "uniaxial"))
+    assert place(pull, [started(0.01), faster]).inside
+    assert place(faster, [started(9.0), pull]).beyond["Hencky rate"] == pytest.approx(3.0)

@@ -12,7 +12,7 @@ from discover.comparison.flows import Flow
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.identify.bands import PredictionBand
-from discover.protocols.shear import oscillatory_shear
+from discover.protocols.shear import in_flow, oscillatory_shear
 from discover.report.predictions import (
     COLUMNS,
     comparison_predictions,
@@ -120,3 +120,18 @@ def test_a_law_that_runs_away_has_no_line_and_spoils_no_other(missing):
         del predictions[flows[1].key]
     table = comparison_predictions(comparison(flows, predictions))
     assert set(table["role"]) == {"fit"}
+
+
+def test_what_is_recorded_in_extension_is_called_a_tensile_stress():
+    pull = replace(record("pull.csv", False, 1), flow="uniaxial")
+    nothing = ErrorPair(0.0, 0.0)
+    result = LoopResult("no_effect_needed", nothing, nothing, 0.0, (), {}, (), (pull,))
+    assert set(loop_predictions(result)["quantity"]) == {"tensile_stress"}
+    shear = flow("held_out", False)
+    stretched = replace(
+        shear, name="pull.csv", protocol=in_flow(oscillatory_shear(1.0, 1.0), "uniaxial")
+    )
+    flows = (shear, stretched)
+    table = comparison_predictions(comparison(flows, of(flows)))
+    kinds = {name: set(rows["quantity"]) for name, rows in table.groupby("run")}
+    assert kinds == {"held_out.csv": {"sigma12", "N1", "N2"}, "pull.csv": {"tensile_stress"}}

@@ -92,6 +92,17 @@ def test_a_step_of_strain_at_once_leaves_the_elastic_stress_of_maxwell():
     )
 
 
+def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learners():
+    run = ShearRun("down", TIMES, start_up(0.2), np.full(30, 0.2), np.ones(30), rate_before=2.0)
+    exact = BY_SCIPY.recorded(
+        "shear", lambda t: 2.0 if t < 0.0 else 0.2, TIMES, begins=-40.0, jumps=[0.0]
+    )
+    grids = make_grids([run.protocol], [TIMES])
+    found = np.asarray(solve_batch(fluid(), stack_protocols([run.protocol]), grids))[0]
+    # the flow before is followed for 80 s, 27 relaxation times; the grid is good to 1e-5
+    np.testing.assert_allclose(recorded_at(run.protocol, found), exact, rtol=2e-5)
+
+
 @pytest.mark.parametrize("sampled", [False, True])
 def test_an_oscillation_that_had_gone_on_is_periodic_from_its_first_sample(sampled):
     period = 2.0 * np.pi / 2.0

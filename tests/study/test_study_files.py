@@ -202,3 +202,31 @@ def test_a_file_in_place_of_the_result_folder_is_an_input_error(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(InputError, match="is a file"):
         RunFolder(tmp_path / "out", "one")
+
+
+def with_an_extension(path):
+    made = make_folder(path)
+    index = (made / "runs.csv").read_text().splitlines()
+    (made / "runs.csv").write_text("\n".join([f"{index[0]},flow", *(f"{n}," for n in index[1:])]))
+    with (made / "runs.csv").open("a") as file:
+        file.write("\npull.csv,uniaxial\n")
+    rows = [f"{t},0.5,{t}" for t in np.linspace(0.1, 2.0, 15)]
+    (made / "pull.csv").write_text("\n".join(["time_s,hencky_rate_1_s,tensile_stress_Pa", *rows]))
+    return made
+
+
+def test_a_stress_that_is_not_observed_judges(tmp_path):
+    folder = str(with_an_extension(tmp_path / "melt"))
+    both = load_study_data(parse_study({"data": {"folder": folder}}))
+    assert both.fit.names == ("r0.csv", "r1.csv", "pull.csv")
+    shear = load_study_data(parse_study({"data": {"folder": folder, "observe": ["sigma12"]}}))
+    assert shear.fit.names == ("r0.csv", "r1.csv")
+    assert shear.held_out.names == ("pull.csv",)
+    pulled = {"folder": folder, "observe": ["tensile_stress"], "held_out": ["r0.csv"]}
+    assert load_study_data(parse_study({"data": pulled})).held_out.names == ("r0.csv", "r1.csv")
+
+
+def test_a_run_cannot_be_fitted_whose_stress_is_not_observed(tmp_path):
+    data = {"folder": str(with_an_extension(tmp_path / "melt")), "observe": ["sigma12"]}
+    with pytest.raises(InputError, match=r"pull\.csv.*not in observe"):
+        load_study_data(parse_study({"data": data | {"fit": ["pull.csv"]}}))

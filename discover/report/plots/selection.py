@@ -60,7 +60,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
                 linestyle="--",
                 label="runs left out",
             )
-        left.set_ylabel("misfit of σ₁₂ (%)")
+        left.set_ylabel("misfit (%)")
         make_percentage(left.yaxis)
         bic = np.array([row["bic"] for row in path], dtype=float)
         if np.any(np.isfinite(bic)):
