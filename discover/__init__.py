@@ -39,11 +39,14 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.protocols import start_up as start_up
     from discover.protocols import step_rates as step_rates
     from discover.simulate import synthetic_dataset as synthetic_dataset
+    from tensor_library import ClosedForm as ClosedForm
     from tensor_library import build_library as build_library
+    from tensor_library import register_closed_form as register_closed_form
 
 __all__ = [
     "TBNNUDE",
     "AbstractConstitutiveLaw",
+    "ClosedForm",
     "Fluid",
     "InputError",
     "LinearSweep",
@@ -61,6 +64,7 @@ __all__ = [
     "make_law",
     "measured_rate",
     "oscillatory_shear",
+    "register_closed_form",
     "register_effect",
     "register_importer",
     "register_law",
@@ -91,7 +95,7 @@ _PLACES = {
     "discover.learners.tensor_sindy": ("TensorSINDy",),
     "discover.protocols": ("measured_rate", "oscillatory_shear", "start_up", "step_rates"),
     "discover.simulate": ("synthetic_dataset",),
-    "tensor_library": ("build_library",),
+    "tensor_library": ("ClosedForm", "build_library", "register_closed_form"),
 }
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 

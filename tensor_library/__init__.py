@@ -9,6 +9,7 @@ from tensor_library.algebra import (
     to_shear,
     trace,
 )
+from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm, register_closed_form
 from tensor_library.conventions import SHEAR_COMPONENTS
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import INVARIANT_NAMES, scalar_invariants
@@ -23,10 +24,12 @@ from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import CandidateTerm, TermShare, parse_term
 
 __all__ = [
+    "CLOSED_FORMS",
     "INVARIANT_NAMES",
     "SHEAR_COMPONENTS",
     "TENSOR_NAMES",
     "CandidateTerm",
+    "ClosedForm",
     "TermLibrary",
     "TermShare",
     "anticommutator",
@@ -38,6 +41,7 @@ __all__ = [
     "parse_term",
     "planar_extension",
     "rate_of_deformation",
+    "register_closed_form",
     "scalar_invariants",
     "simple_shear",
     "square",

@@ -2,14 +2,22 @@
 
 Each has one inner parameter, which enters nonlinearly and so is fitted apart from the
 coefficients. All vanish at zero stress, so that a term keeps the small-strain limit of the law
-it is added to.
+it is added to. Forms of a user's own are registered (see docs/adding-a-term.md).
 """
 
-from collections.abc import Callable, Mapping
+import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from tensor_library.registry import Registry
+
+if TYPE_CHECKING:
+    import sympy
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,9 @@ class ClosedForm:
         Number of operations, as a measure of how much the form costs in model selection.
     source
         Where the form comes from.
+    expression
+        The same as `function`, of SymPy symbols: from it the form is written in any notation. None
+        for a form that is built in, which every notation knows.
     """
 
     name: str
@@ -40,6 +51,7 @@ class ClosedForm:
     function: Callable[[Float[Array, ""], Float[Array, ""]], Float[Array, ""]]
     complexity: int
     source: str
+    expression: "Callable[[Any, Any], sympy.Expr] | None" = None
 
 
 def _exponential(trace_of_stress: Float[Array, ""], inner: Float[Array, ""]) -> Float[Array, ""]:
@@ -52,28 +64,92 @@ def _saturating(trace_of_stress: Float[Array, ""], inner: Float[Array, ""]) -> F
     return trace_of_stress / (1.0 + inner * jnp.abs(trace_of_stress))
 
 
-CLOSED_FORMS: Mapping[str, ClosedForm] = {
-    form.name: form
-    for form in (
-        ClosedForm(
-            "exp",
-            "(exp(epsilon*tr(sigma))-1)",
-            "epsilon",
-            0.25,
-            (1e-4, 2.0),
-            _exponential,
-            3,
-            "Phan-Thien 1978, J. Rheol. 22, 259",
-        ),
-        ClosedForm(
-            "saturating",
-            "(tr(sigma)/(1+kappa*abs(tr(sigma))))",
-            "kappa",
-            0.1,
-            (1e-4, 10.0),
-            _saturating,
-            4,
-            "first Padé form of a coefficient that levels off",
-        ),
-    )
-}
+_BUILT_IN = (
+    ClosedForm(
+        "exp",
+        "(exp(epsilon*tr(sigma))-1)",
+        "epsilon",
+        0.25,
+        (1e-4, 2.0),
+        _exponential,
+        3,
+        "Phan-Thien 1978, J. Rheol. 22, 259",
+    ),
+    ClosedForm(
+        "saturating",
+        "(tr(sigma)/(1+kappa*abs(tr(sigma))))",
+        "kappa",
+        0.1,
+        (1e-4, 10.0),
+        _saturating,
+        4,
+        "first Padé form of a coefficient that levels off",
+    ),
+)
+
+CLOSED_FORMS: Registry[ClosedForm] = Registry(
+    "closed form", "discover.terms", lambda: {form.name: form for form in _BUILT_IN}
+)
+"""Closed forms by name; a package's own by entry points of this group."""
+
+_TRACES = (-0.5, 0.3, 1.0, 2.0)
+_SPELLING = re.compile(r"\([a-z0-9_+\-*/^().]*tr\(sigma\)[a-z0-9_+\-*/^().]*\)")
+
+
+def register_closed_form(form: ClosedForm) -> ClosedForm:
+    """Make a closed form of one's own known to libraries, studies and exports in this process.
+
+    An installed package does so in every process: see docs/adding-a-term.md.
+
+    Parameters
+    ----------
+    form
+        With its `expression`.
+
+    Returns
+    -------
+    The form.
+
+    Raises
+    ------
+    ValueError
+        If its name, spelling or inner parameter is taken or cannot be written, its default is out
+        of bounds, it does not vanish at zero stress, or `function` and `expression` differ.
+    """
+    known = CLOSED_FORMS.present
+    for what, text in (("name", form.name), ("inner_name", form.inner_name)):
+        if not text.isidentifier() or text != text.lower():
+            raise ValueError(
+                f"The {what} of a closed form must be lower-case letters, digits and underscores; "
+                f"got {text!r}."
+            )
+        if text in [getattr(other, what) for other in known.values()]:
+            raise ValueError(f"The {what} {text!r} of a closed form is taken. Choose another.")
+    if not _SPELLING.fullmatch(form.spelling) or form.spelling in [
+        other.spelling for other in known.values()
+    ]:
+        raise ValueError(
+            f"The spelling {form.spelling!r} must be new, in brackets, of lower-case letters, "
+            "numbers and operators without spaces, and hold tr(sigma)."
+        )
+    low, high = form.inner_bounds
+    if not low <= form.inner_default <= high:
+        raise ValueError(
+            f"The default {form.inner_default:g} of {form.inner_name} must be from {low:g} to "
+            f"{high:g}."
+        )
+    if form.expression is None:
+        raise ValueError(f"The closed form {form.name!r} needs its expression in SymPy.")
+    inner = form.inner_default
+    if abs(float(form.function(jnp.asarray(0.0), jnp.asarray(inner)))) > 1e-12:
+        raise ValueError(f"The closed form {form.name!r} must vanish at zero stress.")
+    for trace in _TRACES:
+        one = float(form.function(jnp.asarray(trace), jnp.asarray(inner)))
+        other = float(form.expression(trace, inner))
+        if not math.isclose(one, other, rel_tol=1e-6):
+            raise ValueError(
+                f"function and expression of the closed form {form.name!r} must agree; at a trace "
+                f"of {trace:g} they are {one:.6g} and {other:.6g}."
+            )
+    CLOSED_FORMS[form.name] = form
+    return form

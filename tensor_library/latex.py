@@ -1,8 +1,9 @@
 r"""Terms as LaTeX: bold tensors, centred dots for contractions, ``\operatorname{tr}``."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from tensor_library.notation import Notation
+from tensor_library.notation import Notation, greek_letter, printed
 
 _TENSORS = {
     "I": r"\boldsymbol{I}",
@@ -49,8 +50,8 @@ class LatexNotation(Notation[str]):
         return _bracketed(text) if text.startswith("-") else text
 
     def letter(self, name: str) -> str:
-        """Return a Greek letter."""
-        return rf"\{name}"
+        """Return a Greek letter, or the name in upright letters."""
+        return rf"\{name}" if greek_letter(name) else rf"\mathrm{{{name}}}"
 
     def exponential(self, rate: str, trace: str) -> str:
         """Return the bracketed exponential minus one."""
@@ -59,6 +60,14 @@ class LatexNotation(Notation[str]):
     def saturating(self, level: str, trace: str) -> str:
         """Return a fraction."""
         return rf"\frac{{{trace}}}{{1 + {level} \, \left|{trace}\right|}}"
+
+    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
+        """Return the expression as SymPy typesets it, bracketed where it is a sum."""
+        import sympy
+
+        number = _bracketed(parameter) if " " in parameter else parameter
+        text, brackets = printed(expression, _bracketed(trace), number, sympy.latex)
+        return _bracketed(text) if brackets else text
 
     def product(self, factors: Sequence[str]) -> str:
         """Return the factors with thin spaces between them."""

@@ -4,9 +4,10 @@
 brackets. A notation only says how it writes a tensor, a product or a bracket.
 """
 
+import unicodedata
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import Generic, TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
@@ -51,5 +52,51 @@ class Notation(ABC, Generic[T]):
         """Return trace/(1 + level |trace|), as a factor."""
 
     @abstractmethod
+    def function(self, expression: Callable[[Any, Any], Any], trace: T, parameter: T) -> T:
+        """Return a closed form of a user's own, given as a SymPy expression, as a factor."""
+
+    @abstractmethod
     def product(self, factors: Sequence[T]) -> T:
         """Return scalars times one tensor, in this order."""
+
+
+def printed(
+    expression: Callable[[Any, Any], Any],
+    trace: str,
+    parameter: str,
+    printer: Callable[[Any], str],
+    placeholder: str = "{}",
+) -> tuple[str, bool]:
+    """Return an expression as a printer of SymPy writes it, with given texts for its two symbols.
+
+    Parameters
+    ----------
+    expression
+        Of the trace of the stress and the inner parameter.
+    trace, parameter
+        What stands for them.
+    printer
+        Takes an expression and returns text.
+    placeholder
+        How the printer writes a symbol, with ``{}`` for its name.
+
+    Returns
+    -------
+    The text, and whether it needs brackets to be a factor.
+    """
+    import sympy
+
+    symbols = sympy.symbols("traceofstress innerparameter", real=True)
+    found = sympy.sympify(expression(*symbols))
+    text = printer(found)
+    for symbol, instead in zip(symbols, (trace, parameter), strict=True):
+        text = text.replace(placeholder.format(symbol.name), instead)
+    return text, found.is_Add or found.could_extract_minus_sign()
+
+
+def greek_letter(name: str) -> str | None:
+    """Return the small Greek letter of this name, or None."""
+    try:
+        return unicodedata.lookup(f"GREEK SMALL LETTER {name.replace('lambda', 'lamda')}")
+    except KeyError:
+        return None

@@ -1,6 +1,7 @@
 """Terms as SymPy expressions over non-commuting tensors."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import sympy
 
@@ -64,6 +65,12 @@ class SympyNotation(Notation[sympy.Expr]):
     def saturating(self, level: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
         """Return trace/(1 + level |trace|)."""
         return trace / (1 + level * sympy.Abs(trace))
+
+    def function(
+        self, expression: Callable[[Any, Any], Any], trace: sympy.Expr, parameter: sympy.Expr
+    ) -> sympy.Expr:
+        """Return the expression."""
+        return sympy.sympify(expression(trace, parameter))
 
     def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
         """Return the product."""

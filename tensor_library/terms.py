@@ -58,6 +58,11 @@ class CandidateTerm:
         return None if self.closed_form is None else CLOSED_FORMS[self.closed_form]
 
     @property
+    def told_beside_fields(self) -> tuple:
+        """What a compiled program depends on beside the fields: a name is not its function."""
+        return () if self.form is None else (self.form.function,)
+
+    @property
     def degree(self) -> int:
         """Total degree in the invariants."""
         return sum(self.powers)
@@ -135,11 +140,12 @@ class CandidateTerm:
             name = self.form.inner_name
             known = name in (inner or {})
             parameter = notation.number((inner or {})[name]) if known else notation.letter(name)
-            forms = {"exp": notation.exponential, "saturating": notation.saturating}
-            if self.closed_form not in forms:
-                raise ValueError(f"The closed form {self.closed_form!r} cannot be written out.")
             trace = notation.trace(notation.tensor("sigma"))
-            factors.append(forms[self.closed_form](parameter, trace))
+            if self.form.expression is not None:
+                factors.append(notation.function(self.form.expression, trace, parameter))
+            else:
+                built_in = {"exp": notation.exponential, "saturating": notation.saturating}
+                factors.append(built_in[self.form.name](parameter, trace))
         for name, power in zip(INVARIANT_NAMES, self.powers, strict=True):
             if power:
                 trace = notation.trace(_contraction(name[len("tr(") : -1], notation))

@@ -5,12 +5,13 @@ it except in comments. Matrices of numpy and of SymPy share ``@`` and ``trace()`
 serves both.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.latex_file import header_lines
 from discover.equations.term import EquationTerm
-from tensor_library.notation import Notation
+from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
 
@@ -45,6 +46,12 @@ class _CodeNotation(Notation[str]):
     def saturating(self, level: str, trace: str) -> str:
         return f"({trace} / (1 + {level} * abs({trace})))"
 
+    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
+        from sympy.printing.numpy import NumPyPrinter
+
+        text, _ = printed(expression, trace, parameter, lambda e: str(NumPyPrinter().doprint(e)))
+        return f"({text.replace('numpy.', 'np.')})"
+
     def product(self, factors: Sequence[str]) -> str:
         return " * ".join(factors)
 
@@ -55,6 +62,12 @@ class _SympyCodeNotation(_CodeNotation):
 
     def saturating(self, level: str, trace: str) -> str:
         return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
+
+    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
+        from sympy.printing.pycode import SymPyPrinter
+
+        text, _ = printed(expression, trace, parameter, lambda e: str(SymPyPrinter().doprint(e)))
+        return f"({text})"
 
 
 _NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.

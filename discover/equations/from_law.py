@@ -8,7 +8,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from tensor_library.closed_forms import CLOSED_FORMS
 
-EXPONENTIAL = f"{CLOSED_FORMS['exp'].spelling}*sigma"
+EXPONENTIAL = f"{CLOSED_FORMS.present['exp'].spelling}*sigma"
 
 
 def law_terms(law: AbstractConstitutiveLaw) -> tuple[EquationTerm, ...]:

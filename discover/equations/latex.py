@@ -37,5 +37,5 @@ def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 
         sign = "-" if term.coefficient >= 0 else "+"
         text += f" {sign} {parse_term(term.term).spell(notation, abs(term.coefficient), other)}"
     for name, value in letters.items():
-        text += rf", \qquad \{name} = {latex_number(value, digits)}"
+        text += rf", \qquad {notation.letter(name)} = {latex_number(value, digits)}"
     return text

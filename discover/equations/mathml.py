@@ -1,15 +1,15 @@
 """Terms of a law as MathML, which browsers typeset without any script."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from discover.equations.term import TermLike
-from tensor_library.notation import Notation
+from tensor_library.notation import Notation, greek_letter, printed
 from tensor_library.terms import parse_term
 
 _BOLD = '<mi mathvariant="normal" style="font-weight:bold">{}</mi>'
 # the combining dot sits well in every font, an accent over a letter only in mathematical ones
 _TENSORS = {"I": _BOLD.format("I"), "sigma": _BOLD.format("σ"), "gammadot": _BOLD.format("γ̇")}
-_LETTERS = {"epsilon": "ε", "kappa": "κ"}
 _APPLIED = "<mo>&#x2061;</mo>"
 _SPACE = "<mspace width='0.15em'/>"
 
@@ -53,8 +53,8 @@ class MathmlNotation(Notation[str]):
         return _bracketed(number(value)) if value < 0 else number(value)
 
     def letter(self, name: str) -> str:
-        """Return a Greek letter."""
-        return f"<mi>{_LETTERS[name]}</mi>"
+        """Return a Greek letter, or the name itself."""
+        return f"<mi>{greek_letter(name) or name}</mi>"
 
     def exponential(self, rate: str, trace: str) -> str:
         """Return the bracketed exponential minus one."""
@@ -68,6 +68,16 @@ class MathmlNotation(Notation[str]):
         size = f"<mrow><mo>|</mo>{trace}<mo>|</mo></mrow>"
         below = f"<mn>1</mn><mo>+</mo>{level}{_SPACE}{size}"
         return f"<mfrac><mrow>{trace}</mrow><mrow>{below}</mrow></mfrac>"
+
+    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
+        """Return the expression as SymPy typesets it, bracketed where it is a sum."""
+        import sympy
+
+        def printer(found: Any) -> str:
+            return sympy.mathml(found, printer="presentation")
+
+        text, brackets = printed(expression, _bracketed(trace), parameter, printer, "<mi>{}</mi>")
+        return _bracketed(text) if brackets else f"<mrow>{text}</mrow>"
 
     def product(self, factors: Sequence[str]) -> str:
         """Return the factors with thin spaces between them."""

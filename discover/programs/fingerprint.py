@@ -138,6 +138,9 @@ class _Walk:
             ]
         if dataclasses.is_dataclass(value):
             told = [(f.name, getattr(value, f.name)) for f in dataclasses.fields(value)]
+            # a name in a field may stand for code that is another user's
+            if beside := getattr(value, "told_beside_fields", ()):
+                told.append(("told_beside_fields", beside))
         elif hasattr(value, "__dict__"):
             told = sorted(vars(value).items())
         else:

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, model_validator
 from discover.laws.registry import LAWS
 from discover.learners.registry import learner_names
 from discover.validation import Section
+from tensor_library.closed_forms import CLOSED_FORMS
 
 
 def _known_law(name: str) -> str:
@@ -28,6 +29,15 @@ def _known_learner(name: str) -> str:
     return name
 
 
+def _known_form(name: str) -> str:
+    if name not in CLOSED_FORMS:
+        raise ValueError(
+            f"unknown closed form {name[:60]!r}; write some of {', '.join(CLOSED_FORMS)}"
+        )
+    return name
+
+
+ClosedFormName = Annotated[str, AfterValidator(_known_form)]
 LearnerName = Annotated[str, AfterValidator(_known_learner)]
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
 LawName = Annotated[str, AfterValidator(_known_or_learned)]
@@ -129,7 +139,7 @@ class Library(Section):
     """Candidate terms: tensors × invariants up to a degree, plus closed forms."""
 
     degree: Annotated[int, Field(ge=0, le=2)] = 1
-    closed_forms: tuple[Literal["exp", "saturating"], ...] = ()
+    closed_forms: tuple[ClosedFormName, ...] = ()
 
 
 class Sweep(Section):
