@@ -39,16 +39,19 @@ def _shapes(request: pytest.FixtureRequest) -> Iterator[None]:
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
-# files of a minute and more
-_LONG = {
-    "test_measured.py", "test_commands.py", "test_notebooks.py", "test_contract_script.py",
-    "test_tensor_sindy_estimator.py", "test_planting.py", "test_estimators.py", "test_reports.py",
-}  # fmt: skip
+# files of a minute and more, the longest first; what shares programs stands apart, so that one
+# worker finds what the other compiled
+_LONG = (
+    "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
+    "test_tbnn_training.py", "test_planting.py", "test_tensor_sindy_estimator.py",
+    "test_comparison.py", "test_estimators.py", "test_reports.py",
+)  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let long files begin first, so that no worker waits for another at the end."""
-    items.sort(key=lambda item: item.path.name not in _LONG)
+    place = {name: i for i, name in enumerate(_LONG)}
+    items.sort(key=lambda item: place.get(item.path.name, len(_LONG)))
 
 
 @pytest.fixture(scope="session")

@@ -135,7 +135,7 @@ class Compiled(Generic[P, R]):
         run.__name__ = self._function.__name__  # by which JAX files it
         # what an exported program returns is bound to its device, and JAX compiles once more for
         # bound arguments than for others, unless it is told beforehand where all of them are
-        call = jax.jit(run, in_shardings=jnp.zeros(()).sharding)
+        call = jax.jit(run, in_shardings=_where())
 
         def found(args, kwargs, arrays):
             return put_together(nesting, iter(call(*arrays)))
@@ -168,6 +168,12 @@ class Compiled(Generic[P, R]):
         shapes = [jax.ShapeDtypeStruct(a.shape, a.dtype, weak_type=_weak(a)) for a in arrays]
         exported = jax.export.export(jax.jit(flat), disabled_checks=_UNPROMISED)(*shapes)
         return nesting[0], bytes(exported.serialize())
+
+
+def _where() -> jax.sharding.Sharding:
+    """Return the place where JAX computes unless it is told otherwise."""
+    with jax.ensure_compile_time_eval():  # also when a function is being traced
+        return jnp.zeros(()).sharding
 
 
 def _weak(array: Any) -> bool:

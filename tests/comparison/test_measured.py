@@ -17,20 +17,22 @@ pytestmark = pytest.mark.measured
 SWEEP = 'law = "ucm"\nmodes = "lve"'
 ONE_MODE = 'law = "ucm"\nmodulus_Pa = {}\nrelaxation_time_s = {}'
 
-# data set: runs fitted, runs held out, one row kept of so many, model: one set with a spectrum from
-# its sweep, one of a single mode
+# data set: runs fitted, runs held out, one row kept of so many, other data options, model: one set
+# with a spectrum from its sweep, one of a single mode
 SETS = {
     "gel-laos": (
         ["gel_laos_1rads_1000Pa.csv", "gel_laos_1rads_4000Pa.csv"],
         ["gel_laos_1rads_3000Pa.csv"],
         50,
+        'rate = "measured"',
         f"{SWEEP}\nsweep_rad_s = [0.1, 16.0]",
     ),
-    "blood-steps": (
-        ["blood_up_0p1_5p0.csv", "blood_up_0p1_20p0.csv"],
-        ["blood_up_0p1_10p0.csv"],
-        2,
-        ONE_MODE.format(1.0, 0.1),
+    "cpycl-laos": (
+        ["cpycl_laos_0.3rads_3.16.csv"],
+        [],
+        6,
+        "",
+        ONE_MODE.format(10.0, 1.0),
     ),
 }
 
@@ -50,11 +52,11 @@ def stand_in(source: Path, folder: Path, runs, every: int) -> None:
 
 @pytest.mark.parametrize("name", SETS)
 def test_a_comparison_of_measured_data_ends_with_a_verdict(name, measured_data, tmp_path):
-    fit, held_out, every, model = SETS[name]
+    fit, held_out, every, options, model = SETS[name]
     stand_in(measured_data / name, tmp_path / name, [*fit, *held_out], every)
     study = tmp_path / "study.toml"
     study.write_text(
-        f'[data]\nfolder = "{name}"\nheld_out = {held_out}\nrate = "measured"\n[model]\n{model}\n'
+        f'[data]\nfolder = "{name}"\nheld_out = {held_out}\n{options}\n[model]\n{model}\n'
         '[compare]\nlearners = ["tensor_sindy"]\nlibrary = { degree = 0 }\nmax_terms = 2\n'
         'next = { flows = ["start_up"] }\n'
     )

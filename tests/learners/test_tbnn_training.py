@@ -54,7 +54,7 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
     law = make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     weights = rebuild.start
-    _, jacobian = eqx.filter_jit(states_and_jacobian)(weights, rebuild, giesekus_problem)
+    _, jacobian = states_and_jacobian(weights, rebuild, giesekus_problem)
     direction = jax.random.normal(jax.random.key(2), weights.shape)
     residual = eqx.filter_jit(lambda w, p: p.residual(rebuild(w)))
     step = 1e-5  # truncation of order step², rounding of order 1e-16/step

@@ -109,6 +109,13 @@ def _double(x):
     return 2.0 * x
 
 
+def test_a_program_may_be_called_with_numbers_while_another_function_is_traced(folder):
+    double = compiled(_double, made_from="a third test")
+    three = np.arange(3.0)
+    traced = jax.jit(lambda x: x + double(three))(jnp.ones(3))
+    np.testing.assert_array_equal(traced, [1.0, 3.0, 5.0])
+
+
 def test_what_a_program_returned_is_taken_by_it_without_compiling_again(folder):
     built = []
 
