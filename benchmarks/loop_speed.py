@@ -23,9 +23,9 @@ STRAIN = (0.02, 25.0)
 
 def measured():
     """Return the melt's runs, declared model and held-out names; None where there are none."""
-    from discover.closed_loop.declared import DeclaredModel
     from discover.dataset import load_dataset
     from discover.dataset.linear_viscoelasticity import relaxation_spectrum
+    from discover.forward.declared import DeclaredModel
 
     folder = os.environ.get("DISCOVER_DATA")
     if not folder or not (Path(folder) / "pi95k-startup").exists():
@@ -38,8 +38,8 @@ def measured():
 
 def synthetic():
     """Return a synthetic melt likewise: exponential PTT, a slow motor, one per cent of noise."""
-    from discover.closed_loop.declared import DeclaredModel
     from discover.dataset import ShearDataset, ShearRun
+    from discover.forward.declared import DeclaredModel
     from discover.laws import Fluid, make_law
     from discover.protocols import start_up
     from discover.simulate import simulate
@@ -66,11 +66,11 @@ def main() -> None:
     enable_x64()
     enable_compilation_cache()
     from discover.closed_loop import run_loop
-    from discover.closed_loop.augmented_model import AugmentedModel
     from discover.closed_loop.before_after import cut_to_strain
     from discover.closed_loop.least_squares import fit_batch
-    from discover.closed_loop.run_batch import data_scales, make_batch
     from discover.effects import make_effect
+    from discover.forward.augmented_model import AugmentedModel
+    from discover.forward.run_batch import data_scales, make_batch
     from discover.laws import Fluid, make_law
     from discover.simulate import simulate
 

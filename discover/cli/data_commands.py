@@ -90,8 +90,8 @@ def check(
     """Say everything that is wrong or doubtful about a data folder; exit code 2 on errors."""
     from dataclasses import asdict
 
-    from discover.dataset.check import check_folder
-    from discover.dataset.finding import Severity
+    from discover.dataset.checking.finding import Severity
+    from discover.dataset.checking.folder import check_folder
 
     findings = check_folder(folder, clock_factor)
     if as_json:
@@ -159,7 +159,7 @@ def import_data(
 ) -> None:
     """Make a data folder from exports of a rheometer: CSV, TRIOS, RheoCompass, or your own."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
-    from discover.dataset.check import check_folder
+    from discover.dataset.checking.folder import check_folder
     from discover.dataset.importing import import_files
 
     if out is None:

@@ -1,7 +1,6 @@
 """Find what a model misses, trace it to an effect it lacks, add it, report before and after."""
 
 from discover.closed_loop.attribution import Attribution, CandidateScore
-from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import (
@@ -12,6 +11,7 @@ from discover.closed_loop.result import (
     Stage,
     StageParameter,
 )
+from discover.forward import DeclaredModel
 
 __all__ = [
     "Attribution",

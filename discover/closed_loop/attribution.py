@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.run_batch import RunBatch
 from discover.effects import AbstractEffect
+from discover.forward import AugmentedModel, RunBatch
 
 ALIAS_COSINE = 0.99
 """Signatures that agree to this cosine are the same to first order."""

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from scipy.stats import t as student
 
 from discover.closed_loop.attribution import CandidateScore, with_other_inner
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
     FEWEST_FOLDS,
     NO_PRIOR,
@@ -19,7 +18,7 @@ from discover.closed_loop.least_squares import (
     part_errors,
     run_errors,
 )
-from discover.closed_loop.run_batch import RunBatch
+from discover.forward import AugmentedModel, RunBatch
 from discover.statistics import least_squares_covariance
 from discover.statistics.residual import judging, summarise
 

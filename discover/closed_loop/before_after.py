@@ -5,12 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.result import ErrorPair
-from discover.closed_loop.run_batch import RunBatch
 from discover.closed_loop.run_record import RunRecord
 from discover.dataset import ShearRun
 from discover.errors import InputError
+from discover.forward import AugmentedModel, RunBatch
 from discover.protocols import strains
 
 

@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.dataset import ShearRun
 from discover.effects import SeriesElement
 from discover.errors import InputError
+from discover.forward import AugmentedModel, RunBatch, make_batch
 from discover.protocols import smooth_between_samples
 
 _STRAIN_STEP = 0.05

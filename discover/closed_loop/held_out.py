@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit, jacobians
 from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.run_batch import RunBatch
+from discover.forward import AugmentedModel, RunBatch
 from discover.statistics import least_squares_covariance
 from discover.statistics.unseen import Unseen
 

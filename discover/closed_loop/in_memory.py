@@ -4,12 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from discover.closed_loop.declared import DeclaredModel
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import LoopResult
 from discover.dataset import ShearDataset
 from discover.errors import InputError
+from discover.forward import DeclaredModel
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
 from discover.study.build import DeclaredModel as DeclaredFluid

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.run_batch import RunBatch
+from discover.forward import AugmentedModel, RunBatch
 
 _LARGEST_DAMPING = 1e7
 _FAR_BEHIND, _HARDLY = 2.0, 0.05

@@ -8,27 +8,24 @@ import numpy as np
 
 from discover.closed_loop.augment import FEWEST_SAMPLES, intervals
 from discover.closed_loop.augmented_law import AugmentedLaw
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.before_after import (
     cut_to_strain,
     errors_of,
     record_runs,
     strain_of,
 )
-from discover.closed_loop.declared import MODULUS, RELAXATION_TIME, DeclaredModel
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import LoopResult, Stage, StageParameter
-from discover.closed_loop.run_batch import data_scales, make_batch
 from discover.closed_loop.search import Search
 from discover.closed_loop.search_checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.silence import fluid_is_silent, records_are_silent
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import ShearDataset, ShearRun
-from discover.dataset.check_start import doubts_of_start
+from discover.dataset.checking.start import doubts_of_start
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.effects import (
@@ -43,6 +40,14 @@ from discover.effects import (
     named_effects,
 )
 from discover.errors import InputError
+from discover.forward import (
+    MODULUS,
+    RELAXATION_TIME,
+    AugmentedModel,
+    DeclaredModel,
+    data_scales,
+    make_batch,
+)
 from discover.laws import Fluid
 from discover.statistics import isolated
 from discover.statistics.residual import Expectation, fast_part, summarise

@@ -5,11 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.finer_steps import change_on_finer_steps
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
+from discover.forward import AugmentedModel, RunBatch
 from discover.statistics.residual import judging
 
 COMPUTED = 1e-6

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.effects import AbstractEffect, EffectParameter
+from discover.forward import AugmentedModel
 
 _TOLERANCE = 1e-3
 """Relative distance from an end at which a fit has stopped there: what a fit leaves of its last

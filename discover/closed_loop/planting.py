@@ -13,12 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.run_batch import RunBatch, data_scales, make_batch
 from discover.dataset import ShearDataset, ShearRun
 from discover.effects import named_effects
 from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, RunBatch, data_scales, make_batch
 from discover.protocols import ShearProtocol, oscillatory_shear, start_up
 
 MODULUS, RELAXATION_TIME = 100.0, 1.0

@@ -19,7 +19,6 @@ from discover.closed_loop.augment import (
     simplest,
     taken_out,
 )
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import (
     NO_PRIOR,
     Fit,
@@ -31,13 +30,13 @@ from discover.closed_loop.least_squares import (
 from discover.closed_loop.mode_dependence import names_not_needed
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.physical_range import at_an_end, undetermined
-from discover.closed_loop.run_batch import RunBatch, make_batch
 from discover.closed_loop.search_checkpoint import SearchCheckpoint
 from discover.closed_loop.search_state import SearchState
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import ShearRun
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
+from discover.forward import AugmentedModel, RunBatch, make_batch
 from discover.statistics.residual import summarise
 
 _ROUNDS, _POLISHES = 3, 5

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import Fit
-from discover.closed_loop.run_batch import RunBatch
 from discover.dataset import ShearRun
 from discover.effects import ConstitutiveEffect
+from discover.forward import AugmentedModel, RunBatch
 from discover.statistics import holds_signal
 from discover.statistics.dead_records import CHANCE
 from discover.statistics.residual import judging, summarise

@@ -50,7 +50,7 @@ def test_a_fault_of_the_software_is_seen(tmp_path, monkeypatch, error, verdict):
     def fail(*_):
         raise error
 
-    monkeypatch.setattr("discover.dataset.check.read_index", fail)
+    monkeypatch.setattr("discover.dataset.checking.folder.read_index", fail)
     assert run(Case("bad", ["data", "check", "{}/data"], dict(GOOD)), tmp_path).verdict == verdict
 
 
@@ -60,7 +60,7 @@ def test_a_hang_is_seen(tmp_path, monkeypatch):
             pass
 
     monkeypatch.setattr("hostile_inputs.SECONDS", 0.3)
-    monkeypatch.setattr("discover.dataset.check.read_index", wait)
+    monkeypatch.setattr("discover.dataset.checking.folder.read_index", wait)
     assert run(Case("bad", ["data", "check", "{}/data"], dict(GOOD)), tmp_path).verdict == "hang"
 
 

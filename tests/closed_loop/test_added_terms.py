@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.closed_loop.added_terms import AddedTerms
 from discover.effects import make_effect
+from discover.forward.added_terms import AddedTerms
 
 NAMES = (
     "sigma",

@@ -3,11 +3,10 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.least_squares import fit_batch, left_out_errors
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearRun
 from discover.effects import make_effect
+from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, start_up
 from discover.simulate import simulate

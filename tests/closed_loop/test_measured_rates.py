@@ -5,13 +5,12 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop, run_loop_on_each
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
 from discover.dataset.sequence import in_sequence
 from discover.dataset.thinning import thin_run
 from discover.effects import Record, make_effect
 from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate, start_up
 from discover.report.verdicts import loop_verdict

@@ -7,10 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
 from discover.effects import BY_MODE, make_effect
+from discover.forward import AugmentedModel, make_batch
 from discover.protocols import oscillatory_shear, start_up
 
 MODULI, TIMES = np.array([100.0, 50.0]), np.array([1.0, 0.1])

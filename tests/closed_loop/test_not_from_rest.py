@@ -9,7 +9,7 @@ from independent.misread import relaxation_as_run
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.dataset import ShearDataset, ShearRun
-from discover.dataset.check_start import doubts_of_start
+from discover.dataset.checking.start import doubts_of_start
 from discover.protocols import measured_rate
 
 TIMES = np.geomspace(0.01, 5.0, 100)

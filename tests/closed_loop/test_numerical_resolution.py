@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.numerical_resolution import COMPUTED, NumericalResolution, rounding
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearDataset, ShearRun
 from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
 from discover.protocols import measured_rate, oscillatory_shear, start_up
 
 TIMES = np.linspace(0.1, 10.0, 100)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.augmented_model import AugmentedModel
 from discover.closed_loop.physical_range import at_an_end, undetermined
 from discover.dataset import ShearDataset, ShearRun
 from discover.effects import make_effect
+from discover.forward import AugmentedModel
 from discover.protocols import measured_rate, start_up
 
 STRAIN = 0.03

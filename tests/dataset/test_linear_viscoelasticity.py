@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
-from discover.dataset.sweep_inertia import sweep_inertia
+from discover.dataset.checking.sweep_inertia import sweep_inertia
 from discover.errors import InputError
 
 

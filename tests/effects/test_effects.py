@@ -7,7 +7,6 @@ import pytest
 from independent import JohnsonSegalman
 from independent import start_up as flow_of
 
-from discover.closed_loop.run_batch import data_scales
 from discover.dataset import ShearRun
 from discover.effects import (
     ConstitutiveEffect,
@@ -24,6 +23,7 @@ from discover.effects import (
 from discover.effects.filters import first_order_lag
 from discover.effects.reference import reference_page
 from discover.errors import InputError
+from discover.forward import data_scales
 from discover.laws import LAWS, FenePeterlin
 from discover.protocols import start_up
 from tensor_library.algebra import from_shear

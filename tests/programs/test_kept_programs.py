@@ -12,11 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset import ShearRun
 from discover.effects import make_effect
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
 from discover.programs.fingerprint import NotTold, fingerprint

@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 from independent.homogeneous import UNIT, GiesekusFluid
 
-from discover.closed_loop.augmented_model import AugmentedModel
-from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.run_batch import make_batch
 from discover.dataset.run import ShearRun
 from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.protocols import (
     after_alternation,

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from discover.dataset.check_run import stress_noise
-from discover.dataset.finding import Finding
+from discover.dataset.checking.finding import Finding
+from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import ShearRun
 from discover.dataset.run_table import oscillation

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.check_run import stress_noise
-from discover.dataset.finding import Finding
+from discover.dataset.checking.finding import Finding
+from discover.dataset.checking.one_run import stress_noise
+from discover.dataset.checking.sweep_inertia import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.run import ShearRun
-from discover.dataset.sweep_inertia import sweep_inertia
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
 _LINEAR_STRAIN = 0.2

@@ -17,10 +17,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.closed_loop.added_terms import AddedTerms, InUse
-from discover.closed_loop.declared import DeclaredModel
-from discover.closed_loop.integrator import Modes, Series, integrate
-from discover.closed_loop.run_batch import RunBatch
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
@@ -32,6 +28,10 @@ from discover.effects import (
     SignalEffect,
     StateEffect,
 )
+from discover.forward.added_terms import AddedTerms, InUse
+from discover.forward.declared import DeclaredModel
+from discover.forward.integrator import Modes, Series, integrate
+from discover.forward.run_batch import RunBatch
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics

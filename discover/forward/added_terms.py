@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.closed_loop.library_matrix import LibraryMatrix
 from discover.effects import ConstitutiveEffect, LibraryTerm
+from discover.forward.library_matrix import LibraryMatrix
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
 

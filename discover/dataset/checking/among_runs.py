@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.finding import Finding
+from discover.dataset.checking.finding import Finding
 from discover.dataset.run import ShearRun
 from discover.protocols.kinematics import KINDS
 

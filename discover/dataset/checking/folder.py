@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from discover.dataset import units
-from discover.dataset.check_among import doubts_among_runs
-from discover.dataset.check_linear import against_linear_theory, doubts_of_sweep
-from discover.dataset.check_run import doubts_of_run
-from discover.dataset.check_start import doubts_of_start, doubts_of_unseen_start
-from discover.dataset.finding import Finding, Findings
+from discover.dataset.checking.among_runs import doubts_among_runs
+from discover.dataset.checking.finding import Finding, Findings
+from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
+from discover.dataset.checking.one_run import doubts_of_run
+from discover.dataset.checking.start import doubts_of_start, doubts_of_unseen_start
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,

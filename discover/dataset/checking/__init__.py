@@ -1,0 +1,1 @@
+"""What is wrong or doubtful about data, found before any fit."""
