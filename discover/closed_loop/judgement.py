@@ -158,7 +158,8 @@ def judge(
         text = (
             f"{missed}, as {causes} ({_percent(expected)}), but {' and '.join(not_from_rest)} "
             "cannot have started from rest, as is assumed: what came before looks like an effect. "
-            "Say what it was (rate_before), or give the record from rest on."
+            "Say in runs.csv what it was (start, step_strain, rate_before), or give the record "
+            "from rest on."
         )
     elif pattern:
         text = (

@@ -42,7 +42,7 @@ def differentiate(
     n = len(times)
     if n < _DEGREE + 2:
         raise InputError(
-            f"A shear rate cannot be derived from {n} samples of strain; give at least 5, or a "
+            f"A rate cannot be derived from {n} samples of strain; give at least 5, or a "
             "column shear_rate_1_s."
         )
     window = min(window, n)

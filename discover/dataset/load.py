@@ -129,12 +129,8 @@ def load_dataset(
     root = resolve_folder(folder, base)
     index = read_index(root)
     factors = read_clock_factors(index, clock_factor)
-    before = None
-    rate_before = rate_before or _declared_rate_before(index)
-    if rate_before is not None:
-        before = read_column(index, "rate_before", rate_before)
-        before = before * units.heading_factor(rate_before, units.SHEAR_RATE)
-    aside = [reason_to_set_aside(index, row, rate_before is not None) for row in range(len(index))]
+    before = rates_before(index, rate_before)
+    aside = [reason_to_set_aside(index, row, before is not None) for row in range(len(index))]
     used = [row for row, reason in enumerate(aside) if reason is None]
     if not used and aside:
         raise InputError(
@@ -168,11 +164,28 @@ def load_dataset(
     )
 
 
-def _declared_rate_before(index: Table) -> str | None:
-    """Return the column with the rate before runs that are declared to start from a steady flow."""
-    if "steady" not in index.columns.get("start", ()):
+def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
+    """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
+
+    The study names the column; without it, one whose name begins with ``rate_before`` holds the
+    rates of those runs that are declared to start from a steady flow.
+
+    Raises
+    ------
+    InputError
+        If the column is missing or holds something other than numbers.
+    """
+    if column is not None:
+        rates = read_column(index, "rate_before", column)
+        return rates * units.heading_factor(column, units.SHEAR_RATE)
+    starts = index.columns.get("start", ())
+    steady = [row for row, cell in enumerate(starts) if cell.strip() == "steady"]
+    column = next((name for name in index.columns if name.startswith("rate_before")), None)
+    if column is None or not steady:
         return None
-    return next((name for name in index.columns if name.startswith("rate_before")), None)
+    rates = np.zeros(len(index))
+    rates[steady] = index.rows(steady).numbers(column)
+    return rates * units.heading_factor(column, units.SHEAR_RATE)
 
 
 def _provenance(root: Path) -> str:

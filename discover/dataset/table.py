@@ -7,7 +7,7 @@ import os
 import re
 import stat
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +58,11 @@ class Table:
         names = [shown(column) for column in self.columns]
         more = f" and {len(names) - 12} more" if len(names) > 12 else ""
         return ", ".join(names[:12]) + more
+
+    def rows(self, chosen: Sequence[int]) -> "Table":
+        """Return the table of some rows, counted from 0."""
+        columns = {name: [cells[i] for i in chosen] for name, cells in self.columns.items()}
+        return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
 
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
         """Return a column as finite numbers, those next to nothing as 0.

@@ -55,12 +55,14 @@ def test_a_steady_start_without_its_rate_is_not_read_as_a_start_from_rest(tmp_pa
 
 
 def test_a_steady_start_takes_its_rate_from_the_column_of_that_name(tmp_path):
-    made = folder(
-        tmp_path / "blood", "file,start,rate_before_1_min", "a.csv,steady,300", "b.csv,,0"
-    )
+    made = folder(tmp_path / "blood", "file,start,rate_before_1_min", "a.csv,steady,300", "b.csv,,")
     data = load_dataset(made)
     assert [run.rate_before for run in data] == [5.0, 0.0]
     assert [run.from_rest for run in data] == [False, True]
+    (made / "runs.csv").write_text("file,start,rate_before_1_s\na.csv,steady,\n")
+    with pytest.raises(InputError, match="line 2"):
+        load_dataset(made)
+    assert [f.subject for f in check_folder(made) if f.severity == "error"] == ["start"]
 
 
 def test_a_step_of_strain_is_part_of_what_was_imposed(tmp_path):

@@ -22,6 +22,7 @@ from discover.dataset.linear_viscoelasticity import (
 from discover.dataset.load import (
     SWEEP_FILE,
     find_sweep,
+    rates_before,
     read_clock_factors,
     read_index,
     resolve_folder,
@@ -69,6 +70,10 @@ def check_folder(
     except InputError as error:
         return Findings([Finding("error", "runs", INDEX_FILE, str(error))])
     findings = [*_clock(index, clock_factor), *_before(index)]
+    try:
+        before = rates_before(index, None)
+    except InputError as error:
+        return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
     runs: list[ShearRun] = []
     unused: dict[str, list[str]] = {}
     converted: dict[str, list[str]] = {}
@@ -79,7 +84,8 @@ def check_folder(
                 text = f"{name} is set aside: {reason}."
                 findings.append(Finding("note", "runs", name, text))
                 continue
-            runs.append(read_run(root, index, row))
+            rate = None if before is None else float(before[row])
+            runs.append(read_run(root, index, row, rate_before=rate))
         except InputError as error:
             findings.append(Finding("error", "run", name, str(error)))
             continue

@@ -65,8 +65,8 @@ def doubts_of_start(
         run.name,
         f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
         f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look like "
-        "a missing effect. Give the record from rest on, or rate_before in the study if a steady "
-        "flow came before; otherwise leave the run out.",
+        "a missing effect. Give the record from rest on, or say in runs.csv what came before "
+        "(start, step_strain, rate_before); otherwise leave the run out.",
     )
 
 
@@ -92,8 +92,8 @@ def doubts_of_unseen_start(run: ShearRun) -> Iterator[Finding]:
         run.name,
         f"{run.name} is taken as starting from rest, but does not show it: its first stress, at "
         f"{run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing before it "
-        "was recorded. Sample the start, or give rate_before in the study if a steady flow came "
-        "before; what came before would look like a missing effect. A solvent's viscosity makes "
+        "was recorded. Sample the start, or say in runs.csv what came before (start, rate_before), "
+        "which would look like a missing effect. A solvent's viscosity makes "
         "stress at once: where it is most of the fluid's, nothing is wrong.",
     )
 
