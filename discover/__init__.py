@@ -34,6 +34,10 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
+    from discover.protocols import after_alternation as after_alternation
+    from discover.protocols import after_steady_flow as after_steady_flow
+    from discover.protocols import after_step_strain as after_step_strain
+    from discover.protocols import in_flow as in_flow
     from discover.protocols import measured_rate as measured_rate
     from discover.protocols import oscillatory_shear as oscillatory_shear
     from discover.protocols import start_up as start_up
@@ -53,11 +57,15 @@ __all__ = [
     "ShearDataset",
     "ShearRun",
     "TensorSINDy",
+    "after_alternation",
+    "after_steady_flow",
+    "after_step_strain",
     "build_library",
     "check_folder",
     "close_loop",
     "compare",
     "effects",
+    "in_flow",
     "laws",
     "load",
     "load_dataset",
@@ -93,7 +101,16 @@ _PLACES = {
     "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),
-    "discover.protocols": ("measured_rate", "oscillatory_shear", "start_up", "step_rates"),
+    "discover.protocols": (
+        "after_alternation",
+        "after_steady_flow",
+        "after_step_strain",
+        "in_flow",
+        "measured_rate",
+        "oscillatory_shear",
+        "start_up",
+        "step_rates",
+    ),
     "discover.simulate": ("synthetic_dataset",),
     "tensor_library": ("ClosedForm", "build_library", "register_closed_form"),
 }

@@ -15,7 +15,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.programs import compiled
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.shear import ShearProtocol, shear_rates
+from discover.protocols.shear import ShearProtocol, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 
 
@@ -47,7 +47,7 @@ def synthetic_dataset(
     n_samples: int = 201,
     duration: float = TRAINING_DURATION,
 ) -> SyntheticDataset:
-    """Return σ12 of a named dimensionless law in shear flows, with white noise.
+    """Return the recorded stress of a named dimensionless law in some flows, with white noise.
 
     The linear sweep is exact.
 
@@ -92,14 +92,15 @@ def synthetic_dataset(
     for name, flow in protocols.items():
         stress = simulate(fluid, flow, times)
         exact[name] = stress
-        scale = noise * float(np.sqrt(np.mean(stress.shear_stress**2)))
+        recorded = recorded_at(flow, stress.components)
+        scale = noise * float(np.sqrt(np.mean(recorded**2)))
         runs.append(
             ShearRun(
                 name=name,
                 time=times,
                 protocol=flow,
                 shear_rate=shear_rates(flow, times),
-                shear_stress=stress.shear_stress + scale * generator.standard_normal(n_samples),
+                shear_stress=recorded + scale * generator.standard_normal(n_samples),
             )
         )
     return SyntheticDataset(

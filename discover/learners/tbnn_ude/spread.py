@@ -14,7 +14,7 @@ from jaxtyping import Float
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.shear import ShearProtocol, recorded_at
 from discover.simulate.solve import SimulationError, simulate
 from tensor_library.integrity_basis import TENSOR_NAMES
 
@@ -74,7 +74,7 @@ def member_predictions(
             stress = simulate(fluid, protocol, times)
         except SimulationError:
             continue  # that it ran away is the answer
-        rows[0, i] = stress.shear_stress
+        rows[0, i] = recorded_at(protocol, stress.components)
         rows[1, i] = stress.first_normal_stress_difference
         rows[2, i] = stress.second_normal_stress_difference
     return MemberPredictions(np.asarray(times, dtype=float), *rows)
