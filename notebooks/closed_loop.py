@@ -30,7 +30,7 @@ enable_compilation_cache()
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.simulate import synthetic_dataset
 
-data = synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01, n_samples=51)
+data = synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01)
 result = run_loop(
     data,
     DeclaredModel.maxwell(1.0, 1.0),
