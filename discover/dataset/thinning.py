@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.integrate import cumulative_trapezoid
 
 from discover.dataset.run import ShearRun
-from discover.protocols.shear import measured_rate
+from discover.protocols.shear import in_flow, measured_rate
 
 MOST_SAMPLES = 20_000
 """A record with more samples is thinned: they cost time and say nothing new about a law."""
@@ -117,7 +117,8 @@ def thin_run(run: ShearRun, most: int) -> ShearRun:
     thinned = run.window(keep)
     sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
     if sampled and _strain_error(run.time, run.shear_rate, keep) < _FOLLOWED:
-        thinned = replace(thinned, protocol=measured_rate(thinned.time, thinned.shear_rate))
+        followed = measured_rate(thinned.time, thinned.shear_rate)
+        thinned = replace(thinned, protocol=in_flow(followed, run.flow))
     return thinned
 
 

@@ -207,14 +207,21 @@ def smooth_between_samples(protocol: ShearProtocol) -> ShearProtocol | None:
     protocol
         Any.
     """
-    knots = np.asarray(protocol.table_times)
-    if len(knots) < _FEWEST_KNOTS or np.any(np.diff(knots) <= 0.0):
+    knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    # a jump at 0 ends what came before the record, which no sample holds
+    jump = np.flatnonzero((np.diff(knots) <= 0.0) & (knots[1:] == 0.0))
+    first = int(jump[-1]) + 1 if jump.size and float(protocol.begins) < 0.0 else 0
+    read = knots[first:]
+    if len(read) < _FEWEST_KNOTS or np.any(np.diff(read) <= 0.0):
         return None
-    rates = np.asarray(protocol.table_rates)
-    dense = np.interp(
-        np.arange(_BETWEEN * (len(knots) - 1) + 1) / _BETWEEN, np.arange(len(knots)), knots
+    places = np.arange(_BETWEEN * (len(read) - 1) + 1) / _BETWEEN
+    dense = np.interp(places, np.arange(len(read)), read)
+    smooth = np.asarray(PchipInterpolator(read, rates[first:])(dense))
+    return replace(
+        protocol,
+        table_times=jnp.asarray(np.concatenate([knots[:first], dense])),
+        table_rates=jnp.asarray(np.concatenate([rates[:first], smooth])),
     )
-    return measured_rate(dense, np.asarray(PchipInterpolator(knots, rates)(dense)))
 
 
 def in_flow(protocol: ShearProtocol, kind: str) -> ShearProtocol:

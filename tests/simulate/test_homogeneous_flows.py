@@ -6,17 +6,21 @@ import pytest
 from independent.homogeneous import UNIT, GiesekusFluid
 
 from discover.dataset.run import ShearRun
+from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.protocols import (
     after_alternation,
+    after_steady_flow,
     after_step_strain,
     in_flow,
     kinematics_of,
     measured_rate,
     oscillatory_shear,
     recorded_at,
+    shear_rates,
+    smooth_between_samples,
     stack_protocols,
     start_up,
     step_rates,
@@ -114,6 +118,25 @@ def test_an_oscillation_that_had_gone_on_is_periodic_from_its_first_sample(sampl
     assert np.max(np.abs(found[:65] - found[64:])) < 1e-4 * size
     started = in_the_loop([wave], times)[0]
     assert np.max(np.abs(started[:65] - started[64:])) > 0.05 * size
+
+
+@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(kind):
+    times = np.linspace(0.0, 3.0, 61)
+    rates = 0.5 + 0.1 * np.sin(times)
+    sampled = in_flow(measured_rate(times, rates), kind)
+    begun = after_steady_flow(sampled, 2.0, 3.0)
+    for protocol in (sampled, begun):
+        smooth = smooth_between_samples(protocol)
+        assert smooth is not None
+        assert smooth.flow == kind
+        assert float(smooth.begins) == float(protocol.begins)
+        at = np.array([-0.5, 0.0, 1.025, 2.975])
+        wanted = shear_rates(protocol, at)
+        # a sample apart by 0.05 s: straight lines miss 0.1 * 0.05^2 / 8 of this wave
+        np.testing.assert_allclose(shear_rates(smooth, at), wanted, atol=1e-4)
+    run = ShearRun("a", times, sampled, rates, np.ones(61))
+    assert thin_run(run, 30).flow == kind
 
 
 def test_troutons_ratios_are_three_four_and_six():
