@@ -36,7 +36,15 @@ def after_steady_flow(protocol: ShearProtocol, rate: float, end: float) -> Shear
         Of the flow before, in 1/s.
     end
         Time of the last sample, in s.
+
+    Raises
+    ------
+    InputError
+        If the rate is zero, a time is not positive, or the protocol is an oscillation by a formula.
     """
+    _require_positive("end", end)
+    if not (np.isfinite(rate) and rate != 0.0):
+        raise InputError(f"The rate of the flow before must not be 0; got {rate}. Rest needs none.")
     length = min(STEADY_LENGTH * end, STEADY_STRAIN / abs(rate))
     return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
 
@@ -57,7 +65,18 @@ def after_step_strain(
         changes a relaxing stress by less than a thousandth.
     duration
         Over which the strain was put on at a constant rate, in s; 0 is at once.
+
+    Raises
+    ------
+    InputError
+        If the strain is not finite, a time is not positive, or the protocol is an oscillation by a
+        formula.
     """
+    _require_positive("first", first)
+    if not np.isfinite(strain) or duration < 0.0:
+        raise InputError(
+            f"A step needs a strain and a duration from 0 on; got {strain}, {duration}."
+        )
     length = duration if duration > 0.0 else _AT_ONCE * first
     rate = strain / length
     return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
@@ -76,7 +95,13 @@ def after_alternation(
         In s.
     times
         Of the samples, in s.
+
+    Raises
+    ------
+    InputError
+        If the period is not positive.
     """
+    _require_positive("period", period)
     if np.any(np.asarray(protocol.amplitudes)):
         # a cosine has gone on for ever: begin where its rate is largest
         turn = -CYCLES * period + np.arange(_PER_CYCLE) / _PER_CYCLE * period
@@ -90,6 +115,11 @@ def after_alternation(
     rates = np.tile(cycle, CYCLES)
     start = int(np.argmax(np.abs(cycle)))
     return _begun(protocol, knots[start:], rates[start:], replaces_until=first)
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{name} must be a positive time in s; got {value}.")
 
 
 def _rates(protocol: ShearProtocol, times: np.ndarray) -> np.ndarray:
