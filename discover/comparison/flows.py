@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_simpson
 
 from discover.dataset.run import ShearRun
 from discover.laws.multimode import Fluid
+from discover.protocols.kinematics import recorded_name
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
 from discover.protocols.shear import ShearProtocol, oscillatory_shear, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
@@ -18,9 +19,6 @@ from discover.study.build import StudyData
 
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""
-
-TENSILE_STRESS = "tensile_stress"
-"""What is recorded in extension, as spelled in JSON; it takes the place of σ12."""
 
 Stresses = Mapping[str, Float[np.ndarray, " _"]]
 """Some of `QUANTITIES`, each of shape (n,)."""
@@ -252,4 +250,4 @@ def of_recorded(errors: Mapping[str, float | None], flow: Flow) -> dict[str, flo
     """Return errors under the names of what is recorded: the tensile stress in extension."""
     if flow.in_shear:
         return dict(errors)
-    return {TENSILE_STRESS: errors["sigma12"]}
+    return {recorded_name(flow.protocol.flow): errors["sigma12"]}

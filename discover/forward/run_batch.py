@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import ShearRun
-from discover.protocols.kinematics import Kinematics
-from discover.protocols.shear import shear_rates, stack_protocols
+from discover.protocols.kinematics import Kinematics, stack_kinematics
+from discover.protocols.shear import shear_rates
 from discover.simulate.grid import make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
@@ -103,9 +103,10 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
                 run.strain_before,
             )
         )
-    stacked = stack_protocols([run.protocol for run in runs])
     columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
-    return RunBatch(*columns, kinematics=stacked.kinematics)
+    return RunBatch(
+        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
+    )
 
 
 def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:

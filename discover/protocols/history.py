@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.shear import ShearProtocol, shear_rates
 
 STEADY_LENGTH = 20.0
 """A steady flow before a run is computed over this multiple of the run's length, at most: what
@@ -105,16 +105,16 @@ def after_alternation(
     if np.any(np.asarray(protocol.amplitudes)):
         # a cosine has gone on for ever: begin where its rate is largest
         turn = -CYCLES * period + np.arange(_PER_CYCLE) / _PER_CYCLE * period
-        largest = int(np.argmax(np.abs(_rates(protocol, turn))))
+        largest = int(np.argmax(np.abs(shear_rates(protocol, turn))))
         return replace(protocol, begins=jnp.asarray(float(turn[largest])))
     # one cycle of the record, whole cycles before it, and from the largest rate on
     phase = np.arange(_PER_CYCLE) / _PER_CYCLE * period
     first = float(times[0])
-    cycle = _rates(protocol, first + phase)
+    cycle = shear_rates(protocol, first + phase)
     knots = np.concatenate([first + phase - k * period for k in range(CYCLES, 0, -1)])
     rates = np.tile(cycle, CYCLES)
     start = int(np.argmax(np.abs(cycle)))
-    return _begun(protocol, knots[start:], rates[start:], replaces_until=first)
+    return _begun(protocol, knots[start:], rates[start:], until=first)
 
 
 def _require_positive(name: str, value: float) -> None:
@@ -122,38 +122,23 @@ def _require_positive(name: str, value: float) -> None:
         raise InputError(f"{name} must be a positive time in s; got {value}.")
 
 
-def _rates(protocol: ShearProtocol, times: np.ndarray) -> np.ndarray:
-    table = np.interp(times, np.asarray(protocol.table_times), np.asarray(protocol.table_rates))
-    waves = np.asarray(protocol.amplitudes) * np.cos(
-        np.outer(times, np.asarray(protocol.frequencies)) + np.asarray(protocol.phases)
-    )
-    return table + np.sum(waves, axis=1)
-
-
 def _begun(
     protocol: ShearProtocol,
     knots: np.ndarray,
     rates: np.ndarray,
-    replaces_until: float = 0.0,
+    until: float = 0.0,
 ) -> ShearProtocol:
-    """Return the protocol with a table of rates before it."""
+    """Return the protocol with a table of rates before it, which holds until a time in s."""
     if np.any(np.asarray(protocol.amplitudes)):
         raise InputError(
             "An oscillation given by a formula has no beginning, so nothing can come before it. "
             "Give its rate in samples: measured_rate(times, rates)."
         )
     own_times, own_rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
-    if replaces_until == 0.0:
-        first = np.interp(0.0, own_times, own_rates)
-        keep = own_times > 0.0
-        own_times = np.concatenate([[0.0], own_times[keep]])
-        own_rates = np.concatenate([[first], own_rates[keep]])
-    else:
-        keep = own_times >= replaces_until
-        own_times, own_rates = own_times[keep], own_rates[keep]
+    first, later = np.interp(until, own_times, own_rates), own_times > until
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([knots, own_times])),
-        table_rates=jnp.asarray(np.concatenate([rates, own_rates])),
+        table_times=jnp.asarray(np.concatenate([knots, [until], own_times[later]])),
+        table_rates=jnp.asarray(np.concatenate([rates, [first], own_rates[later]])),
         begins=jnp.asarray(float(knots[0])),
     )

@@ -4,10 +4,11 @@ All of them share their principal third axis, so that the stress has four compon
 12, and the velocity gradient the same four. A rate times a fixed gradient is the whole flow.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -86,6 +87,24 @@ def kinematics_of(kind: str) -> Kinematics:
     return Kinematics(
         *(jnp.asarray(part) for part in (gradient, recorded, intensity, recorded @ rate))
     )
+
+
+def recorded_name(kind: str) -> Literal["sigma12", "tensile_stress"]:
+    """Return what is recorded in a flow, as studies and results spell it."""
+    return "sigma12" if kind == "shear" else "tensile_stress"
+
+
+def of_one_kind(each: Sequence[Kinematics | None]) -> list[Kinematics] | list[None]:
+    """Return kinematics that stack: all None where all are simple shear, none of them otherwise."""
+    if all(one is None for one in each):
+        return [None] * len(each)
+    shear = kinematics_of("shear")
+    return [one or shear for one in each]
+
+
+def stack_kinematics(each: Sequence[Kinematics | None]) -> Kinematics | None:
+    """Return kinematics with a leading batch axis; None where all are simple shear."""
+    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *of_one_kind(each))
 
 
 def recorded_quantity(kinds: Iterable[str]) -> str:

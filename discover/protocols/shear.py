@@ -12,7 +12,13 @@ from scipy.interpolate import PchipInterpolator
 
 from discover.errors import InputError
 from discover.programs import compiled
-from discover.protocols.kinematics import FlowKind, Kinematics, kind_of, kinematics_of
+from discover.protocols.kinematics import (
+    FlowKind,
+    Kinematics,
+    kind_of,
+    kinematics_of,
+    of_one_kind,
+)
 from tensor_library.kinematics import VelocityGradient
 
 
@@ -244,10 +250,10 @@ def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
     """
     m = max(p.table_times.shape[0] for p in protocols)
     c = max(p.amplitudes.shape[0] for p in protocols)
-    if any(p.kinematics is not None for p in protocols):
-        shear = kinematics_of("shear")
-        protocols = [p if p.kinematics else replace(p, kinematics=shear) for p in protocols]
-    stacked = [_padded(p, m, c) for p in protocols]
+    flows = of_one_kind([p.kinematics for p in protocols])
+    stacked = [
+        replace(_padded(p, m, c), kinematics=flow) for p, flow in zip(protocols, flows, strict=True)
+    ]
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
 
 

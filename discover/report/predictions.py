@@ -9,6 +9,7 @@ import pandas as pd
 from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
+from discover.protocols.kinematics import recorded_name
 from discover.study.run_folder import RunFolder
 
 COLUMNS = (
@@ -64,7 +65,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
                         time_s=flow.times,
                         strain=flow.strain,
                         rate_1_s=flow.shear_rate,
-                        quantity=quantity if flow.in_shear else "tensile_stress",
+                        quantity=quantity if flow.in_shear else recorded_name(flow.protocol.flow),
                         source=_SOURCES.get(who, who),
                         value=predicted[quantity],
                         low95=low,
@@ -89,10 +90,6 @@ def write_predictions(table: pd.DataFrame, folder: RunFolder) -> None:
     folder.write(PREDICTIONS, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
 
 
-def _recorded(flow: str) -> str:
-    return "sigma12" if flow == "shear" else "tensile_stress"
-
-
 def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
     sources = {"declared": record.predicted[0]}
     if len(record.predicted) > 1:
@@ -104,7 +101,7 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
             time_s=record.time,
             strain=record.strain,
             rate_1_s=record.shear_rate,
-            quantity=_recorded(record.flow),
+            quantity=recorded_name(record.flow),
             source=source,
             value=predicted,
             low95=np.nan,

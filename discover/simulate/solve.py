@@ -124,9 +124,9 @@ def simulate(
     """
     times = np.asarray(times, dtype=float)
     end = float(times[-1])
-    if end == 0.0:
-        rate = protocol.shear_rate(jnp.asarray(0.0))
-        return ShearStress(times, np.asarray(fluid.stress(fluid.rest(), rate))[None])
+    if end == float(protocol.begins):
+        gradient = protocol.velocity_gradient(jnp.asarray(end))
+        return ShearStress(times, np.asarray(fluid.stress(fluid.rest(), gradient))[None])
     shortest = float(np.min(np.asarray(fluid.relaxation_time)))
     stiff = fluid.n_modes > 1 and end / shortest > 1e3
     solver = ExponentialRungeKutta4(_decay(fluid)) if stiff else diffrax.Tsit5()

@@ -13,6 +13,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
+from discover.protocols.kinematics import recorded_name
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.schema import Study
 
@@ -142,8 +143,7 @@ def _by_observation(
     judges = [
         run.name
         for run in dataset
-        if observe is not None
-        and ("sigma12" if run.flow == "shear" else "tensile_stress") not in observe
+        if observe is not None and recorded_name(run.flow) not in observe
     ]
     both = [name for name in judges if name in (fit or ())]
     if both:

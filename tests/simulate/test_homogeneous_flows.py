@@ -144,6 +144,12 @@ def test_troutons_ratios_are_three_four_and_six():
     assert {kind: float(kinematics_of(kind).viscous) for kind in ratios} == ratios
 
 
+def test_a_solvent_pulls_at_the_first_instant_with_troutons_ratio():
+    pull = in_flow(start_up(0.5), "uniaxial")
+    stress = simulate(fluid(), pull, np.array([0.0]))
+    assert recorded_at(pull, stress.components) == pytest.approx([3.0 * SOLVENT * 0.5])
+
+
 def test_what_cannot_have_come_before_is_refused():
     for nonsense, word in (
         (lambda: after_steady_flow(start_up(1.0), 0.0, 5.0), "must not be 0"),

@@ -222,8 +222,8 @@ def _shared_gain(
     spectrum: RelaxationSpectrum,
 ) -> Iterator[Finding]:
     """Yield by which factor all runs differ from the sweep, if it is one for all."""
-    from_rest = [run for run in runs if run.flows]
-    found = [gain for run in from_rest if (gain := _gain(run, *linear[run.name])) is not None]
+    flowing = [run for run in runs if run.name in linear]
+    found = [gain for run in flowing if (gain := _gain(run, *linear[run.name])) is not None]
     if not found:
         return
     gains, errors = np.array(found).T
