@@ -46,7 +46,7 @@ def main() -> None:
         def one(protocol, grid, target):
             solution = diffrax.diffeqsolve(
                 # a closed-over tracer would escape the continuous adjoint
-                diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].shear_rate(t))),
+                diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].rate(t))),
                 ExponentialRungeKutta4(jnp.ones((1, 1))),
                 0.0,
                 times[-1],

@@ -38,7 +38,7 @@ def measured():
 
 def synthetic():
     """Return a synthetic melt likewise: exponential PTT, a slow motor, one per cent of noise."""
-    from discover.dataset import ShearDataset, ShearRun
+    from discover.dataset import Dataset, Run
     from discover.forward.declared import DeclaredModel
     from discover.laws import Fluid, make_law
     from discover.protocols import start_up
@@ -53,9 +53,9 @@ def synthetic():
         when = np.geomspace(0.02, 25.0, 300) / rate
         stress = np.asarray(simulate(fluid, start_up(float(rate)), when).shear_stress)
         noisy = stress * (1.0 + 0.01 * generator.standard_normal(stress.size))
-        runs.append(ShearRun(f"run_{i:02d}", start_up(float(rate)), when, noisy))
+        runs.append(Run(f"run_{i:02d}", start_up(float(rate)), when, noisy))
     held = tuple(run.name for run in runs[-3:])
-    return ShearDataset("made", tuple(runs)), DeclaredModel.maxwell(moduli, times), held
+    return Dataset("made", tuple(runs)), DeclaredModel.maxwell(moduli, times), held
 
 
 def main() -> None:

@@ -64,7 +64,7 @@ def adaptive_gradient(problem, network):
             # samples of the paper are evenly spaced and start at zero
             times = jnp.linspace(0.0, grid.times[-1], target.shape[0])
             solution = diffrax.diffeqsolve(
-                diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].shear_rate(t))),
+                diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].rate(t))),
                 diffrax.Tsit5(),
                 0.0,
                 times[-1],

@@ -16,9 +16,9 @@ from discover._version import __version__ as __version__
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.closed_loop.in_memory import close_loop as close_loop
     from discover.comparison.in_memory import compare as compare
+    from discover.dataset import Dataset as Dataset
     from discover.dataset import LinearSweep as LinearSweep
-    from discover.dataset import ShearDataset as ShearDataset
-    from discover.dataset import ShearRun as ShearRun
+    from discover.dataset import Run as Run
     from discover.dataset import check_folder as check_folder
     from discover.dataset import load_dataset as load_dataset
     from discover.dataset.importing import register_importer as register_importer
@@ -51,11 +51,11 @@ __all__ = [
     "TBNNUDE",
     "AbstractConstitutiveLaw",
     "ClosedForm",
+    "Dataset",
     "Fluid",
     "InputError",
     "LinearSweep",
-    "ShearDataset",
-    "ShearRun",
+    "Run",
     "TensorSINDy",
     "after_alternation",
     "after_steady_flow",
@@ -87,8 +87,8 @@ _PLACES = {
     "discover.comparison.in_memory": ("compare",),
     "discover.dataset": (
         "LinearSweep",
-        "ShearDataset",
-        "ShearRun",
+        "Dataset",
+        "Run",
         "check_folder",
         "load_dataset",
     ),

@@ -30,7 +30,7 @@ def draw(comparison: Comparison) -> Picture:
     with figure(1, 3, width=9.0, height=2.9) as (drawing, axes):
         for panel, quantity in zip(axes[0], QUANTITIES, strict=True):
             for label, style, stresses in curves(comparison, flow):
-                panel.plot(flow.shear_rate[last], stresses[quantity][last], label=label, **style)
+                panel.plot(flow.rate[last], stresses[quantity][last], label=label, **style)
             panel.set_title(TITLES[quantity])
             panel.set_xlabel("λγ̇")
             panel.set_ylabel(f"{SYMBOLS[quantity]} / G")

@@ -7,20 +7,20 @@ from jaxtyping import Float
 
 from discover.closed_loop.result import ErrorPair
 from discover.closed_loop.run_record import RunRecord
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, RunBatch
 from discover.protocols import strains
 
 
-def strain_of(run: ShearRun) -> Float[np.ndarray, " n"]:
+def strain_of(run: Run) -> Float[np.ndarray, " n"]:
     """Return the strain of a run at its samples: recorded, or of its commanded rate."""
     if run.strain is not None:
         return run.strain
     return strains(run.protocol, run.time)
 
 
-def cut_to_strain(runs: Sequence[ShearRun], window: tuple[float, float] | None) -> list[ShearRun]:
+def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> list[Run]:
     """Return the samples of every run whose strain magnitude lies in a window.
 
     Raises
@@ -52,7 +52,7 @@ def cut_to_strain(runs: Sequence[ShearRun], window: tuple[float, float] | None) 
 def record_runs(
     model: AugmentedModel,
     batch: RunBatch,
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     thetas: Sequence[np.ndarray],
     held_out: bool,
     order: Sequence[str] = (),
@@ -72,8 +72,8 @@ def record_runs(
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]
-        size = np.sqrt(np.mean(run.shear_stress**2))
-        misfit = np.sqrt(np.mean((predicted - run.shear_stress) ** 2, axis=1))
+        size = np.sqrt(np.mean(run.stress**2))
+        misfit = np.sqrt(np.mean((predicted - run.stress) ** 2, axis=1))
         records.append(
             RunRecord(
                 name=run.name,
@@ -81,8 +81,8 @@ def record_runs(
                 time=run.time,
                 strain=strain_of(run),
                 instrument_time=run.time / run.clock_factor,
-                shear_rate=run.shear_rate,
-                measured=run.shear_stress,
+                rate=run.rate,
+                measured=run.stress,
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
                 conditions=_conditions(run, order),
@@ -92,7 +92,7 @@ def record_runs(
     return records
 
 
-def _conditions(run: ShearRun, order: Sequence[str]) -> dict[str, float]:
+def _conditions(run: Run, order: Sequence[str]) -> dict[str, float]:
     numbers = {k: float(v) for k, v in run.metadata.items() if not isinstance(v, str)}
     numbers.pop("n_points", None)  # of the file, not of the experiment
     if run.name in order:

@@ -8,14 +8,14 @@ import numpy as np
 from discover.closed_loop.loop import MOST_SAMPLES, run_loop
 from discover.closed_loop.result import ErrorPair, Fold, LoopResult
 from discover.closed_loop.search_checkpoint import Store
-from discover.dataset import ShearDataset
+from discover.dataset import Dataset
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 
 
 def run_loop_on_each(
-    dataset: ShearDataset,
+    dataset: Dataset,
     declared: DeclaredModel,
     fit: Sequence[str] | None = None,
     effects: Sequence[str | AbstractEffect] | str | None = None,

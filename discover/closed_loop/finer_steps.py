@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.least_squares import Fit
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import SeriesElement
 from discover.errors import InputError
 from discover.forward import AugmentedModel, RunBatch, make_batch
@@ -19,7 +19,7 @@ _STRAIN_STEP = 0.05
 def on_finer_steps(
     model: AugmentedModel,
     batch: RunBatch,
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     fit: Fit,
     active: Sequence[str],
 ) -> Fit:
@@ -52,7 +52,7 @@ def on_finer_steps(
 def change_on_finer_steps(
     model: AugmentedModel,
     batch: RunBatch,
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     theta: np.ndarray,
     active: Sequence[str],
     smooth_rates: bool = False,
@@ -91,7 +91,7 @@ def change_on_finer_steps(
     return change if np.all(np.isfinite(change)) else np.zeros_like(change)
 
 
-def _with_smooth_rate(run: ShearRun) -> ShearRun:
+def _with_smooth_rate(run: Run) -> Run:
     """Return a run whose rate, where it was read in samples, is a smooth curve through them."""
     smooth = smooth_between_samples(run.protocol)
     return run if smooth is None else replace(run, protocol=smooth)

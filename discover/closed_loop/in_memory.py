@@ -7,7 +7,7 @@ from typing import Any
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import LoopResult
-from discover.dataset import ShearDataset
+from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.laws.multimode import Fluid
@@ -17,7 +17,7 @@ from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid
 
 
 def close_loop(
-    data: ShearDataset,
+    data: Dataset,
     base: Fluid | None = None,
     *,
     held_out: HeldOut = (),

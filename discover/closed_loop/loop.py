@@ -24,7 +24,7 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.search_checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.silence import fluid_is_silent, records_are_silent
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.dataset.checking.start import doubts_of_start
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
@@ -71,7 +71,7 @@ EXTRAPOLATION = 10.0
 
 
 def run_loop(
-    dataset: ShearDataset,
+    dataset: Dataset,
     declared: DeclaredModel,
     fit: Sequence[str] | None = None,
     held_out: Sequence[str] = (),
@@ -257,17 +257,17 @@ def _split(dataset, fit, held_out, strain, most):
     return fitted_runs, held_runs, spikes
 
 
-def _without_spikes(runs: Sequence[ShearRun], spikes: dict[str, list[float]]) -> Iterator[ShearRun]:
+def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
     """Give the runs without the samples that stand alone in them, whose times are noted."""
     for run in runs:
-        off = isolated(run.shear_stress)
+        off = isolated(run.stress)
         if np.any(off):
             spikes[run.name] = [float(t) for t in run.time[off]]
         yield run.window(~off) if np.any(off) else run
 
 
 def _with_later_ones(
-    spikes: dict[str, list[float]], runs: Sequence[ShearRun], judgement: Judgement
+    spikes: dict[str, list[float]], runs: Sequence[Run], judgement: Judgement
 ) -> dict[str, list[float]]:
     """Return the times of all outliers: of those that the fit showed too."""
     found = dict(spikes)
@@ -278,14 +278,14 @@ def _with_later_ones(
     return found
 
 
-def _needed(run: ShearRun, most: int) -> int:
+def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
-    size = float(np.sqrt(np.mean(run.shear_stress**2)))
-    noise = fast_part(run.shear_stress) / size if size > 0.0 else 0.0
+    size = float(np.sqrt(np.mean(run.stress**2)))
+    noise = fast_part(run.stress) / size if size > 0.0 else 0.0
     return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
 
 
-def _require_samples(runs: Sequence[ShearRun], declared: DeclaredModel) -> None:
+def _require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
     """Refuse what any law would fit."""
     count, constants = sum(len(run) for run in runs), len(declared.free_positions)
     if count < FEWEST_SAMPLES + constants:
@@ -316,7 +316,7 @@ def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[Ab
     return made
 
 
-def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
+def _admission(fitted: Sequence[Run], held: Sequence[Run]):
     """Return which effects are candidates, given the rates.
 
     Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
@@ -324,8 +324,8 @@ def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
     so this looks at no held-out stress.
     """
     measured = any(run.rate_is_measured for run in fitted)
-    fastest = max(float(np.max(np.abs(run.shear_rate))) for run in fitted)
-    asked = max((float(np.max(np.abs(run.shear_rate))) for run in held), default=0.0)
+    fastest = max(float(np.max(np.abs(run.rate))) for run in fitted)
+    asked = max((float(np.max(np.abs(run.rate))) for run in held), default=0.0)
     far = asked > EXTRAPOLATION * fastest
 
     def admitted(effect: AbstractEffect) -> bool:
@@ -336,7 +336,7 @@ def _admission(fitted: Sequence[ShearRun], held: Sequence[ShearRun]):
     return admitted
 
 
-def _settle(search: Search, runs: Sequence[ShearRun], max_effects: int, say) -> None:
+def _settle(search: Search, runs: Sequence[Run], max_effects: int, say) -> None:
     """Find instrument effects where the strain is small and no law differs from another.
 
     That holds for fluids that are linear there. Where instrument effects alone do not explain the

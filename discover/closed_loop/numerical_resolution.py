@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from discover.closed_loop.finer_steps import change_on_finer_steps
 from discover.closed_loop.least_squares import Fit
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.forward import AugmentedModel, RunBatch
 from discover.statistics.residual import judging
 
@@ -33,11 +33,11 @@ class NumericalResolution:
         The model with all candidates; the runs, laid out for it and as they are.
     """
 
-    def __init__(self, model: AugmentedModel, batch: RunBatch, runs: Sequence[ShearRun]):
+    def __init__(self, model: AugmentedModel, batch: RunBatch, runs: Sequence[Run]):
         self.model, self.batch, self.runs = model, batch, runs
-        sizes = [float(np.sqrt(np.mean(run.shear_stress**2))) or 1.0 for run in runs]
+        sizes = [float(np.sqrt(np.mean(run.stress**2))) or 1.0 for run in runs]
         self.rounding = np.array(
-            [rounding(run.shear_stress) / size for run, size in zip(runs, sizes, strict=True)]
+            [rounding(run.stress) / size for run, size in zip(runs, sizes, strict=True)]
         )
         self._known: dict[bytes, np.ndarray] = {}
 

@@ -13,11 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.effects import named_effects
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, RunBatch, data_scales, make_batch
-from discover.protocols import ShearProtocol, oscillatory_shear, start_up
+from discover.protocols import FlowProtocol, oscillatory_shear, start_up
 
 MODULUS, RELAXATION_TIME = 100.0, 1.0
 """Of the base laws, in Pa and s."""
@@ -29,7 +29,7 @@ BASE_LAWS: Mapping[str, Mapping[str, float]] = {
 }
 """Base laws with their parameters."""
 
-FIT_FLOWS: Mapping[str, ShearProtocol] = {
+FIT_FLOWS: Mapping[str, FlowProtocol] = {
     "start_slow": start_up(0.3),
     "start_middle": start_up(1.0),
     "start_fast": start_up(2.5),
@@ -37,7 +37,7 @@ FIT_FLOWS: Mapping[str, ShearProtocol] = {
     "laos_large": oscillatory_shear(2.0, 1.0),
     "laos_fast": oscillatory_shear(1.5, 3.0),
 }
-HELD_OUT_FLOWS: Mapping[str, ShearProtocol] = {
+HELD_OUT_FLOWS: Mapping[str, FlowProtocol] = {
     "start_held_out": start_up(1.8),
     "laos_held_out": oscillatory_shear(1.8, 0.8),
 }
@@ -89,7 +89,7 @@ class PlantedCase:
         Noise of the record.
     """
 
-    dataset: ShearDataset
+    dataset: Dataset
     declared: DeclaredModel
     held_out: tuple[str, ...]
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -241,7 +241,7 @@ class Planter:
         level = np.sqrt(np.mean(stress**2, axis=1, keepdims=True))
         stress = stress + level * noise.draw(stress.shape, generator)
         return PlantedCase(
-            dataset=ShearDataset("planted", tuple(self._with(stress))),
+            dataset=Dataset("planted", tuple(self._with(stress))),
             declared=told or self.declared,
             held_out=tuple(HELD_OUT_FLOWS),
             effects=planted,
@@ -250,9 +250,9 @@ class Planter:
             noise=noise,
         )
 
-    def _with(self, stress) -> list[ShearRun]:
+    def _with(self, stress) -> list[Run]:
         return [
-            ShearRun(run.name, run.time, run.protocol, run.shear_rate, row[: len(run)])
+            Run(run.name, run.time, run.protocol, run.rate, row[: len(run)])
             for run, row in zip(self._runs, stress, strict=True)
         ]
 
@@ -307,10 +307,10 @@ def _bisect(change: Callable[[float], float], wanted: float, high: float, name: 
     return 0.5 * (low + upper)
 
 
-def _empty_run(name: str, flow: ShearProtocol) -> ShearRun:
+def _empty_run(name: str, flow: FlowProtocol) -> Run:
     times = _START_UP_TIMES if name.startswith("start") else _OSCILLATION_TIMES
-    rate = np.array([float(flow.shear_rate(jnp.asarray(t))) for t in times])
-    return ShearRun(name, times, flow, rate, np.ones(len(times)))
+    rate = np.array([float(flow.rate(jnp.asarray(t))) for t in times])
+    return Run(name, times, flow, rate, np.ones(len(times)))
 
 
 def _sample_times(batch: RunBatch) -> np.ndarray:

@@ -189,7 +189,7 @@ def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
     found = {
         "time": [r.time for r in records],
         "strain": [np.abs(r.strain) for r in records],
-        "shear rate": [r.shear_rate for r in records],
+        "shear rate": [r.rate for r in records],
         "stress": [r.measured for r in records],
     }
     if any(np.ptp(r.time - r.instrument_time) > 0 for r in records):
@@ -252,7 +252,7 @@ def _edges(values: np.ndarray) -> Float[np.ndarray, " bins"]:
 def differences(records: Sequence[RunRecord]) -> dict[str, Float[np.ndarray, " runs"]]:
     """Return what differs from run to run, by name: of the flow, and what the source says."""
     found = {
-        "the largest shear rate": [float(np.max(np.abs(r.shear_rate))) for r in records],
+        "the largest shear rate": [float(np.max(np.abs(r.rate))) for r in records],
         "the largest strain": [float(np.max(np.abs(r.strain))) for r in records],
         "the largest stress": [float(np.max(np.abs(r.measured))) for r in records],
         "the duration": [float(r.time[-1]) for r in records],

@@ -301,7 +301,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
 
 
 def _numbers(record: RunRecord, time: float) -> tuple[float, float]:
-    return flow_numbers(record.time, record.shear_rate, time)
+    return flow_numbers(record.time, record.rate, time)
 
 
 def _plain(value: Any) -> Any:

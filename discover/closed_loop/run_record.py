@@ -19,7 +19,7 @@ class RunRecord:
         The run, and whether it was held out.
     time, strain, instrument_time
         In s, dimensionless, and in s on the instrument's clock, shape (n,).
-    shear_rate
+    rate
         Commanded, in 1/s, shape (n,); in extension the Hencky rate.
     measured
         Recorded stress in Pa, shape (n,): σ12 in shear, σ11 − σ22 in extension.
@@ -39,7 +39,7 @@ class RunRecord:
     time: Float[np.ndarray, " n"]
     strain: Float[np.ndarray, " n"]
     instrument_time: Float[np.ndarray, " n"]
-    shear_rate: Float[np.ndarray, " n"]
+    rate: Float[np.ndarray, " n"]
     measured: Float[np.ndarray, " n"]
     predicted: Float[np.ndarray, "stages n"]
     errors: Float[np.ndarray, " stages"]

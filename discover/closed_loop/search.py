@@ -33,7 +33,7 @@ from discover.closed_loop.physical_range import at_an_end, undetermined
 from discover.closed_loop.search_checkpoint import SearchCheckpoint
 from discover.closed_loop.search_state import SearchState
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, RunBatch, make_batch
@@ -121,7 +121,7 @@ class Search(SearchState):
         return self.tolerated.explained(self.fit, self.active)
 
     def restricted(
-        self, runs: Sequence[ShearRun], admitted: Callable[[AbstractEffect], bool], name: str
+        self, runs: Sequence[Run], admitted: Callable[[AbstractEffect], bool], name: str
     ) -> "Search":
         """Return a new search on other samples among fewer candidates, kept under its own name."""
         batch = make_batch(runs)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from discover.closed_loop.least_squares import Fit
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, RunBatch
 from discover.statistics import holds_signal
@@ -20,9 +20,9 @@ _ALIKE = 1.1
 samples are independent, and the test alone would not see a fluid that halves the misfit."""
 
 
-def records_are_silent(runs: Sequence[ShearRun]) -> bool:
+def records_are_silent(runs: Sequence[Run]) -> bool:
     """Return whether records are noise about a constant, whatever rate was imposed."""
-    return not holds_signal([run.shear_stress for run in runs], [run.shear_rate for run in runs])
+    return not holds_signal([run.stress for run in runs], [run.rate for run in runs])
 
 
 def fluid_is_silent(

@@ -49,7 +49,7 @@ class Wave:
 
 def oscillation(record: RunRecord) -> float | None:
     """Return the frequency in rad/s at which the shear rate of a run oscillates, if it does."""
-    rate, time = record.shear_rate, record.time
+    rate, time = record.rate, record.time
     signs = np.sign(rate)
     turns = np.flatnonzero(signs[1:] * signs[:-1] < 0)
     if len(turns) < 2 * _FEWEST_CYCLES:
@@ -96,7 +96,7 @@ def read_wave(record: RunRecord, model: int = -1) -> Wave | None:
         found = np.linalg.lstsq(basis, values[late], rcond=None)[0]
         return found[: 2 * HARMONICS : 2] - 1j * found[1 : 2 * HARMONICS : 2], float(found[-1])
 
-    rate, _ = coefficients(record.shear_rate)
+    rate, _ = coefficients(record.rate)
     stress, _ = coefficients(record.measured)
     left, drift = coefficients(record.residual[model])
     rest = record.residual[model][late]

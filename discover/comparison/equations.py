@@ -69,7 +69,7 @@ def outcome_equation(
 
 
 def _numbers(flow: Flow, time: float) -> tuple[float, float]:
-    return flow_numbers(flow.times, flow.shear_rate, time, flow.frequency)
+    return flow_numbers(flow.times, flow.rate, time, flow.frequency)
 
 
 def _worst(outcome: LearnerOutcome, judged: Sequence[Flow]) -> dict[str, float]:

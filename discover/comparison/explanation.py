@@ -111,7 +111,7 @@ def _left(
                 return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
             residuals.append(np.asarray(prediction[quantity] - record, dtype=float))
             records.append(np.asarray(record, dtype=float))
-            rates.append(np.asarray(flow.shear_rate, dtype=float))
+            rates.append(np.asarray(flow.rate, dtype=float))
     found = lack_of_fit(residuals, records, expectation, rates)
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:

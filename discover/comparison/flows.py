@@ -8,11 +8,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import recorded_name
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
-from discover.protocols.shear import ShearProtocol, oscillatory_shear, recorded_at, shear_rates
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import StudyData
@@ -59,9 +59,9 @@ class Flow:
 
     name: str
     kind: FlowKind
-    protocol: ShearProtocol
+    protocol: FlowProtocol
     times: Float[np.ndarray, " n"]
-    shear_rate: Float[np.ndarray, " n"]
+    rate: Float[np.ndarray, " n"]
     reference: Stresses
     measured: Float[np.ndarray, " n"] | None = None
     is_truth: bool = False
@@ -93,7 +93,7 @@ class Flow:
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
         """Strain since the first sample, shape (n,)."""
-        return cumulative_simpson(self.shear_rate, x=self.times, initial=0.0)
+        return cumulative_simpson(self.rate, x=self.times, initial=0.0)
 
     @property
     def title(self) -> str:
@@ -159,7 +159,7 @@ def _late_cycle(deborah: float, samples: int = 121) -> Float[np.ndarray, " n"]:
     return np.concatenate([[0.0], start + np.linspace(0.0, period, samples)])
 
 
-def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
+def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
     """Return the flow of a run of the data set."""
     dataset = data.dataset
     exact = dataset.exact if isinstance(dataset, SyntheticDataset) else None
@@ -167,7 +167,7 @@ def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
         reference = stresses(exact[run.name], run.protocol)
     else:
         candidates = {
-            "sigma12": run.shear_stress,  # in extension the tensile stress
+            "sigma12": run.stress,  # in extension the tensile stress
             "N1": run.first_normal_stress_difference,
             "N2": run.second_normal_stress_difference,
         }
@@ -177,12 +177,12 @@ def run_flow(run: ShearRun, kind: FlowKind, data: StudyData) -> Flow:
         kind,
         run.protocol,
         run.time,
-        run.shear_rate,
+        run.rate,
         reference,
-        run.shear_stress if kind == "training" else None,
+        run.stress if kind == "training" else None,
         is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" else None,
-        oscillatory=_oscillates(run.protocol, run.shear_rate),
+        oscillatory=_oscillates(run.protocol, run.rate),
     )
 
 
@@ -201,16 +201,16 @@ def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
     )
 
 
-def _exactly(truth: Fluid, protocol: ShearProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
+def _exactly(truth: Fluid, protocol: FlowProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
     return stresses(simulate(truth, protocol, times), protocol)
 
 
-def _oscillates(protocol: ShearProtocol, rates: np.ndarray) -> bool:
+def _oscillates(protocol: FlowProtocol, rates: np.ndarray) -> bool:
     changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
     return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
 
 
-def stresses(stress: ShearStress, protocol: ShearProtocol) -> dict[str, np.ndarray]:
+def stresses(stress: ShearStress, protocol: FlowProtocol) -> dict[str, np.ndarray]:
     """Return the compared quantities of a solution; in extension the tensile stress comes first."""
     return {
         "sigma12": recorded_at(protocol, stress.components),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.identify import (
     LawStructure,
     LawTerms,
@@ -27,7 +27,7 @@ from discover.identify.relations import spell
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
-from discover.protocols.shear import stack_protocols
+from discover.protocols.protocol import stack_protocols
 from discover.simulate.grid import make_grids
 from discover.study.build import DeclaredModel
 from tensor_library.library import TermLibrary, build_library
@@ -227,7 +227,7 @@ def law_structure(structure: Structure | None) -> LawStructure | None:
 
 def structure_of(
     terms: Sequence[RecoveredTerm],
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     library: TermLibrary,
     model: DeclaredModel,
     use_normal_stresses: bool,
@@ -273,7 +273,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
     time = mean_relaxation_time(fluid)
-    weissenberg = time * max(float(np.max(np.abs(flow.shear_rate))) for flow in training)
+    weissenberg = time * max(float(np.max(np.abs(flow.rate))) for flow in training)
     deborah = time * max(_frequency(flow) for flow in training)
     protocols = [flow.protocol for flow in along]
     times = [_thinned(flow.times) for flow in along]

@@ -6,7 +6,7 @@ from typing import Any, overload
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare as compare_study
 from discover.comparison.training import Progress, searched, silent
-from discover.dataset import ShearDataset
+from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
@@ -24,9 +24,9 @@ from discover.study.schema import Study
 @overload
 def compare(
     first: Sequence[RunPrediction],
-    second: ShearDataset,
+    second: Dataset,
     *,
-    train: ShearDataset | None = None,
+    train: Dataset | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Comparison: ...
@@ -34,7 +34,7 @@ def compare(
 
 @overload
 def compare(
-    first: ShearDataset,
+    first: Dataset,
     second: Fluid | None = None,
     *,
     held_out: HeldOut = (),
@@ -82,7 +82,7 @@ def compare(
         judges that was fitted, or an option is unknown.
     """
     say = progress or silent
-    if isinstance(first, ShearDataset):
+    if isinstance(first, Dataset):
         if train is not None:
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
@@ -96,12 +96,12 @@ def compare(
         )
     estimators = _fitted(first)
     runs = _training_runs(estimators, train)
-    if not isinstance(second, ShearDataset) or not len(second):
+    if not isinstance(second, Dataset) or not len(second):
         raise InputError(
             "Give the data set that judges the estimators, with one run at least: "
             "compare([sindy, network], test)."
         )
-    data = StudyData(joined(second, runs), ShearDataset(second.name, runs), second)
+    data = StudyData(joined(second, runs), Dataset(second.name, runs), second)
     model = declared_fluid(_common_base(estimators), second)
     sparse = estimators.get("tensor_sindy")
     asked = {

@@ -28,7 +28,7 @@ from discover.comparison.training import (
 )
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.comparison.unseen_runs import hold_against_unseen
-from discover.dataset import ShearDataset
+from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
@@ -46,7 +46,7 @@ def compare(
     seed: int | None = None,
     progress: Progress = silent,
     store: RunFolder | None = None,
-    fit_constants: Callable[[DeclaredModel, ShearDataset], DeclaredModel] | None = None,
+    fit_constants: Callable[[DeclaredModel, Dataset], DeclaredModel] | None = None,
     *,
     data: StudyData | None = None,
     declared: DeclaredModel | None = None,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
@@ -46,7 +46,7 @@ def train(
     learner: str,
     study: Study,
     model: DeclaredModel,
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     seed: int = 0,
     progress: Progress = silent,
 ) -> tuple[LearnerResult, Fluid]:

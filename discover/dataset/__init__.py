@@ -2,22 +2,22 @@
 
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.folder import check_folder
+from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
     relaxation_spectrum,
 )
 from discover.dataset.load import load_dataset
-from discover.dataset.run import ShearRun
-from discover.dataset.shear_dataset import ShearDataset
+from discover.dataset.run import Run
 
 __all__ = [
+    "Dataset",
     "Finding",
     "Findings",
     "LinearSweep",
     "RelaxationSpectrum",
-    "ShearDataset",
-    "ShearRun",
+    "Run",
     "check_folder",
     "load_dataset",
     "relaxation_spectrum",

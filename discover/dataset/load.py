@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import units
+from discover.dataset.dataset import Dataset
 from discover.dataset.differentiation import DEFAULT_WINDOW
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.sequence import in_sequence
-from discover.dataset.shear_dataset import ShearDataset
 from discover.dataset.table import Table, read_bytes, read_table, shown
 from discover.dataset.thinning import thin_sweep
 from discover.errors import InputError
@@ -94,7 +94,7 @@ def load_dataset(
     rate_window: int = DEFAULT_WINDOW,
     rate_before: str | None = None,
     sequence: str | None = None,
-) -> ShearDataset:
+) -> Dataset:
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
     A column may carry another unit in its name, such as ``stress_kPa`` or ``time_ms``. A run
@@ -151,7 +151,7 @@ def load_dataset(
     )
     if sequence is not None:
         runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
-    return ShearDataset(
+    return Dataset(
         name=root.resolve().name,
         runs=runs,
         linear_sweep=find_sweep(root),

@@ -10,13 +10,13 @@ from jaxtyping import Float
 from discover.dataset import units
 from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.kind_of_test import DeclaredTest, declared_test
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.dataset.table import Table, read_table
 from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
 from discover.protocols.history import after_alternation, after_step_strain
-from discover.protocols.shear import ShearProtocol, in_flow, measured_rate, start_up
+from discover.protocols.protocol import FlowProtocol, in_flow, measured_rate, start_up
 
 INDEX_FILE = "runs.csv"
 
@@ -38,7 +38,7 @@ def read_run(
     rate_is_measured: bool = False,
     rate_window: int = DEFAULT_WINDOW,
     rate_before: float | None = None,
-) -> ShearRun:
+) -> Run:
     """Return the run on one line of ``runs.csv``.
 
     Parameters
@@ -79,12 +79,12 @@ def read_run(
         rate_is_measured = rate_is_measured or test.control == "stress"
         protocol, source = _protocol(time, rate, rate_is_measured)
     metadata["shear_rate_source"] = source
-    run = ShearRun(
+    run = Run(
         name=name,
         time=time,
         protocol=in_flow(protocol, test.flow),
-        shear_rate=rate,
-        shear_stress=stress,
+        rate=rate,
+        stress=stress,
         first_normal_stress_difference=normal,
         second_normal_stress_difference=second,
         strain=strain,
@@ -137,7 +137,7 @@ def _refuse_another_flow(table: Table, test: DeclaredTest) -> None:
     )
 
 
-def _begun(run: ShearRun, test: DeclaredTest, where: str) -> ShearRun:
+def _begun(run: Run, test: DeclaredTest, where: str) -> Run:
     """Return the run with what came before t = 0, where that is no steady flow."""
     if test.step_strain:
         later = run.time[run.time > 0.0]
@@ -196,7 +196,7 @@ def _check_sign(name: str, time: np.ndarray, rate: np.ndarray, stress: np.ndarra
 
 def _protocol(
     time: np.ndarray, rate: np.ndarray, rate_is_measured: bool
-) -> tuple[ShearProtocol, str]:
+) -> tuple[FlowProtocol, str]:
     level = float(np.median(rate))
     if np.ptp(rate) <= _CONSTANT * abs(level):
         return start_up(level), "measured, constant" if rate_is_measured else "commanded, constant"

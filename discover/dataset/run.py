@@ -10,14 +10,14 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import FlowKind
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
 
 
 @dataclass(frozen=True)
-class ShearRun:
+class Run:
     """One experiment in shear or in extension.
 
     In extension the rate is the Hencky rate, the stress the tensile stress σ11 − σ22, and the
@@ -32,9 +32,9 @@ class ShearRun:
     protocol
         The rate as a function of time, commanded or measured, which flow has it, and what came
         before t = 0.
-    shear_rate
+    rate
         Rate at the sampling times, in 1/s, shape (n,).
-    shear_stress
+    stress
         The stress recorded, in Pa, shape (n,): σ12 in shear.
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
@@ -56,9 +56,9 @@ class ShearRun:
 
     name: str
     time: Float[np.ndarray, " _"]
-    protocol: ShearProtocol
-    shear_rate: Float[np.ndarray, " _"]
-    shear_stress: Float[np.ndarray, " _"]
+    protocol: FlowProtocol
+    rate: Float[np.ndarray, " _"]
+    stress: Float[np.ndarray, " _"]
     first_normal_stress_difference: Float[np.ndarray, " _"] | None = None
     second_normal_stress_difference: Float[np.ndarray, " _"] | None = None
     strain: Float[np.ndarray, " _"] | None = None
@@ -75,8 +75,8 @@ class ShearRun:
             raise InputError(f"The run {self.name!r} has no samples; give at least one.")
         for label, values in (
             ("time", self.time),
-            ("shear_rate", self.shear_rate),
-            ("shear_stress", self.shear_stress),
+            ("rate", self.rate),
+            ("stress", self.stress),
             ("first_normal_stress_difference", self.first_normal_stress_difference),
             ("second_normal_stress_difference", self.second_normal_stress_difference),
             ("strain", self.strain),
@@ -119,14 +119,14 @@ class ShearRun:
     def __repr__(self) -> str:
         kinds = [name for name, values in self._recorded().items() if values is not None]
         span = f"{self.time[0]:.4g} to {self.time[-1]:.4g} s"
-        return f"<ShearRun {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
+        return f"<Run {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
 
     def _recorded(self) -> dict[str, np.ndarray | None]:
         in_shear = self.flow == "shear"
         return {
             "time_s": self.time,
-            "shear_rate_1_s" if in_shear else "hencky_rate_1_s": self.shear_rate,
-            "stress_Pa" if in_shear else "tensile_stress_Pa": self.shear_stress,
+            "shear_rate_1_s" if in_shear else "hencky_rate_1_s": self.rate,
+            "stress_Pa" if in_shear else "tensile_stress_Pa": self.stress,
             "N1_Pa": self.first_normal_stress_difference,
             "N2_Pa": self.second_normal_stress_difference,
             "strain" if in_shear else "hencky_strain": self.strain,
@@ -150,9 +150,9 @@ class ShearRun:
     @property
     def flows(self) -> bool:
         """Whether anything flows in the run, or did just before it."""
-        return not self.from_rest or bool(np.max(np.abs(self.shear_rate)) > SLOWEST_RATE)
+        return not self.from_rest or bool(np.max(np.abs(self.rate)) > SLOWEST_RATE)
 
-    def window(self, keep: np.ndarray) -> "ShearRun":
+    def window(self, keep: np.ndarray) -> "Run":
         """Return the run with only the samples where the boolean array `keep` holds.
 
         The flow's history is unchanged: it is the protocol's, from t = 0.
@@ -164,22 +164,20 @@ class ShearRun:
         return replace(
             self,
             time=self.time[keep],
-            shear_rate=self.shear_rate[keep],
-            shear_stress=self.shear_stress[keep],
+            rate=self.rate[keep],
+            stress=self.stress[keep],
             first_normal_stress_difference=cut(self.first_normal_stress_difference),
             second_normal_stress_difference=cut(self.second_normal_stress_difference),
             strain=cut(self.strain),
         )
 
 
-def same_samples(one: ShearRun, other: ShearRun) -> bool:
+def same_samples(one: Run, other: Run) -> bool:
     """Return whether two runs hold the same times and stresses, under whatever names."""
-    return np.array_equal(one.time, other.time) and np.array_equal(
-        one.shear_stress, other.shear_stress
-    )
+    return np.array_equal(one.time, other.time) and np.array_equal(one.stress, other.stress)
 
 
-def require_signal(runs: Sequence[ShearRun]) -> None:
+def require_signal(runs: Sequence[Run]) -> None:
     """Refuse runs of which none can teach a law.
 
     Raises
@@ -193,7 +191,7 @@ def require_signal(runs: Sequence[ShearRun]) -> None:
             f"The shear rate is zero in every run ({names}), so there is nothing to learn a law "
             "from. Add runs with flow, or check the unit of the column."
         )
-    if runs and not any(np.any(run.shear_stress) for run in runs):
+    if runs and not any(np.any(run.stress) for run in runs):
         raise InputError(
             f"The stress is zero throughout in every run ({names}), so there is nothing to learn a "
             "law from. Check the column."

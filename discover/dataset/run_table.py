@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from discover.dataset.run import SLOWEST_RATE, ShearRun
+from discover.dataset.run import SLOWEST_RATE, Run
 
 # share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
 # many where the stress was commanded, and noise
@@ -13,7 +13,7 @@ _PERIODIC = 0.7
 _VARYING = "varying rate"
 
 
-def run_line(run: ShearRun) -> dict[str, Any]:
+def run_line(run: Run) -> dict[str, Any]:
     """Return what a reader asks first of a run.
 
     Frequency (rad/s) and strain amplitude are there for oscillations alone. They are read off the
@@ -32,33 +32,33 @@ def run_line(run: ShearRun) -> dict[str, Any]:
         "flow": flow if not wave else "oscillation" if run.from_rest else "steady alternation",
         "samples": len(run),
         "duration_s": float(run.time[-1]),
-        "largest_rate_1_s": float(np.max(np.abs(run.shear_rate))),
+        "largest_rate_1_s": float(np.max(np.abs(run.rate))),
         "frequency_rad_s": wave[0] if wave else None,
         "strain_amplitude": wave[1] / wave[0] if wave else None,
-        "largest_stress_Pa": float(np.max(np.abs(run.shear_stress))),
+        "largest_stress_Pa": float(np.max(np.abs(run.stress))),
         "N1": normal[0] is not None,
         "N2": normal[1] is not None,
     }
 
 
-def _flow(run: ShearRun) -> str:
+def _flow(run: Run) -> str:
     if not run.flows:
         return "rest"
-    size = max(float(np.max(np.abs(run.shear_rate))), abs(run.rate_before), SLOWEST_RATE)
-    jumps = np.count_nonzero(np.abs(np.diff(run.shear_rate)) > 1e-6 * size)
+    size = max(float(np.max(np.abs(run.rate))), abs(run.rate_before), SLOWEST_RATE)
+    jumps = np.count_nonzero(np.abs(np.diff(run.rate)) > 1e-6 * size)
     if jumps > len(run) // 4:
         return _VARYING
     if jumps:
         return "steps of rate"
-    if abs(run.shear_rate[0]) <= 1e-6 * size or np.max(np.abs(run.shear_rate)) <= SLOWEST_RATE:
+    if abs(run.rate[0]) <= 1e-6 * size or np.max(np.abs(run.rate)) <= SLOWEST_RATE:
         return "cessation" if run.rate_before or run.from_rest else "relaxation after a step strain"
     kind = "step of rate" if run.rate_before else "start-up"
     return kind if run.flow == "shear" else f"{run.flow} extension, {kind}"
 
 
-def oscillation(run: ShearRun) -> tuple[float, float] | None:
+def oscillation(run: Run) -> tuple[float, float] | None:
     """Return frequency (rad/s) and amplitude (1/s) of a rate that alternates about zero."""
-    time, rate = run.time, run.shear_rate
+    time, rate = run.time, run.rate
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)
     if turns.size < 2:

@@ -6,20 +6,18 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 
 
-def total_strain(run: ShearRun) -> float:
+def total_strain(run: Run) -> float:
     """Return the strain of a run, added up without regard to its sign."""
-    size = np.abs(run.shear_rate)
+    size = np.abs(run.rate)
     # before its first sample a run flows at the rate of that sample
     early = float(size[0] * run.time[0])
     return early + float(np.trapezoid(size, run.time))
 
 
-def in_sequence(
-    runs: Sequence[ShearRun], order: Float[np.ndarray, " runs"]
-) -> tuple[ShearRun, ...]:
+def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
     """Return the runs with the strain that their sample had seen in earlier ones.
 
     Only strains are added up: what a held-out run did to the sample is known without its stress.

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.integrate import cumulative_trapezoid
 
-from discover.dataset.run import ShearRun
-from discover.protocols.shear import in_flow, measured_rate
+from discover.dataset.run import Run
+from discover.protocols.protocol import in_flow, measured_rate
 
 MOST_SAMPLES = 20_000
 """A record with more samples is thinned: they cost time and say nothing new about a law."""
@@ -96,7 +96,7 @@ def thin_sweep(
     return keep, note
 
 
-def thin_run(run: ShearRun, most: int) -> ShearRun:
+def thin_run(run: Run, most: int) -> Run:
     """Return a run with at most so many of its samples, evenly chosen in their order.
 
     A rate that was read sample by sample is followed through the samples kept where that changes
@@ -116,8 +116,8 @@ def thin_run(run: ShearRun, most: int) -> ShearRun:
     keep[np.unique(np.round(np.linspace(0, n - 1, most)).astype(int))] = True
     thinned = run.window(keep)
     sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
-    if sampled and _strain_error(run.time, run.shear_rate, keep) < _FOLLOWED:
-        followed = measured_rate(thinned.time, thinned.shear_rate)
+    if sampled and _strain_error(run.time, run.rate, keep) < _FOLLOWED:
+        followed = measured_rate(thinned.time, thinned.rate)
         thinned = replace(thinned, protocol=in_flow(followed, run.flow))
     return thinned
 

@@ -206,7 +206,7 @@ class Record:
     ----------
     times
         In s, shape (n,), increasing; from 0, or from before where a steady flow came before.
-    shear_rate
+    rate
         Felt by the fluid, in 1/s, shape (n,).
     stress
         Shear stress in Pa, shape (n,).
@@ -221,7 +221,7 @@ class Record:
     """
 
     times: Float[Array, " n"]
-    shear_rate: Float[Array, " n"]
+    rate: Float[Array, " n"]
     stress: Float[Array, " n"]
     clock_factor: Float[Array, ""]
     strain_before: Float[Array, ""] | float = 0.0
@@ -229,7 +229,7 @@ class Record:
 
     def __post_init__(self):
         if self.tool_rate is None:
-            object.__setattr__(self, "tool_rate", self.shear_rate)
+            object.__setattr__(self, "tool_rate", self.rate)
 
     @property
     def instrument_times(self) -> Float[Array, " n"]:
@@ -242,7 +242,7 @@ class Record:
 
         From the start of its first run on; a steady flow before t = 0 does not count.
         """
-        size = jnp.abs(self.shear_rate)
+        size = jnp.abs(self.rate)
         # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
         steps = 0.5 * (size[1:] + size[:-1]) * jnp.diff(jnp.maximum(self.times, 0.0))
         return self.strain_before + jnp.concatenate([jnp.zeros(1), jnp.cumsum(steps)])

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.protocols.kinematics import Kinematics, stack_kinematics
-from discover.protocols.shear import shear_rates
+from discover.protocols.protocol import shear_rates
 from discover.simulate.grid import make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
@@ -55,7 +55,7 @@ class RunBatch(eqx.Module):
     kinematics: Kinematics | None = None
 
 
-def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
+def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> RunBatch:
     """Return runs as a batch.
 
     Parameters
@@ -89,7 +89,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
         # that the slope of the rate at the last sample is the flow's own
         rate[half > grid[-1] + 1.01 * spacing] = 0.0
         n = len(run)
-        size = np.sqrt(np.mean(run.shear_stress**2))
+        size = np.sqrt(np.mean(run.stress**2))
         scale = 1.0 / ((size if size > 0 else 1.0) * np.sqrt(n))
         pad = (0, n_samples - n)
         rows.append(
@@ -98,7 +98,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
                 rate,
                 np.pad(index, pad, mode="edge"),
                 np.pad(np.full(n, scale), pad),
-                np.pad(run.shear_stress, pad),
+                np.pad(run.stress, pad),
                 run.clock_factor,
                 run.strain_before,
             )
@@ -109,7 +109,7 @@ def make_batch(runs: Sequence[ShearRun], strain_step: float = 0.25) -> RunBatch:
     )
 
 
-def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:
+def data_scales(runs: Sequence[Run]) -> dict[str, float]:
     """Return the size of the properties in which effects scale their first trials.
 
     Times are on the instrument's clock, but for ``run_time``, which is the material's.
@@ -117,13 +117,13 @@ def data_scales(runs: Sequence[ShearRun]) -> dict[str, float]:
     gaps = [float(np.min(np.diff(run.time))) / run.clock_factor for run in runs if len(run) > 1]
     lengths = [float(run.time[-1]) / run.clock_factor for run in runs]
     strains = [
-        float(np.sum(np.abs(run.shear_rate[1:]) * np.diff(run.time)))
-        + abs(float(run.shear_rate[0])) * float(run.time[0])
+        float(np.sum(np.abs(run.rate[1:]) * np.diff(run.time)))
+        + abs(float(run.rate[0])) * float(run.time[0])
         for run in runs
     ]
     material_lengths = [float(run.time[-1]) for run in runs]
-    stresses = [float(np.sqrt(np.mean(run.shear_stress**2))) for run in runs]
-    rates = [float(np.max(np.abs(run.shear_rate))) for run in runs]
+    stresses = [float(np.sqrt(np.mean(run.stress**2))) for run in runs]
+    rates = [float(np.max(np.abs(run.rate))) for run in runs]
     stress, gap = float(np.median(stresses)) or 1.0, float(np.median(gaps or [1.0]))
     rate, length = float(np.median(rates)) or 1.0, float(np.median(lengths)) or 1.0
     return {

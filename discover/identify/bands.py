@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from discover.identify.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 
 QUANTITIES = ("sigma12", "N1", "N2")
 
@@ -80,7 +80,7 @@ def prediction_bands(
     chosen: Contender,
     rivals: Sequence[Contender],
     declared: Fluid,
-    protocols: Sequence[ShearProtocol],
+    protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
     n_draws: int = 100,
     seed: int = 0,

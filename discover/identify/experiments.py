@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
-from discover.protocols.shear import (
-    ShearProtocol,
+from discover.protocols.protocol import (
+    FlowProtocol,
     measured_rate,
     oscillatory_shear,
     start_up,
@@ -46,7 +46,7 @@ class Experiment:
 
     title: str
     kind: FlowClass
-    protocol: ShearProtocol
+    protocol: FlowProtocol
     times: Float[np.ndarray, " n"]
     pipkin: tuple[float, float] | None = None
 

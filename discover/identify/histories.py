@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.protocols.shear import (
-    ShearProtocol,
+from discover.protocols.protocol import (
+    FlowProtocol,
     oscillatory_shear,
     stack_protocols,
     start_up,
@@ -46,7 +46,7 @@ class Histories:
         that one compiled program does.
     """
 
-    protocols: ShearProtocol
+    protocols: FlowProtocol
     grids: IntegrationGrid
     amplitude: Float[np.ndarray, " r"]
     names: tuple[str, ...] = ()
@@ -79,7 +79,7 @@ def random_histories(each: int = 3, seed: int = 0) -> Histories:
             weights = generator.normal(size=_WAVES)
             weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
             protocols.append(
-                ShearProtocol(
+                FlowProtocol(
                     jnp.zeros(1),
                     jnp.zeros(1),
                     jnp.asarray(weights),

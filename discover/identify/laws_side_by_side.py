@@ -13,7 +13,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 from discover.simulate.grid import IntegrationGrid
 from discover.simulate.runge_kutta import runge_kutta_4
 from tensor_library.library import TermLibrary
@@ -79,7 +79,7 @@ def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
 def stresses_of_laws(
     library: TermLibrary,
     laws: Sequence[LawTerms],
-    protocols: ShearProtocol,
+    protocols: FlowProtocol,
     grids: IntegrationGrid,
     base: AbstractConstitutiveLaw | None = None,
 ) -> Float[np.ndarray, "laws runs n 4"]:

@@ -14,7 +14,7 @@ from discover.identify.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_on_grid
 from tensor_library.library import TermLibrary
@@ -111,7 +111,7 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
 
 def predict_laws(
     fluids: Fluid,
-    protocols: Sequence[ShearProtocol],
+    protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
 ) -> Float[np.ndarray, "laws flows n 3"]:
     """Return the recorded stress, N1 and N2 in Pa of every law in every flow.
@@ -131,7 +131,7 @@ def predict_laws(
 
 @compiled
 def _predict(
-    fluids: Fluid, protocols: ShearProtocol, grids: IntegrationGrid
+    fluids: Fluid, protocols: FlowProtocol, grids: IntegrationGrid
 ) -> Float[Array, "laws flows n 3"]:
     def of_law(fluid):
         stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)

@@ -25,7 +25,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 from discover.simulate.grid import IntegrationGrid
 
 _ROUNDING = 1e-6
@@ -119,7 +119,7 @@ class PhysicsReport(SentenceAndTable):
 
 def check_physics(
     fluid: Fluid,
-    protocols: ShearProtocol,
+    protocols: FlowProtocol,
     grids: IntegrationGrid,
     names: Sequence[str],
     weissenberg: float,

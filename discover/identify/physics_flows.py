@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.shear import ShearProtocol, oscillatory_shear, stack_protocols
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_batch, solve_states_on_grid
 
@@ -45,7 +45,7 @@ class Trajectories:
         return run, float(values[run])
 
 
-def trajectories(fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid) -> Trajectories:
+def trajectories(fluid: Fluid, protocols: FlowProtocol, grids: IntegrationGrid) -> Trajectories:
     """Return conformation and dissipation of a fluid along flows.
 
     Parameters
@@ -70,7 +70,7 @@ def trajectories(fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid)
 def _along(fluid, protocols, grids):
     def one(protocol, grid):
         states = solve_states_on_grid(fluid, protocol, grid)
-        rates = jax.vmap(protocol.shear_rate)(grid.times[grid.sample_index])
+        rates = jax.vmap(protocol.rate)(grid.times[grid.sample_index])
         at_mode = jax.vmap(partial(_energy, fluid.law), in_axes=(0, 0))
         scaled = rates[:, None] * fluid.relaxation_time
         smallest, dissipation = jax.vmap(at_mode)(states, scaled)

@@ -9,7 +9,7 @@ import numpy as np
 from discover.identify.histories import observe_differences, random_histories
 from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.protocols.shear import in_flow, stack_protocols, start_up
+from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.simulate.grid import make_grids
 from tensor_library.library import TermLibrary
 

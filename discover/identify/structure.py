@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.identify.directions import Direction, weak_directions
 from discover.identify.exact_series import compare_series
 from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
@@ -198,7 +198,7 @@ class Structure(SentenceAndTable):
 
 
 def analyse_structure(
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     library: TermLibrary,
     base: AbstractConstitutiveLaw | None = None,
     nominal: Mapping[str, LawTerms] | None = None,

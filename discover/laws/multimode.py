@@ -69,7 +69,7 @@ class Fluid(eqx.Module):
         Parameters
         ----------
         sweep
-            Small-amplitude data, such as `ShearDataset.linear_sweep`.
+            Small-amplitude data, such as `Dataset.linear_sweep`.
         law
             The law of every mode; by default upper convected Maxwell.
         solvent_viscosity

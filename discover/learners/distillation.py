@@ -24,7 +24,7 @@ from discover.protocols.paper import (
     paper_test_protocols,
     paper_training_protocols,
 )
-from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import SimulationError, simulate, solve_on_grid
 from tensor_library.algebra import Symmetric
@@ -189,7 +189,7 @@ class _Lesson(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
-    protocols: ShearProtocol
+    protocols: FlowProtocol
     grids: IntegrationGrid
     target: Float[Array, "flows n"]
 
@@ -228,11 +228,11 @@ def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
 def distil(
     teacher: AbstractConstitutiveLaw | Fluid,
     student: str | Student,
-    protocols: Mapping[str, ShearProtocol] | None = None,
+    protocols: Mapping[str, FlowProtocol] | None = None,
     penalty: float = 0.01,
     n_samples: int = 201,
     duration: float = TRAINING_DURATION,
-    tests: Mapping[str, ShearProtocol] | None = None,
+    tests: Mapping[str, FlowProtocol] | None = None,
 ) -> Distillation:
     """Teach one law to another by the shear stress alone.
 
@@ -316,7 +316,7 @@ def distil(
 
 
 def compare_fluids(
-    truth: Fluid, other: Fluid, protocol: ShearProtocol, duration: float = TEST_DURATION
+    truth: Fluid, other: Fluid, protocol: FlowProtocol, duration: float = TEST_DURATION
 ) -> dict[str, float] | None:
     """Return relative L2 errors of σ12, N1 and N2 of one fluid against another in a flow.
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discover._version import __version__
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Provenance:
     version: str = __version__
 
 
-def provenance_of(data: Any, runs: Sequence[ShearRun]) -> Provenance:
+def provenance_of(data: Any, runs: Sequence[Run]) -> Provenance:
     """Return the provenance of a fit to some runs.
 
     Parameters
@@ -54,11 +54,11 @@ def provenance_of(data: Any, runs: Sequence[ShearRun]) -> Provenance:
     )
 
 
-def fingerprint_of(runs: Sequence[ShearRun]) -> str:
+def fingerprint_of(runs: Sequence[Run]) -> str:
     """Return a hash of the samples of some runs, whatever their order."""
     digest = hashlib.sha256()
     for run in sorted(runs, key=lambda run: run.name):
         digest.update(f"{run.name}|{len(run)}|".encode())
-        for values in (run.time, run.shear_rate, run.shear_stress):
+        for values in (run.time, run.rate, run.stress):
             digest.update(np.ascontiguousarray(values, dtype=float).tobytes())
     return digest.hexdigest()[:16]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
@@ -34,7 +34,7 @@ class LearningTask:
         To be called with what is going on and the fraction done, 0 to 1.
     """
 
-    runs: tuple[ShearRun, ...]
+    runs: tuple[Run, ...]
     base: Fluid
     library: TermLibrary
     seed: int

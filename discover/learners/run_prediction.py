@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.first_use import require_double
 from discover.learners.estimator_file import EstimatorFile, write_estimator
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from discover.learners.result import LearnerResult
 
 
-def as_runs(runs: Any) -> list[ShearRun]:
+def as_runs(runs: Any) -> list[Run]:
     """Return the runs as a list, having checked that they are runs.
 
     Raises
@@ -31,23 +31,23 @@ def as_runs(runs: Any) -> list[ShearRun]:
         If there is none, one is something else, or JAX computes in single precision.
     """
     require_double()
-    if isinstance(runs, ShearRun):
+    if isinstance(runs, Run):
         raise InputError(
             f"A learner takes several runs; got the single run {runs.name!r}. Put it in a list: "
             "fit([run])."
         )
     if isinstance(runs, str) or not isinstance(runs, Iterable):
         raise InputError(
-            f"A learner takes a data set or a sequence of ShearRun; got a {type(runs).__name__}. "
+            f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__}. "
             "Load a folder with load_dataset."
         )
     listed = list(runs)
     if not listed:
         raise InputError("A learner needs at least one run; got none.")
     for run in listed:
-        if not isinstance(run, ShearRun):
+        if not isinstance(run, Run):
             raise InputError(
-                f"A learner takes a sequence of ShearRun; got a {type(run).__name__}. Load a "
+                f"A learner takes a sequence of Run; got a {type(run).__name__}. Load a "
                 "folder or make a synthetic data set."
             )
     return listed
@@ -58,7 +58,7 @@ class RunPrediction:
 
     fluid_: "Fluid"
     result_: "LearnerResult"
-    runs_: tuple[ShearRun, ...]
+    runs_: tuple[Run, ...]
     provenance_: Provenance
 
     learner: ClassVar[str]
@@ -144,12 +144,12 @@ class RunPrediction:
         del y, sample_weight
         runs = as_runs(X)
         errors = [
-            np.sqrt(np.mean((p - run.shear_stress) ** 2) / np.mean(run.shear_stress**2))
+            np.sqrt(np.mean((p - run.stress) ** 2) / np.mean(run.stress**2))
             for p, run in zip(self._predict_runs(runs), runs, strict=True)
         ]
         error = float(np.mean(errors))
         return 1.0 - error if np.isfinite(error) else -np.inf
 
     @abstractmethod
-    def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
+    def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         """Return σ12 in Pa of each run."""

@@ -4,8 +4,8 @@ from discover import first_use as first_use  # double precision, before any arra
 from discover.protocols.history import after_alternation, after_steady_flow, after_step_strain
 from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
-from discover.protocols.shear import (
-    ShearProtocol,
+from discover.protocols.protocol import (
+    FlowProtocol,
     in_flow,
     measured_rate,
     oscillatory_shear,
@@ -21,8 +21,8 @@ from discover.protocols.shear import (
 __all__ = [
     "KINDS",
     "FlowKind",
+    "FlowProtocol",
     "Kinematics",
-    "ShearProtocol",
     "after_alternation",
     "after_steady_flow",
     "after_step_strain",

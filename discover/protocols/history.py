@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
-from discover.protocols.shear import ShearProtocol, shear_rates
+from discover.protocols.protocol import FlowProtocol, shear_rates
 
 STEADY_LENGTH = 20.0
 """A steady flow before a run is computed over this multiple of the run's length, at most: what
@@ -25,7 +25,7 @@ _AT_ONCE = 1e-3
 _PER_CYCLE = 64
 
 
-def after_steady_flow(protocol: ShearProtocol, rate: float, end: float) -> ShearProtocol:
+def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowProtocol:
     """Return the protocol, begun by a flow at a constant rate that has become steady.
 
     Parameters
@@ -50,8 +50,8 @@ def after_steady_flow(protocol: ShearProtocol, rate: float, end: float) -> Shear
 
 
 def after_step_strain(
-    protocol: ShearProtocol, strain: float, first: float, duration: float = 0.0
-) -> ShearProtocol:
+    protocol: FlowProtocol, strain: float, first: float, duration: float = 0.0
+) -> FlowProtocol:
     """Return the protocol, begun by a step of strain that ends at t = 0.
 
     Parameters
@@ -83,8 +83,8 @@ def after_step_strain(
 
 
 def after_alternation(
-    protocol: ShearProtocol, period: float, times: Float[np.ndarray, " n"]
-) -> ShearProtocol:
+    protocol: FlowProtocol, period: float, times: Float[np.ndarray, " n"]
+) -> FlowProtocol:
     """Return the protocol, begun by cycles like the first one of the record.
 
     Parameters
@@ -123,11 +123,11 @@ def _require_positive(name: str, value: float) -> None:
 
 
 def _begun(
-    protocol: ShearProtocol,
+    protocol: FlowProtocol,
     knots: np.ndarray,
     rates: np.ndarray,
     until: float = 0.0,
-) -> ShearProtocol:
+) -> FlowProtocol:
     """Return the protocol with a table of rates before it, which holds until a time in s."""
     if np.any(np.asarray(protocol.amplitudes)):
         raise InputError(

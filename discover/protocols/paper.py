@@ -1,6 +1,6 @@
 """The flows of Rodrigues et al., on which the two learners are compared."""
 
-from discover.protocols.shear import ShearProtocol, oscillatory_shear, start_up
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear, start_up
 
 TRAINING_DURATION = 20.0
 """Length of every training series, in relaxation times."""
@@ -12,7 +12,7 @@ DEBORAH_NUMBERS = (0.25, 0.5, 0.75, 1.0)
 WEISSENBERG_NUMBERS = (1.0, 2.0)
 
 
-def paper_training_protocols() -> dict[str, ShearProtocol]:
+def paper_training_protocols() -> dict[str, FlowProtocol]:
     """Return the eight training flows γ̇ = Wi cos(De t), keyed ``laos_WI_DE``."""
     return {
         f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de)
@@ -21,7 +21,7 @@ def paper_training_protocols() -> dict[str, ShearProtocol]:
     }
 
 
-def paper_test_protocols() -> dict[str, ShearProtocol]:
+def paper_test_protocols() -> dict[str, FlowProtocol]:
     """Return the three flows that no training saw, keyed by name.
 
     ``laos_2_1`` repeats a training flow past its last time, as the paper does.

@@ -213,7 +213,7 @@ def _next(comparison: Comparison) -> str:
     if comparison.undetermined:
         names = " and ".join(comparison.undetermined)
         return f"Measure {names}: nothing else decides between laws that give the same σ12."
-    rates = [float(np.max(np.abs(f.shear_rate))) for f in comparison.flows_of("training")]
+    rates = [float(np.max(np.abs(f.rate))) for f in comparison.flows_of("training")]
     unit = "" if comparison.noise is not None else " 1/s"
     return (
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "

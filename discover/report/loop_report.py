@@ -147,7 +147,7 @@ def _run_rows(result: LoopResult) -> list[dict[str, Any]]:
             "held_out": record.held_out,
             "samples": record.time.size,
             "end": float(record.time[-1]),
-            "rate": float(np.max(np.abs(record.shear_rate))),
+            "rate": float(np.max(np.abs(record.rate))),
             "stress": float(np.sqrt(np.mean(record.measured**2))),
             "before": float(record.errors[0]),
             "after": float(record.errors[-1]),

@@ -125,7 +125,7 @@ def _several(names: Sequence[str], word: str) -> str:
 
 
 def _loop_next(result: LoopResult) -> str:
-    rates = [float(np.max(np.abs(record.shear_rate))) for record in result.records]
+    rates = [float(np.max(np.abs(record.rate))) for record in result.records]
     faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
     if result.verdict == "no_signal" or result.remaining.get("without_fluid"):
         return (

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 
 MAX_GRID_POINTS = 200_000
 
@@ -44,7 +44,7 @@ class IntegrationGrid(eqx.Module):
 
 
 def make_grid(
-    protocol: ShearProtocol,
+    protocol: FlowProtocol,
     times: Float[np.ndarray, " n"],
     strain_step: float = 0.1,
     phase_step: float = 0.15,
@@ -133,7 +133,7 @@ def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:
     return np.geomspace(first, later[-1], count + 1)[:-1]
 
 
-def _steady_history(protocol: ShearProtocol) -> Float[np.ndarray, " p"]:
+def _steady_history(protocol: FlowProtocol) -> Float[np.ndarray, " p"]:
     """Return steps through a constant rate before t = 0; none where it was anything else."""
     begins = float(protocol.begins)
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
@@ -167,7 +167,7 @@ def _grown(
 
 
 def make_grids(
-    protocols: Sequence[ShearProtocol],
+    protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
     **limits: float,
 ) -> IntegrationGrid:

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.shear import ShearProtocol
+from discover.protocols.protocol import FlowProtocol
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.grid import IntegrationGrid
 
@@ -95,7 +95,7 @@ def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
 
 def simulate(
     fluid: Fluid,
-    protocol: ShearProtocol,
+    protocol: FlowProtocol,
     times: Float[np.ndarray, " n"],
     rtol: float = 1e-8,
     atol: float = 1e-10,
@@ -158,7 +158,7 @@ def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
 
 def solve_on_grid(
     fluid: Fluid,
-    protocol: ShearProtocol,
+    protocol: FlowProtocol,
     grid: IntegrationGrid,
     adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> Float[Array, "n 4"]:
@@ -186,7 +186,7 @@ def solve_on_grid(
 
 def solve_states_on_grid(
     fluid: Fluid,
-    protocol: ShearProtocol,
+    protocol: FlowProtocol,
     grid: IntegrationGrid,
     adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> Float[Array, "n k 4"]:
@@ -218,7 +218,7 @@ def _solve_on_grid(fluid, protocol, grid, observe, adjoint):
 
 @compiled
 def solve_batch(
-    fluid: Fluid, protocols: ShearProtocol, grids: IntegrationGrid
+    fluid: Fluid, protocols: FlowProtocol, grids: IntegrationGrid
 ) -> Float[Array, "runs n 4"]:
     """Return the stresses of one fluid in a batch of runs, on fixed grids.
 

@@ -9,18 +9,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import LinearSweep, ShearDataset, ShearRun
+from discover.dataset import Dataset, LinearSweep, Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.programs import compiled
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.shear import ShearProtocol, recorded_at, shear_rates
+from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 
 
 @dataclass(frozen=True, repr=False)
-class SyntheticDataset(ShearDataset):
+class SyntheticDataset(Dataset):
     """A data set whose law is known.
 
     Attributes
@@ -41,7 +41,7 @@ class SyntheticDataset(ShearDataset):
 def synthetic_dataset(
     law: str,
     parameters: Mapping[str, float] | None = None,
-    protocol: str | Mapping[str, ShearProtocol] = "paper",
+    protocol: str | Mapping[str, FlowProtocol] = "paper",
     noise: float = 0.0,
     seed: int = 0,
     n_samples: int = 201,
@@ -70,7 +70,7 @@ def synthetic_dataset(
         If an argument is out of range.
     """
     if protocol == "paper":
-        protocols: Mapping[str, ShearProtocol] = paper_training_protocols()
+        protocols: Mapping[str, FlowProtocol] = paper_training_protocols()
     elif isinstance(protocol, Mapping):
         protocols = protocol
     else:
@@ -95,12 +95,12 @@ def synthetic_dataset(
         recorded = recorded_at(flow, stress.components)
         scale = noise * float(np.sqrt(np.mean(recorded**2)))
         runs.append(
-            ShearRun(
+            Run(
                 name=name,
                 time=times,
                 protocol=flow,
-                shear_rate=shear_rates(flow, times),
-                shear_stress=recorded + scale * generator.standard_normal(n_samples),
+                rate=shear_rates(flow, times),
+                stress=recorded + scale * generator.standard_normal(n_samples),
             )
         )
     return SyntheticDataset(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discover.dataset import LinearSweep, ShearDataset
+from discover.dataset import Dataset, LinearSweep
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
 from discover.dataset.run import SLOWEST_RATE, require_signal
@@ -35,9 +35,9 @@ class StudyData:
         Whether every fitted run is also to be held out in turn.
     """
 
-    dataset: ShearDataset
-    fit: ShearDataset
-    held_out: ShearDataset
+    dataset: Dataset
+    fit: Dataset
+    held_out: Dataset
     each: bool = False
 
     @property
@@ -99,7 +99,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     data = study.data
     if data.synthetic is not None:
         made = data.synthetic
-        dataset: ShearDataset = synthetic_dataset(
+        dataset: Dataset = synthetic_dataset(
             made.law,
             made.parameters,
             made.protocol,
@@ -134,7 +134,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
 
 
 def _by_observation(
-    dataset: ShearDataset,
+    dataset: Dataset,
     observe: Sequence[str] | None,
     held_out: Sequence[str],
     fit: Sequence[str] | None,
@@ -155,7 +155,7 @@ def _by_observation(
     return held_out, tuple(fit or (name for name in dataset.names if name not in held_out))
 
 
-def declared_model(study: Study, dataset: ShearDataset) -> DeclaredModel:
+def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     """Return the declared law of a study, with its modes.
 
     Raises
@@ -234,7 +234,7 @@ def _start(law: str, parameter: str) -> float:
     return 100.0 if high > 1e3 else min(max(0.1, low), high)
 
 
-def _linear_start(dataset: ShearDataset) -> dict[str, float]:
+def _linear_start(dataset: Dataset) -> dict[str, float]:
     """Return a modulus and relaxation time of the right order from the runs themselves.
 
     The relaxation time is that of the slowest change a run can show, a tenth of the median
@@ -243,9 +243,9 @@ def _linear_start(dataset: ShearDataset) -> dict[str, float]:
     time = 0.1 * float(np.median([run.time[-1] for run in dataset]))
     viscosity = np.median(
         [
-            np.max(np.abs(run.shear_stress)) / np.max(np.abs(run.shear_rate))
+            np.max(np.abs(run.stress)) / np.max(np.abs(run.rate))
             for run in dataset
-            if np.max(np.abs(run.shear_rate)) > SLOWEST_RATE and np.any(run.shear_stress)
+            if np.max(np.abs(run.rate)) > SLOWEST_RATE and np.any(run.stress)
         ]
         or [1.0]
     )

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import require_signal
 from discover.errors import InputError
@@ -15,11 +15,11 @@ from discover.laws.registry import name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import DeclaredModel, StudyData
 
-HeldOut = ShearDataset | Sequence[str] | Literal["each"]
+HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only judges: a data set of its own, or names of runs of the data set."""
 
 
-def data_in_memory(data: ShearDataset, held_out: HeldOut = ()) -> StudyData:
+def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     """Return data divided into runs to fit and runs held out.
 
     Parameters
@@ -35,12 +35,12 @@ def data_in_memory(data: ShearDataset, held_out: HeldOut = ()) -> StudyData:
         If no data set is given, a run is both fitted and held out, none is left to fit, or those
         to fit hold no signal.
     """
-    if not isinstance(data, ShearDataset):
+    if not isinstance(data, Dataset):
         raise InputError(
             f"This needs a data set; got a {type(data).__name__}. Load one with load_dataset, or "
-            'make one of runs: ShearDataset("name", runs).'
+            'make one of runs: Dataset("name", runs).'
         )
-    if isinstance(held_out, ShearDataset):
+    if isinstance(held_out, Dataset):
         whole = joined(data, held_out.runs)
         divided = StudyData(whole, data, held_out)
     elif isinstance(held_out, str):
@@ -58,7 +58,7 @@ def data_in_memory(data: ShearDataset, held_out: HeldOut = ()) -> StudyData:
     return divided
 
 
-def joined(data: ShearDataset, more: Sequence[ShearRun]) -> ShearDataset:
+def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
     """Return a data set with further runs, which must have names of their own.
 
     Raises
@@ -77,10 +77,10 @@ def joined(data: ShearDataset, more: Sequence[ShearRun]) -> ShearDataset:
     if exact is None or all(run.name in exact for run in runs):
         return replace(data, runs=runs)
     # the truth of what was added is not known
-    return ShearDataset(data.name, runs, data.linear_sweep, data.provenance)
+    return Dataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
-def declared_fluid(base: Any, data: ShearDataset) -> DeclaredModel:
+def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     """Return a fluid as the declared model of a study.
 
     Parameters
@@ -118,7 +118,7 @@ def declared_fluid(base: Any, data: ShearDataset) -> DeclaredModel:
     )
 
 
-def _spectrum(data: ShearDataset, modulus, relaxation_time) -> RelaxationSpectrum | None:
+def _spectrum(data: Dataset, modulus, relaxation_time) -> RelaxationSpectrum | None:
     """Return the spectrum of the data's linear sweep if the modes are those."""
     if data.linear_sweep is None:
         return None

@@ -7,7 +7,7 @@ from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.attribution import CandidateScore
 from discover.closed_loop.augment import Choice, aliases_of
 from discover.closed_loop.least_squares import Fit
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.protocols import start_up
 
 NO_FIT = Fit(np.zeros(1), (), np.zeros((1, 1)), np.zeros((0, 1, 1)))
@@ -41,8 +41,8 @@ def test_one_start_up_cannot_tell_a_gain_of_the_rate_from_one_of_the_stress():
     time = np.linspace(0.1, 5.0, 60)
     stress = 1.2 * 100.0 * 0.01 * (1.0 - np.exp(-time))
     noise = 0.01 * np.sqrt(np.mean(stress**2)) * np.random.default_rng(0).normal(size=60)
-    run = ShearRun("one", time, start_up(0.01), np.full(60, 0.01), stress + noise)
+    run = Run("one", time, start_up(0.01), np.full(60, 0.01), stress + noise)
     names = ["rate_gain", "stress_gain", "stress_drift"]
-    result = run_loop(ShearDataset("x", (run,)), DeclaredModel.maxwell(100.0, 1.0), effects=names)
+    result = run_loop(Dataset("x", (run,)), DeclaredModel.maxwell(100.0, 1.0), effects=names)
     (stage,) = result.stages
     assert {stage.effect, *stage.aliases} == {"rate_gain", "stress_gain"}

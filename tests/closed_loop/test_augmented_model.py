@@ -4,7 +4,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.least_squares import fit_batch, left_out_errors
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
@@ -17,8 +17,8 @@ TIMES = np.linspace(0.1, 8.0, 60)
 
 
 def make_run(name, protocol, stress=None, times=TIMES):
-    rate = np.array([float(protocol.shear_rate(jnp.asarray(t))) for t in times])
-    return ShearRun(name, times, protocol, rate, np.ones(len(times)) if stress is None else stress)
+    rate = np.array([float(protocol.rate(jnp.asarray(t))) for t in times])
+    return Run(name, times, protocol, rate, np.ones(len(times)) if stress is None else stress)
 
 
 def test_an_effect_in_the_model_is_the_law_with_that_term():

@@ -5,7 +5,7 @@ import pytest
 from independent.homogeneous import GiesekusFluid
 
 import discover as dc
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.protocols import in_flow, start_up
 
 MODULUS, TIME, SOLVENT = (100.0, 20.0), (0.2, 3.0), 5.0
@@ -22,7 +22,7 @@ def extension(kind, mobility, noise=0.01):
         stress = fluid.recorded(kind, lambda _, r=rate: r, times)
         size = noise * np.sqrt(np.mean(stress**2))
         runs.append(
-            ShearRun(
+            Run(
                 f"{kind}_{rate}",
                 times,
                 in_flow(start_up(rate), kind),
@@ -30,7 +30,7 @@ def extension(kind, mobility, noise=0.01):
                 stress + size * generator.standard_normal(60),
             )
         )
-    return dc.ShearDataset(f"{kind} extension", tuple(runs))
+    return dc.Dataset(f"{kind} extension", tuple(runs))
 
 
 @pytest.fixture(scope="module")

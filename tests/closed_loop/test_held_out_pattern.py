@@ -7,7 +7,7 @@ from independent import start_up as flow_of
 from independent.noise import white
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.protocols import start_up
 
 TIMES = np.geomspace(0.05, 10.0, 80)
@@ -23,9 +23,9 @@ def loop(held_mobility):
         alpha = held_mobility if name == "held" else 0.3
         exact = Giesekus(alpha, 100.0).respond(flow_of(rate), TIMES).sigma12
         record = white(exact, 0.01, generator)
-        runs.append(ShearRun(name, TIMES, start_up(rate), np.full(len(TIMES), rate), record))
+        runs.append(Run(name, TIMES, start_up(rate), np.full(len(TIMES), rate), record))
     return run_loop(
-        ShearDataset("made", tuple(runs)), DECLARED, held_out=["held"],
+        Dataset("made", tuple(runs)), DECLARED, held_out=["held"],
         effects=["giesekus_mobility", "stress_offset"], max_effects=1,
     )  # fmt: skip
 

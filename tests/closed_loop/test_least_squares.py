@@ -8,7 +8,7 @@ from discover.closed_loop import DeclaredModel
 from discover.closed_loop.attribution import attribute
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.least_squares import FEWEST_FOLDS, fit_batch, left_out_errors
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.laws import Fluid, Giesekus
@@ -26,9 +26,9 @@ def runs(count, noise=0.0, seed=0):
     for i, flow in enumerate(FLOWS[:count]):
         stress = np.asarray(simulate(FLUID, flow, TIMES).shear_stress)
         size = noise * np.sqrt(np.mean(stress**2))
-        rate = np.array([float(flow.shear_rate(jnp.asarray(t))) for t in TIMES])
+        rate = np.array([float(flow.rate(jnp.asarray(t))) for t in TIMES])
         noisy = stress + size * generator.standard_normal(len(TIMES))
-        made.append(ShearRun(f"run {i}", TIMES, flow, rate, noisy))
+        made.append(Run(f"run {i}", TIMES, flow, rate, noisy))
     return made
 
 
@@ -109,7 +109,7 @@ def test_finer_steps_take_the_bias_out_of_a_compliance():
     planted[at] = 2e-3
     exact = model.predict(planted, make_batch(runs(4), strain_step=0.01))
     made = [
-        ShearRun(run.name, run.time, run.protocol, run.shear_rate, row)
+        Run(run.name, run.time, run.protocol, run.rate, row)
         for run, row in zip(runs(4), exact, strict=True)
     ]
     batch = make_batch(made)

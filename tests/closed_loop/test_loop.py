@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun, load_dataset, relaxation_spectrum
+from discover.dataset import Dataset, Run, load_dataset, relaxation_spectrum
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, start_up
@@ -42,7 +42,7 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
     runs = []
     for name, flow in FLOWS.items():
         felt = flow
-        rate = np.array([float(flow.shear_rate(jnp.asarray(t))) for t in TIMES])
+        rate = np.array([float(flow.rate(jnp.asarray(t))) for t in TIMES])
         if rise and name != "laos":
             dense = np.linspace(0.0, 10.0, 2001)
             felt = measured_rate(dense, rate[0] * (1 - np.exp(-dense / rise)))
@@ -51,8 +51,8 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
         stress = simulate(fluid, felt, TIMES).shear_stress
         scale = noise * np.sqrt(np.mean(stress**2))
         stress = stress + scale * generator.standard_normal(len(TIMES))
-        runs.append(ShearRun(name, TIMES, flow, rate, stress))
-    return ShearDataset("made", tuple(runs))
+        runs.append(Run(name, TIMES, flow, rate, stress))
+    return Dataset("made", tuple(runs))
 
 
 def loop(dataset, **options):
@@ -141,8 +141,8 @@ def test_the_same_data_give_the_same_result(planted_mobility):
 
 def test_held_out_stresses_do_not_enter_the_fit(planted_mobility):
     dataset = make_dataset(Giesekus(0.2))
-    changed = replace(dataset["late"], shear_stress=3.0 * dataset["late"].shear_stress)
-    other = loop(ShearDataset("made", (*dataset.runs[:3], changed)))
+    changed = replace(dataset["late"], stress=3.0 * dataset["late"].stress)
+    other = loop(Dataset("made", (*dataset.runs[:3], changed)))
     assert other.stages[0].parameters == planted_mobility.stages[0].parameters
     assert other.error_after.held_out > 10 * planted_mobility.error_after.held_out
     # but they judge: what does not carry over to them is not explained
@@ -175,9 +175,9 @@ def test_terms_that_name_the_rate_are_not_tried_where_the_loop_must_extrapolate_
     times = TIMES / factor
     fluid = Fluid(UpperConvectedMaxwell(), jnp.asarray(100.0), jnp.asarray(1.0))
     stress = simulate(fluid, flow, times).shear_stress
-    far = ShearRun("far", times, flow, np.full(len(times), 1.5 * factor), stress)
+    far = Run("far", times, flow, np.full(len(times), 1.5 * factor), stress)
     made = make_dataset(Giesekus(0.2))
-    result = loop(ShearDataset("made", (*made.runs[:2], far)), held_out=["far"], max_effects=1)
+    result = loop(Dataset("made", (*made.runs[:2], far)), held_out=["far"], max_effects=1)
     ranked = {candidate.effect for stage in result.rankings for candidate in stage}
     assert ("non_affine_motion" in ranked) == tried
     assert "giesekus_mobility" in ranked
@@ -234,7 +234,7 @@ def test_one_start_up_gives_the_law_though_modulus_and_time_are_unknown_too():
     dataset = make_dataset(Giesekus(0.3), noise=0.002)
     declared = DeclaredModel.maxwell(10.0, 3.0, fit_modulus=True, fit_relaxation_time=True)
     result = run_loop(
-        ShearDataset("one", (dataset["fast"],)),
+        Dataset("one", (dataset["fast"],)),
         declared,
         effects=["giesekus_mobility", "thixotropy", "tool_compliance", "stress_offset"],
         max_effects=2,

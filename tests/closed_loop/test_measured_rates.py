@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop, run_loop_on_each
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.dataset.sequence import in_sequence
 from discover.dataset.thinning import thin_run
 from discover.effects import Record, make_effect
@@ -27,16 +27,14 @@ def start_ups(alpha, rates=(0.5, 1.0, 2.0), noise=0.01):
     for rate in rates:
         stress = simulate(fluid, start_up(rate), TIMES).shear_stress
         stress = stress * (1.0 + noise * generator.standard_normal(len(TIMES)))
-        runs.append(ShearRun(f"{rate:g}", TIMES, start_up(rate), np.full(80, rate), stress))
-    return ShearDataset("start-ups", tuple(runs))
+        runs.append(Run(f"{rate:g}", TIMES, start_up(rate), np.full(80, rate), stress))
+    return Dataset("start-ups", tuple(runs))
 
 
 @pytest.mark.parametrize("effect", ["stress_offset", "rate_rise_time", "thixotropy"])
 def test_a_run_from_a_steady_flow_relaxes_to_the_next_one(effect):
     before, after = 2.0, 0.5
-    run = ShearRun(
-        "down", TIMES, start_up(after), np.full(80, after), np.ones(80), rate_before=before
-    )
+    run = Run("down", TIMES, start_up(after), np.full(80, after), np.ones(80), rate_before=before)
     # an effect at zero amplitude changes nothing, whatever the program it is compiled into
     model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect(effect)])
     predicted = model.predict(model.zero(), make_batch([run]))[0]
@@ -45,7 +43,7 @@ def test_a_run_from_a_steady_flow_relaxes_to_the_next_one(effect):
 
 
 def test_a_run_from_a_steady_flow_starts_at_the_steady_state_of_a_nonlinear_law():
-    run = ShearRun("on", TIMES, start_up(30.0), np.full(80, 30.0), np.ones(80), rate_before=30.0)
+    run = Run("on", TIMES, start_up(30.0), np.full(80, 30.0), np.ones(80), rate_before=30.0)
     declared = DeclaredModel.named("giesekus", {"alpha": 0.3}, 100.0, 1.0)
     model = AugmentedModel(declared, [make_effect("stress_offset")])
     predicted = model.predict(model.zero(), make_batch([run]))[0]
@@ -63,7 +61,7 @@ def test_strain_is_counted_from_the_start_of_the_run_and_not_of_the_flow_before_
 @pytest.mark.parametrize("measured", [False, True])
 def test_what_shapes_a_command_is_no_candidate_where_the_rate_was_measured(measured):
     runs = [replace(run, rate_is_measured=measured) for run in start_ups(0.3)]
-    dataset = ShearDataset("start-ups", tuple(runs))
+    dataset = Dataset("start-ups", tuple(runs))
     declared = DeclaredModel.maxwell(100.0, 1.0)
     result = run_loop(dataset, declared, effects=EFFECTS, max_effects=1)
     ranked = {candidate.effect for stage in result.rankings for candidate in stage}
@@ -101,8 +99,8 @@ def test_each_run_is_judged_by_a_search_that_did_not_see_it():
     assert result.error_after.held_out == pytest.approx(mean)
     assert result.error_after.held_out < 0.03 < 0.1 < result.error_before.held_out
     # a wrong record spoils its own judgement, and what is found without it stays
-    wrong = replace(dataset["2"], shear_stress=3.0 * dataset["2"].shear_stress)
-    spoilt = run_loop_on_each(ShearDataset("x", (*dataset.runs[:2], wrong)), declared, **options)
+    wrong = replace(dataset["2"], stress=3.0 * dataset["2"].stress)
+    spoilt = run_loop_on_each(Dataset("x", (*dataset.runs[:2], wrong)), declared, **options)
     assert spoilt.folds[-1].effects == result.folds[-1].effects
     assert spoilt.folds[-1].error_after > 10 * result.folds[-1].error_after
 
@@ -119,7 +117,7 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     rates = np.where(times < 0.01, 5.0, 20.0) * noise
     rates[times > 20.0] *= 0.01
     flow = measured_rate(times, rates)
-    run = ShearRun("steps", times, flow, rates, np.ones(60))
+    run = Run("steps", times, flow, rates, np.ones(60))
     batch = make_batch([run])
     # steps of 1/80 s, which the turn from 5 to 20 1/s wants, would be 4800; middles count too
     assert batch.times.shape[1] < 2 * 4800 / 3
@@ -134,11 +132,11 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
 def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     generator = np.random.default_rng(0)
     runs = [
-        ShearRun(str(r), TIMES, start_up(r), np.full(80, r), generator.standard_normal(80))
+        Run(str(r), TIMES, start_up(r), np.full(80, r), generator.standard_normal(80))
         for r in (0.5, 1.0, 2.0)
     ]
     declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
-    result = run_loop(ShearDataset("noise", tuple(runs)), declared, effects=EFFECTS)
+    result = run_loop(Dataset("noise", tuple(runs)), declared, effects=EFFECTS)
     assert result.verdict == "no_signal"
     assert result.stages == ()
     assert "noise about a constant" in result.remaining["description"]
@@ -149,7 +147,7 @@ def test_as_many_constants_as_samples_are_refused():
     run = start_ups(0.3, rates=(1.0,)).runs[0].window(np.arange(80) < 6)
     declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
     with pytest.raises(InputError, match="6 samples in all, for 2 constants"):
-        run_loop(ShearDataset("short", (run,)), declared, effects=EFFECTS)
+        run_loop(Dataset("short", (run,)), declared, effects=EFFECTS)
 
 
 def test_what_was_lost_in_earlier_runs_stays_lost():
@@ -168,7 +166,7 @@ def test_what_was_lost_in_earlier_runs_stays_lost():
 def test_thinned_runs_hold_the_same_flow(samples):
     times = np.linspace(0.01, 20.0, 2000)
     rates = np.cos(times)
-    run = ShearRun("wave", times, measured_rate(times, rates), rates, np.sin(times))
+    run = Run("wave", times, measured_rate(times, rates), rates, np.sin(times))
     thinned = thin_run(run, samples)
     assert len(thinned) == samples
     assert thinned.time[-1] == times[-1]

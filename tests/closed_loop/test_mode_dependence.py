@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.effects import BY_MODE, make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.protocols import oscillatory_shear, start_up
@@ -52,13 +52,13 @@ def runs(mobilities, breakdown=0.0, noise=0.01):
         size = np.sqrt(np.mean(stress**2))
         stress = stress + noise * size * generator.normal(size=len(SAMPLES))
         rates = np.array([rate(t) for t in SAMPLES])
-        out.append(ShearRun(name, SAMPLES, flow, rates, stress))
+        out.append(Run(name, SAMPLES, flow, rates, stress))
     return tuple(out)
 
 
 def loop(data):
     declared = DeclaredModel.named("giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"])
-    return run_loop(ShearDataset("two", data), declared, effects=["thixotropy", "rate_gain"])
+    return run_loop(Dataset("two", data), declared, effects=["thixotropy", "rate_gain"])
 
 
 def test_the_exponent_gives_each_mode_its_own_constant():
@@ -75,7 +75,7 @@ def test_the_exponent_gives_each_mode_its_own_constant():
     data = runs(mobilities, noise=0.0)
     predicted = model.predict(theta, make_batch(data, strain_step=0.1))
     for row, run in zip(predicted, data, strict=True):
-        stress = run.shear_stress
+        stress = run.stress
         np.testing.assert_allclose(row[: len(run)], stress, atol=2e-3 * np.max(np.abs(stress)))
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import odeint
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.protocols import oscillatory_shear, start_up
 from discover.report.verdicts import loop_verdict
 
@@ -30,9 +30,9 @@ def maxwell(rate):
 
 
 def loop(stress, declared=DECLARED, effects=("stress_offset", "stress_gain"), **options):
-    runs = [ShearRun(n, TIMES, FLOWS[n], RATES[n], np.asarray(stress[n])) for n in FLOWS]
+    runs = [Run(n, TIMES, FLOWS[n], RATES[n], np.asarray(stress[n])) for n in FLOWS]
     return run_loop(
-        ShearDataset("made", tuple(runs)), declared, effects=list(effects), max_effects=2, **options
+        Dataset("made", tuple(runs)), declared, effects=list(effects), max_effects=2, **options
     )
 
 

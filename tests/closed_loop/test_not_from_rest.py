@@ -8,7 +8,7 @@ from independent import Modes, UpperConvectedMaxwell
 from independent.misread import relaxation_as_run
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.dataset.checking.start import doubts_of_start
 from discover.protocols import measured_rate
 
@@ -27,12 +27,12 @@ def step(strain, told=True, times=TIMES):
     noise = 0.01 * np.sqrt(np.mean(exact**2))
     stress = exact + noise * np.random.default_rng(int(1e4 * strain)).standard_normal(len(times))
     flow = measured_rate(times, rate)
-    return ShearRun(f"step_{strain}", times, flow, rate, stress, strain=made if told else None)
+    return Run(f"step_{strain}", times, flow, rate, stress, strain=made if told else None)
 
 
 def loop(*runs):
     return run_loop(
-        ShearDataset("steps", runs), TO_FIT, effects=["relaxation_mode", "solvent_viscosity"],
+        Dataset("steps", runs), TO_FIT, effects=["relaxation_mode", "solvent_viscosity"],
         max_effects=2,
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.numerical_resolution import COMPUTED, NumericalResolution, rounding
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.protocols import measured_rate, oscillatory_shear, start_up
@@ -45,7 +45,7 @@ def maxwell_runs(offset=0.0, digits=17, stress=1.0, time=1.0):
 
     def run(name, flow, rate, values):
         kept = rounded(stress * (values + offset), digits)
-        return ShearRun(name, time * TIMES, flow, rate / time, kept)
+        return Run(name, time * TIMES, flow, rate / time, kept)
 
     steady = 100.0 * -np.expm1(-TIMES)
     # σ' + σ = 100 γ̇ from rest
@@ -65,7 +65,7 @@ def declared(stress=1.0, time=1.0):
 def loop(runs, *units):
     # one list of candidates, so that all loops here share a program
     return run_loop(
-        ShearDataset("exact", tuple(runs)), declared(*units), held_out=["held"],
+        Dataset("exact", tuple(runs)), declared(*units), held_out=["held"],
         effects=["stress_offset", "stress_gain"], max_effects=2,
     )  # fmt: skip
 
@@ -89,7 +89,7 @@ def test_a_small_effect_that_no_candidate_is_stays_unexplained_in_exact_data():
     # a slow wave of 0.1 % of the stress, ten times what the samples of the rate leave
     runs = maxwell_runs()
     flaw = 0.04 * np.sin(2.0 * TIMES)
-    bent = [ShearRun(r.name, r.time, r.protocol, r.shear_rate, r.shear_stress + flaw) for r in runs]
+    bent = [Run(r.name, r.time, r.protocol, r.rate, r.stress + flaw) for r in runs]
     result = loop(bent)
     assert result.error_after.fit < 2e-3
     assert result.verdict == "unexplained"
@@ -110,10 +110,7 @@ def test_a_copy_of_a_fitted_run_is_not_held_out():
 
 
 def test_every_candidate_may_be_in_the_model():
-    runs = [
-        ShearRun(r.name, r.time, r.protocol, r.shear_rate, 1.2 * r.shear_stress + 3.0)
-        for r in maxwell_runs()
-    ]
+    runs = [Run(r.name, r.time, r.protocol, r.rate, 1.2 * r.stress + 3.0) for r in maxwell_runs()]
     result = loop(runs)
     assert {stage.effect for stage in result.stages} == {"stress_offset", "stress_gain"}
     assert result.verdict == "effects_added"

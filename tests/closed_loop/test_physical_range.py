@@ -5,7 +5,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.physical_range import at_an_end, undetermined
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel
 from discover.protocols import measured_rate, start_up
@@ -24,13 +24,13 @@ def relaxation(count=120, noise=0.01):
     rate = np.zeros(count)
     rate[0] = STRAIN / time[0]
     flow = measured_rate(time, rate)
-    return ShearRun("step.csv", time, flow, rate, stress, rate_is_measured=True)
+    return Run("step.csv", time, flow, rate, stress, rate_is_measured=True)
 
 
 @pytest.fixture(scope="module")
 def relaxed():
     declared = DeclaredModel.maxwell(2000.0, 1.0, fit_modulus=True, fit_relaxation_time=True)
-    return run_loop(ShearDataset("step", (relaxation(),)), declared, effects=CANDIDATES)
+    return run_loop(Dataset("step", (relaxation(),)), declared, effects=CANDIDATES)
 
 
 def test_no_heat_is_found_in_the_relaxation_after_a_step_of_three_per_cent(relaxed):
@@ -60,11 +60,11 @@ def warming(heating, count=60):
     record = np.array(record)
     noise = 0.01 * np.sqrt(np.mean(record**2)) * np.random.default_rng(2).normal(size=count)
     flow = start_up(rate)
-    return ShearRun("melt.csv", at, flow, np.full(count, rate), record + noise)
+    return Run("melt.csv", at, flow, np.full(count, rate), record + noise)
 
 
 def test_the_heat_of_a_stiff_melt_is_still_found():
-    dataset = ShearDataset("melt", (warming(2e-8),))
+    dataset = Dataset("melt", (warming(2e-8),))
     result = run_loop(dataset, DeclaredModel.maxwell(1e6, 1.0), effects=CANDIDATES)
     assert result.verdict == "effects_added"
     (stage,) = result.stages

@@ -19,8 +19,8 @@ def relative_change(case, reference):
     fitted = [run for run in case.dataset if run.name not in case.held_out]
     changes = []
     for run in fitted:
-        other = reference.dataset[run.name].shear_stress
-        difference = run.shear_stress - other
+        other = reference.dataset[run.name].stress
+        difference = run.stress - other
         changes.append(np.sqrt(np.mean(difference**2) / np.mean(other**2)))
     return np.mean(changes)
 
@@ -54,7 +54,7 @@ def test_the_same_seed_plants_the_same(planter):
     other = planter.plant(["thixotropy"], seed=6)
     assert first.effects == second.effects != other.effects
     for run in first.dataset:
-        np.testing.assert_array_equal(run.shear_stress, second.dataset[run.name].shear_stress)
+        np.testing.assert_array_equal(run.stress, second.dataset[run.name].stress)
 
 
 def test_noise_has_the_size_and_the_correlation_asked_for():

@@ -20,7 +20,7 @@ def start_up(rate, residual, seed=0, **options):
         time=time,
         strain=rate * time,
         instrument_time=time,
-        shear_rate=np.full_like(time, rate),
+        rate=np.full_like(time, rate),
         measured=measured,
         predicted=np.stack([measured + left]),
         errors=np.array([float(np.sqrt(np.mean(left**2))) / size]),
@@ -40,7 +40,7 @@ def oscillating(residual, frequency=0.7, cycles=6.0, samples=400, noise=0.0, see
         time=time,
         strain=np.sin(phase),
         instrument_time=time,
-        shear_rate=frequency * np.cos(phase),
+        rate=frequency * np.cos(phase),
         measured=measured,
         predicted=np.stack([measured + left]),
         errors=np.array([float(np.sqrt(np.mean(left**2) / np.mean(measured**2)))]),
@@ -144,8 +144,8 @@ def test_a_start_up_does_not_oscillate(rate):
 
 def test_steps_up_and_down_do_not_oscillate():
     record = oscillating(lambda p: 0.0 * p)
-    noisy = record.shear_rate + np.random.default_rng(0).normal(size=record.time.size)
-    assert oscillation(RunRecord(**{**vars(record), "shear_rate": noisy})) is None
+    noisy = record.rate + np.random.default_rng(0).normal(size=record.time.size)
+    assert oscillation(RunRecord(**{**vars(record), "rate": noisy})) is None
 
 
 def test_a_perfect_prediction_has_no_reading():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.laws import Fluid, Giesekus
 from discover.protocols import start_up
 from discover.simulate import simulate
@@ -45,8 +45,8 @@ def dataset():
         stress = simulate(fluid, start_up(rate), TIMES).shear_stress
         noise = 0.01 * np.sqrt(np.mean(stress**2)) * generator.standard_normal(TIMES.size)
         rates = np.full(TIMES.size, rate)
-        runs.append(ShearRun(f"at_{rate:g}", TIMES, start_up(rate), rates, stress + noise + 6.0))
-    return ShearDataset("with an offset", tuple(runs))
+        runs.append(Run(f"at_{rate:g}", TIMES, start_up(rate), rates, stress + noise + 6.0))
+    return Dataset("with an offset", tuple(runs))
 
 
 def loop(dataset, store=None, say=None):

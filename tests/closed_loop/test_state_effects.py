@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.least_squares import fit_batch
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.protocols import oscillatory_shear, start_up
@@ -19,8 +19,8 @@ FLOWS = (start_up(STEADY), oscillatory_shear(*OSCILLATION))
 
 
 def make_run(name, flow):
-    rate = np.array([float(flow.shear_rate(jnp.asarray(t))) for t in TIMES])
-    return ShearRun(name, TIMES, flow, rate, np.ones(len(TIMES)))
+    rate = np.array([float(flow.rate(jnp.asarray(t))) for t in TIMES])
+    return Run(name, TIMES, flow, rate, np.ones(len(TIMES)))
 
 
 BATCH = make_batch([make_run(str(i), flow) for i, flow in enumerate(FLOWS)], strain_step=0.1)
@@ -247,7 +247,7 @@ def test_a_correction_for_inertia_that_is_too_large_is_found():
     stress = integrate(lambda y, rate: MODULUS * rate - y / TIME, 1, oscillating_rate)[0]
     tool = -OSCILLATION[0] * OSCILLATION[1] * np.sin(OSCILLATION[1] * TIMES)
     noise = 0.01 * np.sqrt(np.mean(stress**2)) * np.random.default_rng(1).normal(size=len(TIMES))
-    run = ShearRun("1", TIMES, FLOWS[1], oscillating_rate(TIMES), stress - 8.0 * tool + noise)
+    run = Run("1", TIMES, FLOWS[1], oscillating_rate(TIMES), stress - 8.0 * tool + noise)
     name = "instrument_inertia"
     model = AugmentedModel(
         DeclaredModel.maxwell(MODULUS, TIME), [make_effect(name)], data_scales([run])

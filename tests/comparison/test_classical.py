@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from discover.comparison.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.flows import Flow
 from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.protocols.shear import oscillatory_shear, start_up
+from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.study.build import DeclaredModel
 
 MODULUS, RELAXATION_TIME = 100.0, 2.0

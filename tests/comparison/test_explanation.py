@@ -17,7 +17,7 @@ from discover.identify import HiddenStresses, LawTerms
 from discover.identify.bands import PredictionBand
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
-from discover.protocols.shear import measured_rate, oscillatory_shear
+from discover.protocols.protocol import measured_rate, oscillatory_shear
 from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.0, 20.0, 201)
@@ -113,7 +113,7 @@ def test_arithmetic_is_no_pattern(responses):
 
 def test_a_rate_that_is_known_at_the_samples_only_is_allowed_for(responses):
     exact = flows_of(responses["giesekus"])
-    read = [replace(f, protocol=measured_rate(TIMES, np.asarray(f.shear_rate))) for f in exact]
+    read = [replace(f, protocol=measured_rate(TIMES, np.asarray(f.rate))) for f in exact]
     fluid = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
     rows = [predict(fluid, flow)["sigma12"] for flow in read]
     one = outcome("tensor_sindy", read, rows)

@@ -12,7 +12,7 @@ from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.comparison.explanation import explain
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.protocols import start_up
@@ -39,15 +39,13 @@ def runs_and_residuals(kind):
         if kind == "dead":
             exact = 42.0 + left
         record = exact - left if kind != "dead" else exact
-        runs.append(ShearRun(str(rate), TIMES, start_up(rate), np.full(len(TIMES), rate), record))
+        runs.append(Run(str(rate), TIMES, start_up(rate), np.full(len(TIMES), rate), record))
         residuals.append(left)
     return runs, residuals
 
 
 def said_by_comparison(runs, residuals, expectation):
-    flows = [
-        Flow(r.name, "training", r.protocol, r.time, r.shear_rate, {}, r.shear_stress) for r in runs
-    ]
+    flows = [Flow(r.name, "training", r.protocol, r.time, r.rate, {}, r.stress) for r in runs]
     predictions = {
         flow.key: {"sigma12": flow.measured + left}
         for flow, left in zip(flows, residuals, strict=True)
@@ -65,8 +63,8 @@ def said_by_loop(runs, residuals, expectation):
     fit = Fit(model.zero(), (), weighted, np.zeros((0, *weighted.shape)))
     records = [
         RunRecord(
-            run.name, False, run.time, run.time, run.time, run.shear_rate, run.shear_stress,
-            (run.shear_stress + left)[None], np.array([np.sqrt(np.sum(row**2))]),
+            run.name, False, run.time, run.time, run.time, run.rate, run.stress,
+            (run.stress + left)[None], np.array([np.sqrt(np.sum(row**2))]),
         )
         for run, left, row in zip(runs, residuals, weighted, strict=True)
     ]  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from discover.comparison.flows import Flow
 from discover.comparison.range import place
-from discover.protocols.shear import in_flow, oscillatory_shear, start_up
+from discover.protocols.protocol import in_flow, oscillatory_shear, start_up
 
 TIME = np.linspace(0.0, 20.0, 201)
 

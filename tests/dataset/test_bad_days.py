@@ -120,7 +120,7 @@ def test_any_table_is_a_run_or_one_message(tmp_path, header, rows, separator, en
     message = use(tmp_path)
     if message is None:
         run = load_dataset(tmp_path)["a.csv"]
-        assert np.all(np.isfinite(run.shear_stress))
+        assert np.all(np.isfinite(run.stress))
         assert np.all(np.diff(run.time) > 0)
     else:
         assert_clear(message, FILES)
@@ -207,7 +207,7 @@ def test_harmless_habits_of_editors_change_nothing(tmp_path, content):
     write(tmp_path, {"a.csv": content, "study.toml": "\ufeff" + FILES["study.toml"]})
     assert use(tmp_path) is None
     run = load_dataset(tmp_path)["a.csv"]
-    np.testing.assert_array_equal(run.shear_stress, wanted.shear_stress)
+    np.testing.assert_array_equal(run.stress, wanted.stress)
     np.testing.assert_array_equal(run.time, wanted.time)
 
 
@@ -283,11 +283,11 @@ def test_a_long_record_is_thinned_with_a_word_and_its_samples_are_the_recorded_o
     assert f"of {n:,} samples" in str(run.metadata["thinned"])
     assert run.time[-1] == pytest.approx(100.0)
     # the overshoot's height and the early decades are kept
-    assert np.max(run.shear_stress) == pytest.approx(np.max(noisy), abs=1e-8)
+    assert np.max(run.stress) == pytest.approx(np.max(noisy), abs=1e-8)
     assert np.sum(run.time < 0.05) > 0.9 * np.sum(times < 0.05)
     # noise is neither smoothed nor selected: its size stays within sampling error, 3 / sqrt(2 n)
     expected = np.interp(run.time, times, stress)
-    assert np.std(run.shear_stress - expected) == pytest.approx(1e-3, rel=3 / np.sqrt(2 * len(run)))
+    assert np.std(run.stress - expected) == pytest.approx(1e-3, rel=3 / np.sqrt(2 * len(run)))
     findings = [f for f in check_folder(tmp_path) if f.file == "a.csv"]
     assert any("half evenly in log time" in f.text for f in findings if f.severity == "note")
     assert "thinned" not in load_dataset(tmp_path)["b.csv"].metadata

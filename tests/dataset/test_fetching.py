@@ -70,8 +70,8 @@ def test_a_set_is_fetched_by_the_installer_and_loads(package, tmp_path, monkeypa
     dataset = load_dataset(tmp_path / "pi", clock_factor="time_factor")
     assert dataset.names == ("pi_Tm10_rate1.csv", "pi_Tm10_rate4.csv")
     fast = dataset.runs[1]
-    np.testing.assert_allclose(fast.shear_rate, 2.0)
-    np.testing.assert_allclose(fast.shear_stress[-1], 4.0)
+    np.testing.assert_allclose(fast.rate, 2.0)
+    np.testing.assert_allclose(fast.stress[-1], 4.0)
     sweep = dataset.linear_sweep
     np.testing.assert_array_equal(sweep.angular_frequency, [1.0, 2.0, 4.0])
     assert (tmp_path / "pi" / "LICENSE").read_text() == "the licence"

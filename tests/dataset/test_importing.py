@@ -73,8 +73,8 @@ def german(path):
 
 def assert_equals_original(run, normal=False, strain=False):
     np.testing.assert_allclose(run.time, TIMES, rtol=EXACT)
-    np.testing.assert_allclose(run.shear_rate, RATE, rtol=EXACT)
-    np.testing.assert_allclose(run.shear_stress, STRESS, rtol=EXACT)
+    np.testing.assert_allclose(run.rate, RATE, rtol=EXACT)
+    np.testing.assert_allclose(run.stress, STRESS, rtol=EXACT)
     if normal:
         np.testing.assert_allclose(run.first_normal_stress_difference, NORMAL, rtol=EXACT)
     if strain:
@@ -356,8 +356,8 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
         rows = ["[step]", "Peak hold", "Step time\tShear rate\tStress\tN1", "min\t1/h\tkPa\tMPa"]
         columns = (
             run.time / 60,
-            run.shear_rate * 3600,
-            run.shear_stress / 1e3,
+            run.rate * 3600,
+            run.stress / 1e3,
             run.first_normal_stress_difference / 1e6,
         )
         rows += ["\t".join(map(repr, row)) for row in np.stack(columns, 1).tolist()]
@@ -375,7 +375,7 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
     assert result.exit_code == 0, result.output
     again = load_dataset(out)
     for run in original.runs[:4]:
-        for name in ("time", "shear_rate", "shear_stress", "first_normal_stress_difference"):
+        for name in ("time", "rate", "stress", "first_normal_stress_difference"):
             wanted = getattr(run, name)
             np.testing.assert_allclose(getattr(again[run.name], name), wanted, rtol=EXACT)
     assert again.linear_sweep is not None

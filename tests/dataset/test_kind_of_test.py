@@ -33,7 +33,7 @@ def test_extension_is_read_beside_shear_with_its_own_columns(tmp_path):
     data = load_dataset(made)
     assert [run.flow for run in data] == ["shear", "uniaxial", "shear"]
     assert list(data["b.csv"].to_dataframe()) == ["time_s", "hencky_rate_1_s", "tensile_stress_Pa"]
-    np.testing.assert_array_equal(data["b.csv"].shear_stress, TIME)
+    np.testing.assert_array_equal(data["b.csv"].stress, TIME)
     assert not [f for f in check_folder(made) if "aside" in f.text or "not used" in f.text]
 
 
@@ -74,7 +74,7 @@ def test_a_step_of_strain_is_part_of_what_was_imposed(tmp_path):
     at_once, slow = load_dataset(made)
     assert float(slow.protocol.begins) == -0.5
     assert 0.0 < -float(at_once.protocol.begins) < 0.01 * TIME[0]
-    assert not np.any(slow.shear_rate)
+    assert not np.any(slow.rate)
     assert slow.strain is not None
     assert slow.strain[0] == 2.0
     np.testing.assert_allclose(shear_rates(slow.protocol, np.array([-0.25])) * 0.5, 2.0)

@@ -5,8 +5,8 @@ import pytest
 
 from discover.dataset import check_folder, load_dataset
 from discover.dataset.checking.among_runs import doubts_among_runs
-from discover.dataset.run import ShearRun
-from discover.protocols.shear import start_up
+from discover.dataset.run import Run
+from discover.protocols.protocol import start_up
 
 
 def write_sweep(folder, n):
@@ -49,12 +49,12 @@ def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):
     def largest(run):
         nonlocal looks
         looks += 1
-        return float(np.max(np.abs(run.shear_stress)))
+        return float(np.max(np.abs(run.stress)))
 
     monkeypatch.setattr("discover.dataset.checking.among_runs._largest", largest)
     time = np.linspace(0.1, 5.0, 12)
     runs = [
-        ShearRun(f"r{i}.csv", time, start_up(0.1), np.full(12, 0.1), 10 * -np.expm1(-time))
+        Run(f"r{i}.csv", time, start_up(0.1), np.full(12, 0.1), 10 * -np.expm1(-time))
         for i in range(40)
     ]
     assert list(doubts_among_runs(runs)) == []
@@ -65,7 +65,7 @@ def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):
 def test_one_run_of_many_in_another_unit_is_still_found(factor):
     time = np.linspace(0.1, 5.0, 12)
     runs = [
-        ShearRun(
+        Run(
             f"r{i}.csv",
             time,
             start_up(rate),

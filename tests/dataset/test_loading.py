@@ -32,7 +32,7 @@ def test_a_constant_rate_is_a_start_up_and_a_varying_one_is_followed(folder):
     assert steady.metadata["label"] == "first"
     # the flow starts at t = 0 although the first sample is at 1 s
     assert float(steady.protocol.strain(jnp.asarray(1.0))) == pytest.approx(0.5)
-    assert float(varying.protocol.shear_rate(jnp.asarray(1.5))) == pytest.approx(1.5)
+    assert float(varying.protocol.rate(jnp.asarray(1.5))) == pytest.approx(1.5)
     np.testing.assert_array_equal(steady.first_normal_stress_difference, [0.0, 1.0, 2.0])
     assert varying.first_normal_stress_difference is None
 
@@ -53,8 +53,8 @@ def test_units_in_column_names_are_converted(folder):
     )
     run = data["a.csv"]
     np.testing.assert_allclose(run.time, [0.0, 0.1])
-    np.testing.assert_allclose(run.shear_rate, 1.0)
-    np.testing.assert_allclose(run.shear_stress, [0.0, 500.0])
+    np.testing.assert_allclose(run.rate, 1.0)
+    np.testing.assert_allclose(run.stress, [0.0, 500.0])
     np.testing.assert_allclose(run.strain, [0.0, 0.1])
     assert data.linear_sweep is not None
     np.testing.assert_allclose(data.linear_sweep.angular_frequency, 2 * np.pi)
@@ -71,7 +71,7 @@ def test_the_rate_is_derived_from_strain_and_the_run_says_so(folder):
     rows = "\n".join(f"{t:.8f},{np.sin(t):.10f},1" for t in time)
     run = load_dataset(folder(a__csv="time_s,strain,stress_Pa\n" + rows))["a.csv"]
     # a cubic over 15 samples of 15 ms: truncation error below 1e-4 at the ends
-    np.testing.assert_allclose(run.shear_rate, np.cos(time), atol=1e-4)
+    np.testing.assert_allclose(run.rate, np.cos(time), atol=1e-4)
     assert "derived from strain" in str(run.metadata["shear_rate_source"])
 
 

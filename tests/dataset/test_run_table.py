@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discover.dataset import Finding, Findings, LinearSweep, ShearDataset, ShearRun
+from discover.dataset import Dataset, Finding, Findings, LinearSweep, Run
 from discover.dataset.run_table import run_line
-from discover.protocols.shear import measured_rate
+from discover.protocols.protocol import measured_rate
 
 TIME = np.linspace(0.0, 10.0, 201)
 ONES = np.ones(201)
 
 
 def run(rate, **more):
-    return ShearRun("a.csv", TIME, measured_rate(TIME, rate), rate, 3.0 * ONES, **more)
+    return Run("a.csv", TIME, measured_rate(TIME, rate), rate, 3.0 * ONES, **more)
 
 
 @pytest.mark.parametrize(
@@ -50,24 +50,24 @@ def test_amplitude_and_frequency_are_read_off_a_noisy_rate():
 
 def test_a_single_sample_has_a_line():
     one = np.ones(1)
-    line = run_line(ShearRun("a", 0.0 * one, measured_rate([0.0], [1.0]), one, one))
+    line = run_line(Run("a", 0.0 * one, measured_rate([0.0], [1.0]), one, one))
     assert (line["flow"], line["samples"]) == ("start-up", 1)
 
 
 def test_a_data_set_shows_its_runs_with_units_and_escapes_their_names():
     wave = replace(run(2.0 * np.cos(TIME)), name="<b>.csv", first_normal_stress_difference=ONES)
     sweep = LinearSweep(np.ones(1), np.ones(1), np.ones(1))
-    shown = ShearDataset("gel", (wave,), sweep, "from <there>")._repr_html_()
+    shown = Dataset("gel", (wave,), sweep, "from <there>")._repr_html_()
     for text in ("a linear sweep of 1 points", "&lt;there&gt;", "&lt;b&gt;.csv", "oscillation"):
         assert text in shown
     for column in ("samples", "duration_s", "largest_rate_1_s", "frequency_rad_s"):
         assert f"<th>{column}</th>" in shown
     assert "<b>" not in shown
     # nothing oscillates: no column for it
-    assert "frequency_rad_s" not in ShearDataset("x", (run(ONES),))._repr_html_()
+    assert "frequency_rad_s" not in Dataset("x", (run(ONES),))._repr_html_()
     assert "N2" not in shown
     assert "measured" in shown
-    assert "no linear sweep" in ShearDataset("x", ())._repr_html_()
+    assert "no linear sweep" in Dataset("x", ())._repr_html_()
 
 
 def test_findings_show_their_whole_sentences_and_stay_a_tuple():

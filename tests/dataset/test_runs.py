@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from discover.dataset import ShearDataset, ShearRun
+from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.protocols import start_up
 
@@ -12,10 +12,10 @@ def make_run(**changes):
         "name": "a.csv",
         "time": time,
         "protocol": start_up(1.0),
-        "shear_rate": np.ones(3),
-        "shear_stress": time,
+        "rate": np.ones(3),
+        "stress": time,
     } | changes
-    return ShearRun(**fields)
+    return Run(**fields)
 
 
 @pytest.mark.parametrize(
@@ -23,8 +23,8 @@ def make_run(**changes):
     [
         ({"time": np.array([0.0, 2.0, 1.0])}, "increase strictly"),
         ({"time": np.array([-1.0, 0.0, 1.0])}, "at or after 0"),
-        ({"shear_stress": np.array([0.0, np.nan, 1.0])}, "sample 1 holds nan"),
-        ({"shear_rate": np.ones(2)}, r"shape \(3,\)"),
+        ({"stress": np.array([0.0, np.nan, 1.0])}, "sample 1 holds nan"),
+        ({"rate": np.ones(2)}, r"shape \(3,\)"),
         ({"time": np.zeros(0)}, "no samples"),
         ({"clock_factor": 0.0}, "clock factor"),
     ],
@@ -44,11 +44,11 @@ def test_a_window_cuts_samples_and_keeps_the_flow():
 
 
 def test_selecting_an_unknown_run_names_those_there_are():
-    data = ShearDataset("set", (make_run(),))
+    data = Dataset("set", (make_run(),))
     with pytest.raises(InputError, match=r"no run 'b\.csv'; it has a\.csv"):
         data.select(["b.csv"])
 
 
 def test_a_repeated_name_is_refused():
     with pytest.raises(InputError, match="twice"):
-        ShearDataset("set", (make_run(), make_run()))
+        Dataset("set", (make_run(), make_run()))

@@ -77,7 +77,7 @@ def test_a_second_column_of_the_kind_is_not_taken_for_a_fraction(tmp_path, heade
 def test_a_second_column_beside_the_first_is_left_alone_and_said(tmp_path):
     table = "time_s,shear_rate_1_s,stress_Pa,stress_Pa_2\n0.1,1,1,7\n0.2,1,2,7\n"
     run = load_dataset(write(tmp_path, table)).runs[0]
-    assert run.shear_stress.tolist() == [1.0, 2.0]
+    assert run.stress.tolist() == [1.0, 2.0]
     assert "stress_Pa_2 in a.csv is not used" in " ".join(map(str, check_folder(tmp_path)))
 
 

@@ -101,7 +101,7 @@ def test_a_bare_run_is_refused_with_what_to_write(data, learner):
     with pytest.raises(dc.InputError, match=r"fit\(\[run\]\)"):
         learner().fit(data[0])
     for wrong in (None, "melt", 3.0):
-        with pytest.raises(dc.InputError, match="sequence of ShearRun"):
+        with pytest.raises(dc.InputError, match="sequence of Run"):
             learner().fit(wrong)
 
 
@@ -117,8 +117,8 @@ def test_an_equation_has_the_modes_and_comes_after_the_fit(sindy, base):
 
 def test_the_score_is_one_less_the_relative_error(sindy, data):
     run = data["fast.csv"]
-    missed = sindy.predict([run]) - run.shear_stress
-    error = np.linalg.norm(missed) / np.linalg.norm(run.shear_stress)
+    missed = sindy.predict([run]) - run.stress
+    error = np.linalg.norm(missed) / np.linalg.norm(run.stress)
     assert sindy.score([run]) == pytest.approx(1.0 - error)
     assert 0.98 < sindy.score([run]) < 1.0  # noise of half a per cent
 

@@ -73,7 +73,7 @@ def test_a_study_uses_a_law_and_an_effect_from_outside(registered):
 
     run = data.dataset["laos_1_0.5"]
     found = solve_ivp(field, (0, 20), np.zeros(3), t_eval=run.time, rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(run.shear_stress, found.y[2], rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(run.stress, found.y[2], rtol=1e-6, atol=1e-8)
 
 
 def test_tables_list_what_is_registered_with_range_unit_and_source(registered):

@@ -20,7 +20,7 @@ def test_a_run_is_chosen_by_number_or_name_and_several_are_a_data_set(data):
     assert [run.name for run in data] == list(RATES)
     for chosen in (data[1:], data[[1, 2]], data[np.array([1, 2])], data[["medium.csv", "fast.csv"]],
                    data[np.array([False, True, True])]):  # fmt: skip
-        assert isinstance(chosen, dc.ShearDataset)
+        assert isinstance(chosen, dc.Dataset)
         assert chosen.names == ("medium.csv", "fast.csv")
         assert chosen.linear_sweep is data.linear_sweep
     assert len(data[[]]) == 0
@@ -74,7 +74,7 @@ def test_representations_are_short_and_tables_long(data):
     assert list(table.columns) == ["run", "time_s", "shear_rate_1_s", "stress_Pa"]
     assert len(table) == 120
     np.testing.assert_array_equal(
-        table[table["run"] == "fast.csv"]["stress_Pa"], data["fast.csv"].shear_stress
+        table[table["run"] == "fast.csv"]["stress_Pa"], data["fast.csv"].stress
     )
     assert list(data.linear_sweep.to_dataframe()) == ["omega_rad_s", "Gp_Pa", "Gpp_Pa"]
 

@@ -7,7 +7,7 @@ import pytest
 from independent import JohnsonSegalman
 from independent import start_up as flow_of
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
@@ -67,7 +67,7 @@ def response(effect, amplitude):
 
 def run():
     flow = start_up(1.0)
-    return ShearRun("run", np.asarray(TIMES), flow, np.ones(len(TIMES)), np.asarray(SIGNAL))
+    return Run("run", np.asarray(TIMES), flow, np.ones(len(TIMES)), np.asarray(SIGNAL))
 
 
 def record(clock_factor=1.0):

@@ -36,10 +36,10 @@ def test_the_importer_of_the_page_makes_a_folder_that_loads(workplace):
     data = load_dataset(str(workplace.folder / "melt"))
     assert [run.name for run in data] == ["run1.csv", "run2.csv"]
     np.testing.assert_allclose(data[1].time, time)
-    np.testing.assert_allclose(data[1].shear_rate, 2.0)
+    np.testing.assert_allclose(data[1].rate, 2.0)
     # cone and plate: stress = 3 M / (2 pi R^3)
     stress = 3 * 2e-6 * (1.0 - np.exp(-time)) / (2 * np.pi * 0.0125**3)
-    np.testing.assert_allclose(data[1].shear_stress, stress)
+    np.testing.assert_allclose(data[1].stress, stress)
 
 
 def test_the_format_is_kept_with_the_import_so_that_it_can_be_repeated(workplace):

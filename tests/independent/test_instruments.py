@@ -145,7 +145,7 @@ def test_a_folder_and_a_study_written_by_hand_are_read(tmp_path):
     )
     write_table(folder / "lve.csv", maxwell_sweep([50.0], [1.0], np.geomspace(0.01, 100, 20)))
     dataset = load_dataset(folder)
-    np.testing.assert_allclose(dataset["b.csv"].shear_stress, runs["b.csv"].stress, rtol=1e-8)
+    np.testing.assert_allclose(dataset["b.csv"].stress, runs["b.csv"].stress, rtol=1e-8)
     np.testing.assert_allclose(
         dataset["b.csv"].second_normal_stress_difference, runs["b.csv"].N2, rtol=1e-8
     )

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from shared_flows import LIBRARY
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.protocols import start_up
 
@@ -25,7 +25,7 @@ def runs(correlation, seed):
         innovation = generator.standard_normal(len(TIMES) + 100)
         noise = lfilter([np.sqrt(1.0 - correlation**2)], [1.0, -correlation], innovation)[100:]
         stress = exact + NOISE * np.sqrt(np.mean(exact**2)) * noise
-        made.append(ShearRun(f"{rate}", TIMES, start_up(rate), np.full_like(TIMES, rate), stress))
+        made.append(Run(f"{rate}", TIMES, start_up(rate), np.full_like(TIMES, rate), stress))
     return made
 
 
@@ -50,6 +50,6 @@ def test_every_sample_counts_in_white_noise(seed):
 
 def test_a_law_that_fits_exactly_is_judged_on_every_sample():
     noisy = runs(0.0, 0)
-    exact = [replace(run, shear_stress=-run.shear_rate * np.expm1(-TIMES)) for run in noisy]
+    exact = [replace(run, stress=-run.rate * np.expm1(-TIMES)) for run in noisy]
     search = TensorSINDy(LIBRARY, n_stability=0, n_folds=0).fit(exact).search_
     assert search.n_independent == len(RATES) * len(TIMES)

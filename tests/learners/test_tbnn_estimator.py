@@ -8,7 +8,7 @@ from sklearn.base import clone
 from sklearn.model_selection import KFold, cross_val_score
 
 import tensor_library as tl
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
 from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe
@@ -65,7 +65,7 @@ def test_every_member_of_an_ensemble_is_reported(model):
 def test_predictions_follow_the_runs_and_their_order(model, data):
     together = model.predict(data.runs)
     assert together.shape == (3 * 51,)
-    np.testing.assert_allclose(together[51:102], data.runs[1].shear_stress, atol=1e-4)
+    np.testing.assert_allclose(together[51:102], data.runs[1].stress, atol=1e-4)
     assert model.score(data.runs) > 0.9999
 
 
@@ -74,8 +74,8 @@ def test_units_come_in_through_modulus_and_relaxation_time(data):
         replace(
             run,
             time=4.0 * run.time,
-            shear_rate=run.shear_rate / 4,
-            shear_stress=50 * run.shear_stress,
+            rate=run.rate / 4,
+            stress=50 * run.stress,
             protocol=oscillatory_shear(wi / 4, de / 4),
         )
         for run, (wi, de) in zip(data.runs, [(1, 0.5), (2, 0.5), (2, 1.0)], strict=True)
@@ -89,7 +89,7 @@ def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
     fluid = Fluid(Giesekus(0.3), [70.0, 30.0], [1.0, 0.2])
     times = np.linspace(0.0, 10.0, 51)
     runs = [
-        ShearRun(name, times, flow, np.zeros(51), simulate(fluid, flow, times).shear_stress)
+        Run(name, times, flow, np.zeros(51), simulate(fluid, flow, times).shear_stress)
         for name, flow in FLOWS.items()
     ]
     settings = {"modulus": [70.0, 30.0], "relaxation_time": [1.0, 0.2], "n_members": 1}
@@ -128,7 +128,7 @@ def test_a_wrong_setting_is_refused(data, options, message):
 
 
 def test_runs_of_another_kind_are_refused():
-    with pytest.raises(InputError, match="sequence of ShearRun"):
+    with pytest.raises(InputError, match="sequence of Run"):
         TBNNUDE().fit([np.zeros(3)])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from independent.homogeneous import GiesekusFluid
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.laws import Giesekus
 from discover.learners.tbnn_ude.least_squares import Objective, Stopping, minimise
 from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
@@ -210,7 +210,7 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     fluid = GiesekusFluid((1.0,), (1.0,), 0.3)
     times = np.linspace(0.1, 3.0, 20)
     runs = [
-        ShearRun(
+        Run(
             kind,
             times,
             in_flow(start_up(rate), kind),

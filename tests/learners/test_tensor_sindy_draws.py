@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from discover.comparison.next_measurement import contenders
 from discover.comparison.outcome import LearnerOutcome
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
@@ -56,7 +56,7 @@ class Fitted:
     def __init__(self, curves, seed, name, start):
         rng = np.random.default_rng(seed)
         runs = [
-            ShearRun(
+            Run(
                 f"{wi} {de}",
                 TIMES,
                 oscillatory_shear(wi, de),

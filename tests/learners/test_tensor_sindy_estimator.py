@@ -8,7 +8,7 @@ from shared_flows import LIBRARY, small_dataset, with_normal_stresses
 from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_val_score
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus, LibraryExpansion
 from discover.learners.tensor_sindy import OPTIMISERS, TensorSINDy
@@ -112,7 +112,7 @@ def test_a_coefficient_that_is_not_one_is_not_taken_for_it():
     )
     fluid = Fluid.dimensionless(law)
     runs = [
-        replace(run, shear_stress=simulate(fluid, run.protocol, run.time).shear_stress)
+        replace(run, stress=simulate(fluid, run.protocol, run.time).shear_stress)
         for run in small_dataset("ptt_exponential", {"epsilon": 0.4})
     ]
     (term,) = TensorSINDy(LIBRARY, **ALONE).fit(runs).terms_
@@ -128,7 +128,7 @@ def test_a_redundant_first_pick_leaves():
     runs = [
         replace(
             run,
-            shear_stress=simulate(Fluid.dimensionless(law), run.protocol, run.time).shear_stress,
+            stress=simulate(Fluid.dimensionless(law), run.protocol, run.time).shear_stress,
         )
         for run in small_dataset("ucm")
     ]
@@ -142,7 +142,7 @@ def test_modes_share_one_law_of_which_not_even_the_relaxation_is_known():
     modulus, relaxation_time = [30.0, 10.0], [0.5, 3.0]
     truth = Fluid(Giesekus(0.3), modulus, relaxation_time)
     runs = [
-        replace(run, shear_stress=simulate(truth, run.protocol, run.time).shear_stress)
+        replace(run, stress=simulate(truth, run.protocol, run.time).shear_stress)
         for run in small_dataset("ucm")
     ]
     model = TensorSINDy(
@@ -232,11 +232,11 @@ def test_bad_parameters_give_one_clear_error(parameters, message):
 def test_bad_runs_give_one_clear_error():
     with pytest.raises(InputError, match="at least one run"):
         TensorSINDy().fit([])
-    with pytest.raises(InputError, match="ShearRun"):
+    with pytest.raises(InputError, match="Run"):
         TensorSINDy().fit([1.0, 2.0])
     run = next(iter(small_dataset("ucm")))
-    silent = replace(run, shear_stress=np.zeros_like(run.shear_stress))
-    assert isinstance(silent, ShearRun)
+    silent = replace(run, stress=np.zeros_like(run.stress))
+    assert isinstance(silent, Run)
     with pytest.raises(InputError, match="zero throughout"):
         TensorSINDy().fit([silent])
     with pytest.raises(InputError, match="two runs"):

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.dataset import ShearRun
+from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
@@ -20,7 +20,7 @@ from discover.programs import compiled, forget_programs
 from discover.programs.fingerprint import NotTold, fingerprint
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
-from discover.protocols.shear import oscillatory_shear, start_up
+from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.simulate.solve import simulate, solve_batch
 from tensor_library.library import build_library
 
@@ -35,7 +35,7 @@ traced = []
 jax.monitoring.register_event_duration_secs_listener(
     lambda name, seconds, **_: traced.append(seconds) if "jaxpr_trace" in name else None)
 from discover.laws import Fluid, make_law
-from discover.protocols.shear import oscillatory_shear
+from discover.protocols.protocol import oscillatory_shear
 from discover.simulate.solve import simulate
 fluid = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
 t = np.linspace(0.0, 2.0, 21)
@@ -156,7 +156,7 @@ def test_models_that_share_every_shape_have_programs_of_their_own(folder):
     # jax.vmap of a method bears the method's name, whatever its object holds
     declared = DeclaredModel.maxwell(100.0, 1.0)
     times = np.linspace(0.1, 2.0, 30)
-    run = ShearRun("a", times, start_up(2.0), np.full(30, 2.0), 100.0 * (1.0 - np.exp(-times)))
+    run = Run("a", times, start_up(2.0), np.full(30, 2.0), 100.0 * (1.0 - np.exp(-times)))
     sizes = {}
     for name in ("giesekus_mobility", "tool_compliance", "stress_offset", "tr(sigma)*sigma"):
         model = AugmentedModel(declared, [make_effect(name)])

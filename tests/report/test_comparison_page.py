@@ -13,7 +13,7 @@ from discover.comparison.explanation import Explanation
 from discover.comparison.identifiability import Rival
 from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.learners import RecoveredTerm
-from discover.protocols.shear import oscillatory_shear
+from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison_report import write_comparison
 from discover.report.comparison_tables import error_rows
 from discover.report.comparison_verdict import comparison_verdict
@@ -240,7 +240,7 @@ def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):
 def test_errors_inside_and_beyond_the_range_are_told_apart_and_so_is_a_runaway():
     # shear start-ups of a melt: the fast one could not be integrated, and was passed over
     inside = flow("b", "held_out")
-    faster = replace(inside, name="fast", shear_rate=3.0 * inside.shear_rate)
+    faster = replace(inside, name="fast", rate=3.0 * inside.rate)
     flows = [flow("a", "training"), inside, faster]
     comparison = made_up(flows=flows, before=dict.fromkeys(f.key for f in flows))
     wrong = {q: 1.5 * np.sin(TIMES) for q in ("sigma12", "N1", "N2")}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from independent.homogeneous import UNIT, GiesekusFluid
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
@@ -39,7 +39,7 @@ def fluid():
 def in_the_loop(protocols, times=TIMES):
     """Return what the closed loop's model predicts."""
     runs = [
-        ShearRun(str(i), times, protocol, np.ones(len(times)), np.ones(len(times)))
+        Run(str(i), times, protocol, np.ones(len(times)), np.ones(len(times)))
         for i, protocol in enumerate(protocols)
     ]
     declared = DeclaredModel(
@@ -95,7 +95,7 @@ def test_a_step_of_strain_at_once_leaves_the_elastic_stress_of_maxwell():
 
 
 def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learners():
-    run = ShearRun("down", TIMES, start_up(0.2), np.full(30, 0.2), np.ones(30), rate_before=2.0)
+    run = Run("down", TIMES, start_up(0.2), np.full(30, 0.2), np.ones(30), rate_before=2.0)
     exact = BY_SCIPY.recorded(
         "shear", lambda t: 2.0 if t < 0.0 else 0.2, TIMES, begins=-40.0, jumps=[0.0]
     )
@@ -135,7 +135,7 @@ def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(k
         wanted = shear_rates(protocol, at)
         # a sample apart by 0.05 s: straight lines miss 0.1 * 0.05^2 / 8 of this wave
         np.testing.assert_allclose(shear_rates(smooth, at), wanted, atol=1e-4)
-    run = ShearRun("a", times, sampled, rates, np.ones(61))
+    run = Run("a", times, sampled, rates, np.ones(61))
     assert thin_run(run, 30).flow == kind
 
 

@@ -197,8 +197,8 @@ def test_synthetic_noise_has_the_size_asked_for_and_the_seed_decides_it():
     assert one.exact is not None
     for run in one:
         exact = one.exact[run.name].shear_stress
-        ratio = np.std(run.shear_stress - exact) / np.sqrt(np.mean(exact**2))
+        ratio = np.std(run.stress - exact) / np.sqrt(np.mean(exact**2))
         assert ratio == pytest.approx(0.02, rel=0.08)  # five times 1/sqrt(2 n)
-        np.testing.assert_array_equal(run.shear_stress, two[run.name].shear_stress)
+        np.testing.assert_array_equal(run.stress, two[run.name].stress)
     other = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.02, seed=4, n_samples=2001)
-    assert not np.array_equal(one.runs[0].shear_stress, other.runs[0].shear_stress)
+    assert not np.array_equal(one.runs[0].stress, other.runs[0].stress)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
 
 # Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
@@ -14,7 +14,7 @@ from discover.protocols.kinematics import KINDS
 _UNIT_FACTOR = 30.0
 
 
-def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
+def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
     """Yield which start-ups do not go together with the others.
 
     In a faster start-up the largest stress is no smaller, and larger by the ratio of the rates at
@@ -31,10 +31,10 @@ def doubts_among_runs(runs: Sequence[ShearRun]) -> Iterator[Finding]:
         yield from _among_alike([r for r in runs if r.flow == kind and _is_start_up(r)])
 
 
-def _among_alike(start_ups: Sequence[ShearRun]) -> Iterator[Finding]:
+def _among_alike(start_ups: Sequence[Run]) -> Iterator[Finding]:
     if len(start_ups) < 2:
         return
-    rates = np.array([abs(run.shear_rate[0]) for run in start_ups])
+    rates = np.array([abs(run.rate[0]) for run in start_ups])
     for what, quantity, rises in (
         ("The stress", _largest, True),
         ("The time at which the stress rises", _half_time, False),
@@ -54,18 +54,18 @@ def _among_alike(start_ups: Sequence[ShearRun]) -> Iterator[Finding]:
             )
 
 
-def _is_start_up(run: ShearRun) -> bool:
-    rate = run.shear_rate
+def _is_start_up(run: Run) -> bool:
+    rate = run.rate
     constant = np.ptp(rate) <= 1e-6 * np.max(np.abs(rate))
     return bool(len(run) >= 3 and rate[0] != 0 and constant and run.from_rest)
 
 
-def _largest(run: ShearRun) -> float:
-    return float(np.max(np.abs(run.shear_stress)))
+def _largest(run: Run) -> float:
+    return float(np.max(np.abs(run.stress)))
 
 
-def _half_time(run: ShearRun) -> float:
-    stress = np.abs(run.shear_stress)
+def _half_time(run: Run) -> float:
+    stress = np.abs(run.stress)
     return float(run.time[int(np.argmax(stress >= 0.5 * np.max(stress)))])
 
 

@@ -28,7 +28,7 @@ from discover.dataset.load import (
     resolve_folder,
 )
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.run import ShearRun, require_signal
+from discover.dataset.run import Run, require_signal
 from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
 
@@ -74,7 +74,7 @@ def check_folder(
         before = rates_before(index, None)
     except InputError as error:
         return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
-    runs: list[ShearRun] = []
+    runs: list[Run] = []
     unused: dict[str, list[str]] = {}
     converted: dict[str, list[str]] = {}
     for row, name in enumerate(index.columns["file"]):
@@ -230,12 +230,12 @@ def _sweep(
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
 
 
-def _digest(run: ShearRun) -> bytes:
+def _digest(run: Run) -> bytes:
     """Return what tells runs of different samples apart, however many there are."""
-    return hashlib.sha256(run.time.tobytes() + run.shear_stress.tobytes()).digest()
+    return hashlib.sha256(run.time.tobytes() + run.stress.tobytes()).digest()
 
 
-def _folder(root: Path, index: Table, runs: list[ShearRun]) -> Iterator[Finding]:
+def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
     listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE}
     try:
         others = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))

@@ -10,7 +10,7 @@ from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.checking.sweep_inertia import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
 _LINEAR_STRAIN = 0.2
@@ -98,7 +98,7 @@ def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
 
 
 def against_linear_theory(
-    runs: Sequence[ShearRun], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
+    runs: Sequence[Run], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
 ) -> Iterator[Finding]:
     """Yield where runs and the linear sweep, or runs among themselves, do not fit together.
 
@@ -109,7 +109,7 @@ def against_linear_theory(
     sweep, spectrum
         The linear sweep and its relaxation modes, if there are any.
     """
-    fastest = max((np.max(np.abs(run.shear_rate)) for run in runs), default=0.0)
+    fastest = max((np.max(np.abs(run.rate)) for run in runs), default=0.0)
     runs = [run for run in runs if run.flow == "shear" and run.from_rest]
     start_ups = [run for run in runs if _is_start_up(run)]
     yield from _second_order(start_ups, spectrum)
@@ -135,13 +135,13 @@ def against_linear_theory(
         yield from _cox_merz(run, sweep, mean_time)
 
 
-def _is_start_up(run: ShearRun) -> bool:
-    rate = run.shear_rate
+def _is_start_up(run: Run) -> bool:
+    rate = run.rate
     return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
-def _duration(run: ShearRun, mean_time: float) -> Iterator[Finding]:
-    strain = abs(run.shear_rate[0]) * run.time[-1]
+def _duration(run: Run, mean_time: float) -> Iterator[Finding]:
+    strain = abs(run.rate[0]) * run.time[-1]
     # strongly sheared melts are steady after some strain, however slow they relax
     if run.time[-1] < mean_time and strain < 5.0:
         yield Finding(
@@ -171,13 +171,13 @@ def _linear_stress(
 
 
 def _linear_part(
-    run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum
+    run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return the first stresses and those of linear theory, in their order.
 
     Used is what comes before the strain from rest exceeds its limit for the first time.
     """
-    rates, times = np.append(run.shear_rate[0], run.shear_rate), np.append(0.0, run.time)
+    rates, times = np.append(run.rate[0], run.rate), np.append(0.0, run.time)
     strain = np.abs(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
     n = int(np.argmax(np.append(strain, np.inf) >= _LINEAR_STRAIN))
     linear = _linear_stress(times[: n + 1], rates[: n + 1], spectrum)
@@ -186,11 +186,11 @@ def _linear_part(
     use &= size > _CLEAR_OF_ZERO * np.maximum.accumulate(size)
     # times shorter than those of the sweep are extrapolation
     use &= run.time[:n] > 1.0 / np.max(sweep.angular_frequency)
-    return run.shear_stress[:n][use], linear[use]
+    return run.stress[:n][use], linear[use]
 
 
 def _gain(
-    run: ShearRun, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
+    run: Run, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
 ) -> tuple[float, float] | None:
     """Return the logarithm of a run's gain against the sweep and its error; None if it is no gain.
 
@@ -207,8 +207,8 @@ def _gain(
     if drift > _STEADY_RATIO or left > max(_STEADY_RATIO * size, 2.0 * stress_noise(run)):
         return None
     # lines between samples lose (ωh)²/12 of a wave; what they miss in the middle is (ωh)²/2
-    bends = float(np.sqrt(np.mean(np.diff(run.shear_rate, 2) ** 2)))
-    coarse = bends / float(np.sqrt(np.mean(run.shear_rate**2))) / 6.0
+    bends = float(np.sqrt(np.mean(np.diff(run.rate, 2) ** 2)))
+    coarse = bends / float(np.sqrt(np.mean(run.rate**2))) / 6.0
     # a median's error is 1.25 times a mean's; the fewest samples hardly show how they scatter
     known = max(len(ratios) - _FEWEST_RATIOS, 1)
     of_median = 1.25 * float(np.std(ratios)) / np.sqrt(known)
@@ -216,7 +216,7 @@ def _gain(
 
 
 def _shared_gain(
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     linear: Mapping[str, tuple[np.ndarray, np.ndarray]],
     sweep: LinearSweep,
     spectrum: RelaxationSpectrum,
@@ -258,7 +258,7 @@ def _shared_gain(
 
 
 def _small_strain(
-    run: ShearRun, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
+    run: Run, stress: Float[np.ndarray, " n"], linear: Float[np.ndarray, " n"]
 ) -> Iterator[Finding]:
     if len(stress) < _FEWEST_RATIOS:
         return
@@ -274,10 +274,10 @@ def _small_strain(
         )
 
 
-def _cox_merz(run: ShearRun, sweep: LinearSweep, mean_time: float) -> Iterator[Finding]:
-    rate = abs(run.shear_rate[0])
+def _cox_merz(run: Run, sweep: LinearSweep, mean_time: float) -> Iterator[Finding]:
+    rate = abs(run.rate[0])
     frequency = sweep.angular_frequency
-    tail = run.shear_stress[run.time > 0.8 * run.time[-1]]
+    tail = run.stress[run.time > 0.8 * run.time[-1]]
     level = float(np.median(tail)) if len(tail) else 0.0
     steady = len(tail) >= 3 and np.ptp(tail) < 0.1 * abs(level)
     if rate * mean_time > _COX_MERZ_RATE or not steady:
@@ -299,7 +299,7 @@ def _cox_merz(run: ShearRun, sweep: LinearSweep, mean_time: float) -> Iterator[F
 
 
 def _second_order(
-    start_ups: Sequence[ShearRun], spectrum: RelaxationSpectrum | None
+    start_ups: Sequence[Run], spectrum: RelaxationSpectrum | None
 ) -> Iterator[Finding]:
     """Hold the last N1 of slow runs against N1 = 2 γ̇² Σ G_k λ_k²   [Coleman & Markovitz 1964]."""
     if spectrum is None:
@@ -307,7 +307,7 @@ def _second_order(
     moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
     mean_time = moment / spectrum.zero_shear_viscosity
     for run in start_ups:
-        normal, rate = run.first_normal_stress_difference, abs(run.shear_rate[0])
+        normal, rate = run.first_normal_stress_difference, abs(run.rate[0])
         if normal is None or rate * mean_time > _SLOW:
             continue
         last = float(np.median(normal[-max(3, len(run) // 10) :]))

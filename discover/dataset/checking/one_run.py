@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 
 FEWEST_SAMPLES = 10
 """Runs with fewer samples than this say little about a law."""
@@ -27,7 +27,7 @@ _NORMAL_STRESS_FACTOR = 2.0
 _SMALL_STRAIN = 0.5
 
 
-def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
+def doubts_of_run(run: Run) -> Iterator[Finding]:
     """Yield what is doubtful about a run.
 
     Parameters
@@ -55,12 +55,12 @@ def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
             "out, unless it follows a flow.",
         )
         return
-    if not np.any(run.shear_stress):
+    if not np.any(run.stress):
         yield warn("stress", f"The stress in {run.name} is zero throughout. Check the column.")
         return
     if len(run) < 3:
         return
-    if np.ptp(run.shear_stress) <= 1e-9 * np.max(np.abs(run.shear_stress)):
+    if np.ptp(run.stress) <= 1e-9 * np.max(np.abs(run.stress)):
         yield warn(
             "stress",
             f"The stress in {run.name} is the same in every sample: a steady value or a command "
@@ -70,21 +70,21 @@ def doubts_of_run(run: ShearRun) -> Iterator[Finding]:
     yield from _outliers(run)
     yield from _clock_start(run)
     yield from _strain(run)
-    if np.ptp(run.shear_rate) <= 1e-6 * np.max(np.abs(run.shear_rate)):
-        if run.from_rest and np.any(run.shear_rate):
+    if np.ptp(run.rate) <= 1e-6 * np.max(np.abs(run.rate)):
+        if run.from_rest and np.any(run.rate):
             yield from _start_up(run)
             yield from _normal_stress(run)
     else:
         yield from _cycles(run)
 
 
-def spikes(run: ShearRun) -> Float[np.ndarray, " k"]:
+def spikes(run: Run) -> Float[np.ndarray, " k"]:
     """Return the times, in s, of single samples of stress that stand out of their neighbours.
 
     A sample is compared with the straight line between its neighbours. A lone spike also bends
     the lines at its neighbours the other way; a corner or a fast rise does not.
     """
-    off = _bends(run.time, run.shear_stress)
+    off = _bends(run.time, run.stress)
     if len(off) < 5:
         return np.empty(0)
     width = min(41, len(off))
@@ -92,7 +92,7 @@ def spikes(run: ShearRun) -> Float[np.ndarray, " k"]:
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(off), width)
     noise = 1.4826 * np.median(windows, axis=1)[first]
     large = np.abs(off) > np.maximum(
-        _SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.shear_stress))
+        _SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.stress))
     )
     alone = np.zeros(len(off), dtype=bool)
     alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
@@ -101,9 +101,9 @@ def spikes(run: ShearRun) -> Float[np.ndarray, " k"]:
     return run.time[1:-1][large & alone]
 
 
-def stress_noise(run: ShearRun) -> float:
+def stress_noise(run: Run) -> float:
     """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
-    off = _bends(run.time, run.shear_stress)
+    off = _bends(run.time, run.stress)
     # a sample minus the mean of two neighbours: variance 1 + 1/4 + 1/4
     return float(1.4826 * np.median(np.abs(off)) / np.sqrt(1.5)) if len(off) else 0.0
 
@@ -113,7 +113,7 @@ def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
 
 
-def _outliers(run: ShearRun) -> Iterator[Finding]:
+def _outliers(run: Run) -> Iterator[Finding]:
     found = spikes(run)
     if len(found):
         where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
@@ -127,7 +127,7 @@ def _outliers(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _clock_start(run: ShearRun) -> Iterator[Finding]:
+def _clock_start(run: Run) -> Iterator[Finding]:
     if run.time[0] > 0.2 * run.time[-1]:
         yield Finding(
             "warning",
@@ -139,10 +139,10 @@ def _clock_start(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _strain(run: ShearRun) -> Iterator[Finding]:
+def _strain(run: Run) -> Iterator[Finding]:
     if run.strain is None or "derived" in str(run.metadata.get("shear_rate_source", "")):
         return
-    steps = 0.5 * (run.shear_rate[1:] + run.shear_rate[:-1]) * np.diff(run.time)
+    steps = 0.5 * (run.rate[1:] + run.rate[:-1]) * np.diff(run.time)
     expected = np.concatenate([[0.0], np.cumsum(steps)])
     measured = run.strain - run.strain[0]
     size = np.max(np.abs(expected))
@@ -166,8 +166,8 @@ def _strain(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _start_up(run: ShearRun) -> Iterator[Finding]:
-    stress = run.shear_stress * np.sign(run.shear_rate[0])
+def _start_up(run: Run) -> Iterator[Finding]:
+    stress = run.stress * np.sign(run.rate[0])
     half = int(np.argmax(stress >= 0.5 * np.max(stress)))
     if half < _FEWEST_ON_THE_RISE:
         yield Finding(
@@ -193,8 +193,8 @@ def _start_up(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _cycles(run: ShearRun) -> Iterator[Finding]:
-    turns = int(np.sum(np.diff(np.sign(run.shear_rate[run.shear_rate != 0])) != 0))
+def _cycles(run: Run) -> Iterator[Finding]:
+    turns = int(np.sum(np.diff(np.sign(run.rate[run.rate != 0])) != 0))
     if turns < 2:
         return
     if run.from_rest:
@@ -211,9 +211,9 @@ def _cycles(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _work(run: ShearRun) -> Iterator[Finding]:
+def _work(run: Run) -> Iterator[Finding]:
     """Hold the work of an oscillation from rest against zero, below which no passive fluid goes."""
-    power = run.shear_rate * run.shear_stress
+    power = run.rate * run.stress
     work = float(np.trapezoid(power, run.time))
     size = float(np.trapezoid(np.abs(power), run.time))
     # noise around zero sums to some 1/√n of its size
@@ -228,7 +228,7 @@ def _work(run: ShearRun) -> Iterator[Finding]:
         )
 
 
-def _normal_stress(run: ShearRun) -> Iterator[Finding]:
+def _normal_stress(run: Run) -> Iterator[Finding]:
     """Hold N1 against what elasticity allows in start-up from rest: 0 ≤ N1 ≤ σ12 γ, about.
 
     With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
@@ -237,9 +237,9 @@ def _normal_stress(run: ShearRun) -> Iterator[Finding]:
     normal = run.first_normal_stress_difference
     if normal is None:
         return
-    rate = abs(run.shear_rate[0])
+    rate = abs(run.rate[0])
     strain = rate * run.time
-    limit = np.abs(run.shear_stress) * strain
+    limit = np.abs(run.stress) * strain
     small = strain < _SMALL_STRAIN
     bad = (normal > _NORMAL_STRESS_FACTOR * limit) | (normal < -0.5 * limit)
     if np.sum(small) >= 5 and np.mean(bad[small]) > 0.3:

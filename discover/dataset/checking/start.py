@@ -7,7 +7,7 @@ import numpy as np
 from discover.dataset.checking.finding import Finding
 from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.protocols.kinematics import kinematics_of
 
@@ -28,7 +28,7 @@ _HARMONICS = (1, 2, 3, 5, 7)
 
 
 def doubts_of_start(
-    run: ShearRun, sweep: LinearSweep | None = None, spectrum: RelaxationSpectrum | None = None
+    run: Run, sweep: LinearSweep | None = None, spectrum: RelaxationSpectrum | None = None
 ) -> Iterator[Finding]:
     """Yield why a run that is taken as starting from rest cannot have started so.
 
@@ -70,7 +70,7 @@ def doubts_of_start(
     )
 
 
-def doubts_of_unseen_start(run: ShearRun) -> Iterator[Finding]:
+def doubts_of_unseen_start(run: Run) -> Iterator[Finding]:
     """Yield a doubt if a run began so late that nothing shows whether it started from rest.
 
     For runs without a sweep, which would say how fast the stress grows, and without a better reason
@@ -98,11 +98,11 @@ def doubts_of_unseen_start(run: ShearRun) -> Iterator[Finding]:
     )
 
 
-def _largest_and_first(run: ShearRun) -> tuple[float, float]:
-    return float(np.max(np.abs(run.shear_stress))), abs(float(run.shear_stress[0]))
+def _largest_and_first(run: Run) -> tuple[float, float]:
+    return float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
 
 
-def _is_loaded_at_first(run: ShearRun) -> bool:
+def _is_loaded_at_first(run: Run) -> bool:
     """Whether a run that is taken as starting from rest has a stress at its first sample."""
     if not run.from_rest or len(run) < 5:
         return False
@@ -110,11 +110,11 @@ def _is_loaded_at_first(run: ShearRun) -> bool:
     return first >= max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run))
 
 
-def _without_memory(run: ShearRun) -> bool:
+def _without_memory(run: Run) -> bool:
     """Whether a power law of the rate, where it changes, makes the stress at every sample."""
-    rate, stress = np.abs(run.shear_rate), run.shear_stress * np.sign(run.shear_rate)
+    rate, stress = np.abs(run.rate), run.stress * np.sign(run.rate)
     use = (rate > 0.0) & (stress > 0.0)
-    if np.ptp(run.shear_rate) < _NOTICEABLE * np.max(rate) or np.count_nonzero(use) < 3:
+    if np.ptp(run.rate) < _NOTICEABLE * np.max(rate) or np.count_nonzero(use) < 3:
         return False
     power = np.polynomial.Polynomial.fit(np.log(rate[use]), np.log(stress[use]), 1)
     left = stress[use] - np.exp(power(np.log(rate[use])))
@@ -122,27 +122,27 @@ def _without_memory(run: ShearRun) -> bool:
     return bool(left @ left + lost @ lost < _TRANSIENT**2 * (stress @ stress))
 
 
-def _only_falls(run: ShearRun) -> bool:
-    stress = run.shear_stress * np.sign(run.shear_stress[0])
+def _only_falls(run: Run) -> bool:
+    stress = run.stress * np.sign(run.stress[0])
     tail = float(np.median(stress[-max(3, len(run) // 10) :]))
     if np.max(stress) > 1.1 * stress[0] or tail > 0.5 * stress[0]:
         return False
-    rate = run.shear_rate
+    rate = run.rate
     power = float(rate @ rate)
-    viscosity = max(float(rate @ run.shear_stress) / power, 0.0) if power > 0.0 else 0.0
-    left = run.shear_stress - viscosity * rate
-    return bool(left @ left > 0.5 * (run.shear_stress @ run.shear_stress))
+    viscosity = max(float(rate @ run.stress) / power, 0.0) if power > 0.0 else 0.0
+    left = run.stress - viscosity * rate
+    return bool(left @ left > 0.5 * (run.stress @ run.stress))
 
 
-def _strained_before(run: ShearRun) -> bool:
+def _strained_before(run: Run) -> bool:
     if run.strain is None or run.rate_is_measured:
         return False
-    made = run.shear_rate[0] * run.time[0]
+    made = run.rate[0] * run.time[0]
     whole = float(np.max(np.abs(run.strain)))
     return bool(abs(run.strain[0] - made) > _NOT_MADE * whole)
 
 
-def _steady_alternation(run: ShearRun) -> bool:
+def _steady_alternation(run: Run) -> bool:
     wave = oscillation(run)
     if wave is None:
         return False
@@ -153,19 +153,19 @@ def _steady_alternation(run: ShearRun) -> bool:
         return False
     angles = wave[0] * run.time[:, None] * np.array(_HARMONICS)
     waves = np.hstack([np.cos(angles), np.sin(angles), np.ones((len(run), 1))])
-    found, *_ = np.linalg.lstsq(waves[later], run.shear_stress[later], rcond=None)
-    left = run.shear_stress - waves @ found
+    found, *_ = np.linalg.lstsq(waves[later], run.stress[later], rcond=None)
+    left = run.stress - waves @ found
     scatter = float(np.sqrt(np.mean(left[later] ** 2)))
     early = float(np.sqrt(np.mean(left[time < 0.25 * period] ** 2)))
-    rates, *_ = np.linalg.lstsq(waves, run.shear_rate, rcond=None)
+    rates, *_ = np.linalg.lstsq(waves, run.rate, rcond=None)
     n = len(_HARMONICS)
     viscosity = complex(found[0], -found[n]) / complex(rates[0], -rates[n])
-    size = float(np.max(np.abs(run.shear_stress)))
+    size = float(np.max(np.abs(run.stress)))
     alike = early < max(3.0 * scatter, _TRANSIENT * size) and scatter < _NOTICEABLE * size
     return alike and abs(viscosity.imag) > _NOTICEABLE * abs(viscosity)
 
 
-def _more_than_linear(run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpectrum) -> bool:
+def _more_than_linear(run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum) -> bool:
     """Hold the first stress against Tr γ̇ (Σ G_k λ_k (1 − exp(−t/λ_k)) + η), η of what is faster.
 
     Tr is Trouton's ratio of the flow, 1 in shear.
@@ -176,5 +176,5 @@ def _more_than_linear(run: ShearRun, sweep: LinearSweep, spectrum: RelaxationSpe
     fast = float(np.min(sweep.loss_modulus / sweep.angular_frequency))
     linear = fast + float(-np.expm1(-time / spectrum.relaxation_time) @ modes)
     trouton = float(kinematics_of(run.flow).viscous)
-    allowed = _LINEAR_FACTOR * trouton * abs(float(run.shear_rate[0])) * linear
-    return abs(float(run.shear_stress[0])) > allowed + 5.0 * stress_noise(run)
+    allowed = _LINEAR_FACTOR * trouton * abs(float(run.rate[0])) * linear
+    return abs(float(run.stress[0])) > allowed + 5.0 * stress_noise(run)

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
@@ -34,7 +34,7 @@ from discover.learners.tbnn_ude.spread import (
     coefficient_spread,
     member_predictions,
 )
-from discover.protocols.shear import ShearProtocol, recorded_at
+from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
@@ -90,7 +90,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         How the members came about.
     fitting_ : list of TensorBasisNetwork
         Members that fit the data about as well as the best, `law_` first.
-    runs_ : tuple of ShearRun
+    runs_ : tuple of Run
         What was fitted; a file does not hold it.
     provenance_ : Provenance
         The same in words, with a hash.
@@ -145,7 +145,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X
-            Runs (`ShearRun`), or a data set.
+            Runs (`Run`), or a data set.
         y
             Ignored: the observations are part of the runs.
 
@@ -213,7 +213,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         return self
 
     def predict_members(
-        self, protocol: ShearProtocol, times: Float[np.ndarray, " n"]
+        self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
     ) -> MemberPredictions:
         """Return σ12, N1 and N2 of every member in a flow, with their bands.
 
@@ -225,7 +225,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         check_is_fitted(self, "ensemble_fluids_")
         return member_predictions(self.ensemble_fluids_, protocol, times)
 
-    def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
+    def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
         fluid = self.fluid_
         problem = make_problem(runs, np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
@@ -275,7 +275,7 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[ShearRun], known: KnownPart) -> TrainingProblem:
+def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
     modulus, relaxation_time = (
         np.atleast_1d(np.asarray(value, dtype=float))
         for value in (known.modulus, known.relaxation_time)

@@ -71,7 +71,7 @@ def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cl
     def one(states, protocol, grid):
         pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
         times = grid.times[grid.sample_index][pick]
-        shear_rates = jax.vmap(protocol.shear_rate)(times)[:, None] * problem.relaxation_time
+        shear_rates = jax.vmap(protocol.rate)(times)[:, None] * problem.relaxation_time
         return states[pick], shear_rates
 
     stress, shear_rate = jax.vmap(one)(states, problem.protocols, problem.grids)

@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
-from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_on_grid
 
@@ -30,7 +30,7 @@ class TrainingProblem(eqx.Module):
         Of each mode, shape (k,); the moduli sum to one.
     """
 
-    protocols: ShearProtocol
+    protocols: FlowProtocol
     grids: IntegrationGrid
     target: Float[Array, "runs n"]
     modulus: Float[Array, " k"]
@@ -81,7 +81,7 @@ class TrainingProblem(eqx.Module):
 
 
 def make_problem(
-    runs: Sequence[ShearRun],
+    runs: Sequence[Run],
     modulus: Float[np.ndarray, " k"],
     relaxation_time: Float[np.ndarray, " k"],
     strain_step: float = 0.2,
@@ -107,7 +107,7 @@ def make_problem(
         protocols, [run.time for run in runs], strain_step=strain_step, phase_step=phase_step
     )
     n = grids.sample_index.shape[1]
-    target = np.stack([np.pad(run.shear_stress, (0, n - len(run)), mode="edge") for run in runs])
+    target = np.stack([np.pad(run.stress, (0, n - len(run)), mode="edge") for run in runs])
     return TrainingProblem(
         stack_protocols(protocols),
         grids,

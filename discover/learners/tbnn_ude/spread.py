@@ -14,7 +14,7 @@ from jaxtyping import Float
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
-from discover.protocols.shear import ShearProtocol, recorded_at
+from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.solve import SimulationError, simulate
 from tensor_library.integrity_basis import TENSOR_NAMES
 
@@ -57,7 +57,7 @@ class MemberPredictions:
 
 
 def member_predictions(
-    fluids: Sequence[Fluid], protocol: ShearProtocol, times: Float[np.ndarray, " n"]
+    fluids: Sequence[Fluid], protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> MemberPredictions:
     """Return the stresses of every member in a flow from rest.
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
@@ -33,7 +33,7 @@ from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
-from discover.protocols.shear import recorded_at
+from discover.protocols.protocol import recorded_at
 from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
@@ -113,7 +113,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         The best fit of each size, from empty on.
     search_ : SupportSearch
         Every support that was refitted.
-    runs_ : tuple of ShearRun
+    runs_ : tuple of Run
         What was fitted. A file holds neither these nor `search_` and `path_`.
     provenance_ : Provenance
         The same in words, with a hash.
@@ -190,7 +190,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X
-            Runs (`ShearRun`), or a data set.
+            Runs (`Run`), or a data set.
         y
             Ignored: the observations are part of the runs.
 
@@ -320,7 +320,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         )
         return self
 
-    def _predict_runs(self, runs: list[ShearRun]) -> list[Float[np.ndarray, " n"]]:
+    def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
         # the same padded layout as in the fit, so that folds share a compilation
         problem = make_problem(runs, self.library_, strain_step=self.strain_step)

@@ -12,7 +12,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.run_prediction import as_runs
-from discover.protocols.shear import ShearProtocol, stack_protocols
+from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from tensor_library.library import TermLibrary
 
@@ -53,7 +53,7 @@ class TrajectoryProblem(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
-    protocols: ShearProtocol
+    protocols: FlowProtocol
     grids: IntegrationGrid
     target: Float[Array, "runs n 3"]
     weight: Float[Array, "runs n 3"]

@@ -55,7 +55,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
     strain = about_middle(flow.strain, last)[last]
-    closed = {"elastic": (strain, "strain γ"), "viscous": (flow.shear_rate[last], rate_label)}
+    closed = {"elastic": (strain, "strain γ"), "viscous": (flow.rate[last], rate_label)}
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
     with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
@@ -133,7 +133,7 @@ def training_picture(comparison: Comparison) -> Picture:
                         flow.times, prediction["sigma12"], label=learner_title(name), **style
                     )
             panel.set_title(literal(flow.title), fontsize=8)
-            if runs_through_decades(flow.times, flow.shear_rate):
+            if runs_through_decades(flow.times, flow.rate):
                 make_logarithmic(panel.xaxis)
         for panel in axes[-1]:
             panel.set_xlabel(time_label)

@@ -34,7 +34,7 @@ _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the dura
 
 
 def _through_decades(record: RunRecord) -> bool:
-    return runs_through_decades(record.time, record.shear_rate)
+    return runs_through_decades(record.time, record.rate)
 
 
 def _recorded(records: Sequence[RunRecord]) -> str:

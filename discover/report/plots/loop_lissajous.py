@@ -25,7 +25,7 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
         for column, (record, frequency) in enumerate(shown):
             last = in_last_cycle(record.time, frequency)
             strain = about_middle(record.strain, last)
-            for panel, along in ((axes[0, column], strain), (axes[1, column], record.shear_rate)):
+            for panel, along in ((axes[0, column], strain), (axes[1, column], record.rate)):
                 draw_run(panel, record, along, last, last)
                 _frame(panel, record.measured[last])
             axes[0, column].set_title(short_title(record), fontsize=8)

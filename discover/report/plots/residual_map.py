@@ -50,8 +50,8 @@ class ResidualRow:
 
 def loop_residual_map(result: LoopResult) -> Picture:
     """Return the residual of every run before and after, over time or strain."""
-    records = sorted(result.records, key=lambda r: (r.held_out, np.max(np.abs(r.shear_rate))))
-    started = all(runs_through_decades(r.time, r.shear_rate) for r in records)
+    records = sorted(result.records, key=lambda r: (r.held_out, np.max(np.abs(r.rate))))
+    started = all(runs_through_decades(r.time, r.rate) for r in records)
     panels = {}
     for stage, title in ((0, "declared model"), (-1, "augmented model")):
         panels[title] = [
@@ -85,7 +85,7 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
             panels[title] = rows
     if not panels:
         return None
-    logarithmic = all(runs_through_decades(f.times, f.shear_rate) for f in flows)
+    logarithmic = all(runs_through_decades(f.times, f.rate) for f in flows)
     return _draw(panels, units(comparison)[1], logarithmic, "in the order of the data")
 
 

@@ -58,7 +58,7 @@ def high_deborah_picture(comparison: Comparison) -> Picture | None:
             for label, style, stresses in curves(comparison, flow):
                 if "sigma12" in stresses:
                     # the first sample is rest at t = 0, the others one late cycle
-                    panel.plot(flow.shear_rate[1:], stresses["sigma12"][1:], label=label, **style)
+                    panel.plot(flow.rate[1:], stresses["sigma12"][1:], label=label, **style)
             harmonic = third_harmonic(flow.reference["sigma12"][1:])
             deborah = float(np.max(np.asarray(flow.protocol.frequencies)))
             panel.set_title(f"De = {deborah:g}, I₃/I₁ = {100 * harmonic:.2g} %")
@@ -92,7 +92,7 @@ def sweep_picture(comparison: Comparison) -> Picture | None:
             mine = [p for p in points if p.law == law]
             for panel, point in zip(row, mine, strict=False):
                 late = point.flow.times > 0.75 * point.flow.times[-1]
-                rate = point.flow.shear_rate[late]
+                rate = point.flow.rate[late]
                 truth = point.flow.reference["sigma12"][late]
                 panel.plot(rate, truth, label="truth", **TRUTH_STYLE)
                 for name, outcome in point.outcomes.items():

@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from discover.dataset.linear_viscoelasticity import LinearSweep
-from discover.dataset.run import ShearRun
+from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
 from discover.errors import InputError
 from discover.notebook_view import NotebookView
 
 
 @dataclass(frozen=True)
-class ShearDataset(NotebookView):
+class Dataset(NotebookView):
     """Runs on one fluid: a sequence of runs, for Python and for scikit-learn.
 
     ``data["a.csv"]`` and ``data[0]`` are a run; ``data[:3]``, ``data[[0, 2]]`` and
@@ -36,7 +36,7 @@ class ShearDataset(NotebookView):
     """
 
     name: str
-    runs: tuple[ShearRun, ...]
+    runs: tuple[Run, ...]
     linear_sweep: LinearSweep | None = None
     provenance: str = ""
     set_aside: Mapping[str, str] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class ShearDataset(NotebookView):
     def __len__(self) -> int:
         return len(self.runs)
 
-    def __iter__(self) -> Iterator[ShearRun]:
+    def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
 
     def __repr__(self) -> str:
@@ -62,12 +62,12 @@ class ShearDataset(NotebookView):
         return f"<{kind} {self.name!r}: {len(self)} runs, {samples} samples{sweep}>"
 
     @overload
-    def __getitem__(self, which: str | int | np.integer) -> ShearRun: ...
+    def __getitem__(self, which: str | int | np.integer) -> Run: ...
 
     @overload
-    def __getitem__(self, which: slice | Sequence[Any] | np.ndarray) -> "ShearDataset": ...
+    def __getitem__(self, which: slice | Sequence[Any] | np.ndarray) -> "Dataset": ...
 
-    def __getitem__(self, which: Any) -> "ShearRun | ShearDataset":
+    def __getitem__(self, which: Any) -> "Run | Dataset":
         if isinstance(which, str):
             return self._named(which)
         if isinstance(which, slice):
@@ -86,7 +86,7 @@ class ShearDataset(NotebookView):
             f"slice, by names, by numbers, or by {len(self)} booleans; got {which!r}."
         )
 
-    def _named(self, name: str) -> ShearRun:
+    def _named(self, name: str) -> Run:
         for run in self.runs:
             if run.name == name:
                 return run
@@ -99,7 +99,7 @@ class ShearDataset(NotebookView):
             f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
         )
 
-    def _numbered(self, number: int) -> ShearRun:
+    def _numbered(self, number: int) -> Run:
         if not -len(self) <= number < len(self):
             # an IndexError: it ends a loop over the numbers of a sequence
             raise IndexError(
@@ -152,7 +152,7 @@ class ShearDataset(NotebookView):
         yield self.thinned
         yield self.left_out
 
-    def select(self, names: Sequence[str]) -> "ShearDataset":
+    def select(self, names: Sequence[str]) -> "Dataset":
         """Return the data set of the named runs, in the order given.
 
         Raises
@@ -164,7 +164,7 @@ class ShearDataset(NotebookView):
 
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
-    ) -> "tuple[ShearDataset, ShearDataset]":
+    ) -> "tuple[Dataset, Dataset]":
         """Return the runs to fit and those that only judge, as two data sets.
 
         Parameters

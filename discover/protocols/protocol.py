@@ -22,7 +22,7 @@ from discover.protocols.kinematics import (
 from tensor_library.kinematics import VelocityGradient
 
 
-class ShearProtocol(eqx.Module):
+class FlowProtocol(eqx.Module):
     """Rate of deformation as a function of time: a piecewise-linear table plus a sum of cosines.
 
     One class holds every protocol, so that runs of different kinds stack into one batch and
@@ -52,7 +52,7 @@ class ShearProtocol(eqx.Module):
 
     def velocity_gradient(self, time: Float[Array, ""]) -> VelocityGradient:
         """Return L(t) in 1/s: its four components, or the scalar shear rate in simple shear."""
-        rate = self.shear_rate(time)
+        rate = self.rate(time)
         return rate if self.kinematics is None else rate * self.kinematics.gradient
 
     @property
@@ -64,7 +64,7 @@ class ShearProtocol(eqx.Module):
         """Return what a rheometer records of σ11, σ22, σ33, σ12 in this flow."""
         return components[3] if self.kinematics is None else self.kinematics.stress(components)
 
-    def shear_rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
+    def rate(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return γ̇(t) in 1/s, in extension the Hencky rate; at a jump, the value after it."""
         time = jnp.asarray(time)
         table = _interpolate(time, self.table_times, self.table_rates)
@@ -118,9 +118,9 @@ def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
     return array
 
 
-def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> ShearProtocol:
+def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
     table = jnp.asarray(times, float), jnp.asarray(rates, float)
-    return ShearProtocol(
+    return FlowProtocol(
         *table,
         jnp.asarray(amplitudes, float),
         jnp.asarray(frequencies, float),
@@ -128,7 +128,7 @@ def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)
     )
 
 
-def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> ShearProtocol:
+def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> FlowProtocol:
     """Return γ̇(t) = amplitude · cos(frequency · t + phase).
 
     Parameters
@@ -148,13 +148,13 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
     return _protocol([0.0], [0.0], [amplitude], [frequency], [phase])
 
 
-def start_up(rate: float) -> ShearProtocol:
+def start_up(rate: float) -> FlowProtocol:
     """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0."""
     _checked("rate", [rate])
     return _protocol([0.0], [rate])
 
 
-def step_rates(times: Sequence[float], rates: Sequence[float]) -> ShearProtocol:
+def step_rates(times: Sequence[float], rates: Sequence[float]) -> FlowProtocol:
     """Return a shear rate that jumps to ``rates[i]`` at ``times[i]``.
 
     Parameters
@@ -178,7 +178,7 @@ def step_rates(times: Sequence[float], rates: Sequence[float]) -> ShearProtocol:
 
 def measured_rate(
     times: Sequence[float] | np.ndarray, rates: Sequence[float] | np.ndarray
-) -> ShearProtocol:
+) -> FlowProtocol:
     """Return the piecewise-linear shear rate through measured points.
 
     Parameters
@@ -201,7 +201,7 @@ _FEWEST_KNOTS = 4
 _BETWEEN = 4  # points of a smooth rate for each sample of it
 
 
-def smooth_between_samples(protocol: ShearProtocol) -> ShearProtocol | None:
+def smooth_between_samples(protocol: FlowProtocol) -> FlowProtocol | None:
     """Return a protocol whose rate, where it was read in samples, is a smooth curve through them.
 
     Monotonic between samples, and not straight lines   [Fritsch & Carlson 1980, SIAM J. Numer.
@@ -230,7 +230,7 @@ def smooth_between_samples(protocol: ShearProtocol) -> ShearProtocol | None:
     )
 
 
-def in_flow(protocol: ShearProtocol, kind: str) -> ShearProtocol:
+def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     """Return the protocol with its rate in another flow: uniaxial, planar or biaxial extension.
 
     Raises
@@ -242,7 +242,7 @@ def in_flow(protocol: ShearProtocol, kind: str) -> ShearProtocol:
     return replace(protocol, kinematics=None if kind == "shear" else found)
 
 
-def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
+def stack_protocols(protocols: Sequence[FlowProtocol]) -> FlowProtocol:
     """Return one protocol with a leading batch axis, for `jax.vmap`.
 
     Tables are padded by holding their last value, cosines by zero amplitudes. Simple shear keeps
@@ -257,7 +257,7 @@ def stack_protocols(protocols: Sequence[ShearProtocol]) -> ShearProtocol:
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
 
 
-def _padded(protocol: ShearProtocol, entries: int, cosines: int) -> ShearProtocol:
+def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
     # in numpy: every operation of JAX's outside a program is a program of its own to compile
     times, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     rows = entries - times.size
@@ -277,21 +277,21 @@ def _padded(protocol: ShearProtocol, entries: int, cosines: int) -> ShearProtoco
 
 
 def recorded_at(
-    protocol: ShearProtocol, components: Float[np.ndarray, "n 4"]
+    protocol: FlowProtocol, components: Float[np.ndarray, "n 4"]
 ) -> Float[np.ndarray, " n"]:
     """Return what a rheometer records of σ11, σ22, σ33, σ12 at many times, shape (n,)."""
     flow = protocol.kinematics
     return components[:, 3] if flow is None else components @ np.asarray(flow.recorded)
 
 
-def shear_rates(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def shear_rates(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return γ̇ in 1/s at many times in s, shape (n,)."""
-    return _at_many(ShearProtocol.shear_rate, protocol, times)
+    return _at_many(FlowProtocol.rate, protocol, times)
 
 
-def strains(protocol: ShearProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return the strain since t = 0 at many times in s, shape (n,)."""
-    return _at_many(ShearProtocol.strain, protocol, times)
+    return _at_many(FlowProtocol.strain, protocol, times)
 
 
 def _at_many(function, protocol, times):
@@ -304,5 +304,5 @@ def _at_many(function, protocol, times):
 
 
 @compiled
-def _mapped(function, protocol: ShearProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
+def _mapped(function, protocol: FlowProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
     return jax.vmap(lambda time: function(protocol, time))(times)
