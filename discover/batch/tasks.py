@@ -129,7 +129,6 @@ def run_close_loop(
     if there is not None:
         return there
     from discover.closed_loop import run_loop, run_loop_on_each
-    from discover.laws.registry import LAWS
     from discover.report.loop_report import write_loop
     from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, load_study_data
@@ -174,13 +173,26 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {LAWS[model.law_name].described(model.parameters)}, {modes}. "
+        f"Declared model: {_described(model)}, {modes}{_beside(model)}. "
+        f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
     write_loop(result, folder, study.name, summary, study.text)
     ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
     return ended
+
+
+def _described(model) -> str:
+    from discover.laws.registry import LAWS
+
+    named = LAWS.get(model.law_name)
+    return model.law_name if named is None else named.described(model.parameters)
+
+
+def _beside(model) -> str:
+    """Return the effects of the declared model, in words."""
+    return f", beside them {', '.join(e.text for e in model.effects)}" if model.effects else ""
 
 
 def fit_declared(model, dataset):
@@ -234,12 +246,14 @@ def _scaled(modes, values, name, factor):
 def declared_for_loop(model):
     """Return the declared model as the closed loop takes it, with all that is left to be fitted."""
     from discover.closed_loop import DeclaredModel
+    from discover.laws.registry import LAWS
 
     options = {
         "solvent_viscosity": model.solvent_viscosity,
         "linear_error": 0.0 if model.spectrum is None else model.spectrum.relative_error,
+        "effects": model.effects,
     }
-    if not model.law.linear_relaxation:
+    if not model.law.linear_relaxation or model.law_name not in LAWS:
         return DeclaredModel(
             model.law,
             model.modulus,

@@ -1,6 +1,7 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,7 @@ def write_loop(
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
+        declared_effects=_declared_effects(result),
         rankings=[_ranking(ranking) for ranking in result.rankings],
         folds=[_fold(fold) for fold in result.folds],
         law=_law(result),
@@ -216,6 +218,14 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "check": stage.check,
         "error": stage.error,
     }
+
+
+def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:
+    return [
+        {"effect": effect_title(one.effect), "name": name, **asdict(parameter)}
+        for one in result.declared_effects
+        for name, parameter in one.parameters.items()
+    ]
 
 
 def _law(result: LoopResult) -> str:
