@@ -72,8 +72,8 @@ def record_runs(
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]
-        size = np.sqrt(np.mean(run.stress**2))
-        misfit = np.sqrt(np.mean((predicted - run.stress) ** 2, axis=1))
+        size = np.sqrt(np.mean(run.recorded**2))
+        misfit = np.sqrt(np.mean((predicted - run.recorded) ** 2, axis=1))
         records.append(
             RunRecord(
                 name=run.name,
@@ -82,11 +82,12 @@ def record_runs(
                 strain=strain_of(run),
                 instrument_time=run.time / run.clock_factor,
                 rate=run.rate,
-                measured=run.stress,
+                measured=run.recorded,
                 predicted=predicted,
                 errors=misfit / (size if size > 0 else 1.0),
                 conditions=_conditions(run, order),
                 flow=run.flow,
+                quantity=run.quantity,
             )
         )
     return records

@@ -272,7 +272,7 @@ def _split(dataset, fit, held_out, strain, most):
 def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
     """Give the runs without the samples that stand alone in them, whose times are noted."""
     for run in runs:
-        off = isolated(run.stress)
+        off = isolated(run.recorded)
         if np.any(off):
             spikes[run.name] = [float(t) for t in run.time[off]]
         yield run.window(~off) if np.any(off) else run
@@ -292,8 +292,8 @@ def _with_later_ones(
 
 def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
-    size = float(np.sqrt(np.mean(run.stress**2)))
-    noise = fast_part(run.stress) / size if size > 0.0 else 0.0
+    size = float(np.sqrt(np.mean(run.recorded**2)))
+    noise = fast_part(run.recorded) / size if size > 0.0 else 0.0
     return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
 
 

@@ -35,9 +35,9 @@ class NumericalResolution:
 
     def __init__(self, model: AugmentedModel, batch: RunBatch, runs: Sequence[Run]):
         self.model, self.batch, self.runs = model, batch, runs
-        sizes = [float(np.sqrt(np.mean(run.stress**2))) or 1.0 for run in runs]
+        sizes = [float(np.sqrt(np.mean(run.recorded**2))) or 1.0 for run in runs]
         self.rounding = np.array(
-            [rounding(run.stress) / size for run, size in zip(runs, sizes, strict=True)]
+            [rounding(run.recorded) / size for run, size in zip(runs, sizes, strict=True)]
         )
         self._known: dict[bytes, np.ndarray] = {}
 

@@ -32,6 +32,8 @@ class RunRecord:
         order of the runs.
     flow
         Which flow it is.
+    quantity
+        What is recorded: ``sigma12``, ``tensile_stress``, ``N1`` or ``N2`` in Pa.
     """
 
     name: str
@@ -45,6 +47,7 @@ class RunRecord:
     errors: Float[np.ndarray, " stages"]
     conditions: dict[str, float] = field(default_factory=dict)
     flow: FlowKind = "shear"
+    quantity: str = "sigma12"
 
     def line(self) -> dict[str, Any]:
         """Return the run as one line of a table: its errors, the declared model's first."""

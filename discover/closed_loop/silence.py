@@ -22,7 +22,7 @@ samples are independent, and the test alone would not see a fluid that halves th
 
 def records_are_silent(runs: Sequence[Run]) -> bool:
     """Return whether records are noise about a constant, whatever rate was imposed."""
-    return not holds_signal([run.stress for run in runs], [run.rate for run in runs])
+    return not holds_signal([run.recorded for run in runs], [run.rate for run in runs])
 
 
 def fluid_is_silent(

@@ -10,7 +10,6 @@ from scipy.integrate import cumulative_simpson
 
 from discover.dataset.run import Run
 from discover.laws.multimode import Fluid
-from discover.protocols.kinematics import recorded_name
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
 from discover.protocols.protocol import FlowProtocol, oscillatory_shear, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
@@ -74,9 +73,12 @@ class Flow:
         return self.name if self.kind == "test" else f"{self.kind}/{self.name}"
 
     @property
-    def in_shear(self) -> bool:
-        """Whether it is simple shear; else what is recorded is the tensile stress."""
-        return self.protocol.kinematics is None
+    def records_shear_stress(self) -> bool:
+        """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
+
+        Else it is the tensile stress, or a normal stress difference that is data of its own.
+        """
+        return self.protocol.quantity == "sigma12"
 
     @property
     def frequency(self) -> float | None:
@@ -106,7 +108,7 @@ class Flow:
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
         if not np.any(amplitudes) and rates.size == 1:
-            if not self.in_shear:
+            if self.protocol.flow != "shear":
                 return f"{self.protocol.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name
@@ -167,7 +169,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference = stresses(exact[run.name], run.protocol)
     else:
         candidates = {
-            "sigma12": run.stress,  # in extension the tensile stress
+            "sigma12": run.recorded,  # in extension the tensile stress, say
             "N1": run.first_normal_stress_difference,
             "N2": run.second_normal_stress_difference,
         }
@@ -179,7 +181,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         run.time,
         run.rate,
         reference,
-        run.stress if kind == "training" else None,
+        run.recorded if kind == "training" else None,
         is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" else None,
         oscillatory=_oscillates(run.protocol, run.rate),
@@ -248,6 +250,6 @@ def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[st
 
 def of_recorded(errors: Mapping[str, float | None], flow: Flow) -> dict[str, float | None]:
     """Return errors under the names of what is recorded: the tensile stress in extension."""
-    if flow.in_shear:
+    if flow.records_shear_stress:
         return dict(errors)
-    return {recorded_name(flow.protocol.flow): errors["sigma12"]}
+    return {flow.protocol.quantity: errors["sigma12"]}

@@ -33,7 +33,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
 from discover.learners.result import LearnerResult
-from discover.protocols.kinematics import recorded_quantity
+from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
 from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
 from discover.study.run_folder import RunFolder
@@ -303,7 +303,7 @@ def _require_one_split(data: StudyData) -> None:
 
 def _summary(data: StudyData, study: Study) -> str:
     samples = sum(len(run) for run in data.fit)
-    recorded = recorded_quantity(run.flow for run in data.fit)
+    recorded = in_words(run.quantity for run in data.fit)
     runs = f"{recorded} of {len(data.fit)} runs ({samples} samples)"
     made = study.data.synthetic
     if made is None:

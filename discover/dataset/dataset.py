@@ -162,6 +162,18 @@ class Dataset(NotebookView):
         """
         return replace(self, runs=tuple(self._named(name) for name in names))
 
+    def quantity_by_quantity(self) -> "Dataset":
+        """Return the data with N1 and N2, where recorded, as records of their own beside σ12.
+
+        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run.
+        """
+        runs = [
+            seen
+            for run in self.runs
+            for seen in (run, *(run.observing(name) for name in run.beside))
+        ]
+        return replace(self, runs=tuple(runs))
+
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
     ) -> "tuple[Dataset, Dataset]":

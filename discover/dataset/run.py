@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.protocols.history import after_steady_flow
-from discover.protocols.kinematics import FlowKind
-from discover.protocols.protocol import FlowProtocol
+from discover.protocols.kinematics import FlowKind, RecordedQuantity
+from discover.protocols.protocol import FlowProtocol, recording
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
@@ -136,6 +136,56 @@ class Run:
         """Return the samples, one line each, in the columns of a data folder's files."""
         columns = {name: values for name, values in self._recorded().items() if values is not None}
         return pd.DataFrame(columns)
+
+    @property
+    def quantity(self) -> RecordedQuantity:
+        """What of the record is fitted or judged, as studies and results spell it."""
+        return self.protocol.quantity
+
+    @property
+    def recorded(self) -> Float[np.ndarray, " n"]:
+        """The values of that quantity, in Pa, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If it was not recorded.
+        """
+        values = {
+            "N1": self.first_normal_stress_difference,
+            "N2": self.second_normal_stress_difference,
+        }.get(self.quantity, self.stress)
+        if values is None:
+            raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
+        return values
+
+    def observing(self, quantity: RecordedQuantity) -> "Run":
+        """Return the same run with N1 or N2 as what is fitted or judged, under a name of its own.
+
+        Raises
+        ------
+        InputError
+            If it was not recorded.
+        """
+        seen = replace(
+            self, name=f"{self.name} ({quantity})", protocol=recording(self.protocol, quantity)
+        )
+        _ = seen.recorded  # says what is missing
+        return seen
+
+    @property
+    def beside(self) -> tuple[RecordedQuantity, ...]:
+        """What was recorded beside σ12: N1, N2, both or neither."""
+        both: tuple[RecordedQuantity, ...] = ("N1", "N2")
+        columns = (self.first_normal_stress_difference, self.second_normal_stress_difference)
+        if self.quantity != "sigma12":
+            return ()
+        return tuple(q for q, values in zip(both, columns, strict=True) if values is not None)
+
+    @property
+    def source(self) -> str:
+        """Name of the run whose record it is."""
+        return self.name.removesuffix(f" ({self.quantity})")
 
     @property
     def flow(self) -> FlowKind:

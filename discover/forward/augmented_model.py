@@ -115,18 +115,18 @@ class _Program:
         rate = run.commanded_rate
         for effect in self._upstream:
             changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
-            rate = _in_shear(flow, changed, rate)
+            rate = _where_in_shear(flow, changed, rate)
         tool_rate = rate[::2]
         for effect in self._downstream:
             changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
-            rate = _in_shear(flow, changed, rate)
+            rate = _where_in_shear(flow, changed, rate)
         times = run.times[::2]
         stress, felt = self._integrate(numbers, used, theta, times, rate, flow)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
             changed = effect.recorded_stress(self._values(theta, effect), record)
-            stress = _in_shear(flow, changed, stress)
+            stress = changed if flow is None else jnp.where(flow.records_torque, changed, stress)
         return stress[run.sample_index]
 
     def _beside(self, numbers, theta, rate, flow: Kinematics | None):
@@ -200,8 +200,8 @@ class _Program:
             pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
             slip, compliance = (sum(column) for column in zip(*pairs, strict=True))
             viscosity = self._beside(numbers, theta, jnp.ones(1), flow)[0]
-            none = jnp.zeros(())
-            slip, compliance = (_in_shear(flow, jnp.asarray(s), none) for s in (slip, compliance))
+            both = jnp.stack([jnp.asarray(slip), jnp.asarray(compliance)])
+            slip, compliance = _where_in_shear(flow, both, jnp.zeros(2))
             series = Series(slip, compliance, viscosity)
         return integrate(
             modes_rate,
@@ -216,12 +216,13 @@ class _Program:
         )
 
 
-def _in_shear(flow: Kinematics | None, changed, unchanged):
-    """Return what a rheometer's effect changes: runs in shear alone.
+def _where_in_shear(flow: Kinematics | None, changed, unchanged):
+    """Return what a rotational rheometer's drive changes: runs in shear alone.
 
-    An extension is made on another instrument, with flaws of its own.
+    An extension is made on another instrument, with flaws of its own. What distorts the signal of
+    the torque changes neither that nor the normal force.
     """
-    return changed if flow is None else jnp.where(flow.recorded[3] == 1.0, changed, unchanged)
+    return changed if flow is None else jnp.where(flow.is_shear, changed, unchanged)
 
 
 _program = lru_cache(maxsize=16)(_Program)

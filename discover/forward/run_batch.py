@@ -89,7 +89,7 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> RunBatch:
         # that the slope of the rate at the last sample is the flow's own
         rate[half > grid[-1] + 1.01 * spacing] = 0.0
         n = len(run)
-        size = np.sqrt(np.mean(run.stress**2))
+        size = np.sqrt(np.mean(run.recorded**2))
         scale = 1.0 / ((size if size > 0 else 1.0) * np.sqrt(n))
         pad = (0, n_samples - n)
         rows.append(
@@ -98,7 +98,7 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> RunBatch:
                 rate,
                 np.pad(index, pad, mode="edge"),
                 np.pad(np.full(n, scale), pad),
-                np.pad(run.stress, pad),
+                np.pad(run.recorded, pad),
                 run.clock_factor,
                 run.strain_before,
             )

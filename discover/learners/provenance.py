@@ -59,6 +59,6 @@ def fingerprint_of(runs: Sequence[Run]) -> str:
     digest = hashlib.sha256()
     for run in sorted(runs, key=lambda run: run.name):
         digest.update(f"{run.name}|{len(run)}|".encode())
-        for values in (run.time, run.rate, run.stress):
+        for values in (run.time, run.rate, run.recorded):
             digest.update(np.ascontiguousarray(values, dtype=float).tobytes())
     return digest.hexdigest()[:16]

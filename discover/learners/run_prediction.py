@@ -144,7 +144,7 @@ class RunPrediction:
         del y, sample_weight
         runs = as_runs(X)
         errors = [
-            np.sqrt(np.mean((p - run.stress) ** 2) / np.mean(run.stress**2))
+            np.sqrt(np.mean((p - run.recorded) ** 2) / np.mean(run.recorded**2))
             for p, run in zip(self._predict_runs(runs), runs, strict=True)
         ]
         error = float(np.mean(errors))

@@ -11,11 +11,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
+
+RecordedQuantity = Literal["sigma12", "tensile_stress", "N1", "N2"]
 
 KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
 """Flows by name; the first is the default everywhere."""
@@ -28,7 +30,22 @@ _GRADIENT = {
     "planar": (1.0, -1.0, 0.0, 0.0),
     "biaxial": (1.0, -2.0, 1.0, 0.0),
 }
-_TENSION = (1.0, -1.0, 0.0, 0.0)
+# weights of σ11, σ22, σ33, σ12
+_RECORDED: dict[RecordedQuantity, tuple[float, ...]] = {
+    "sigma12": (0.0, 0.0, 0.0, 1.0),
+    "tensile_stress": (1.0, -1.0, 0.0, 0.0),
+    "N1": (1.0, -1.0, 0.0, 0.0),
+    "N2": (0.0, 1.0, -1.0, 0.0),
+}
+
+
+_IN_WORDS = {
+    "sigma12": "σ12",
+    "N1": "N1",
+    "N2": "N2",
+    "tensile_stress": "tensile stress",
+    "strain": "strain",
+}
 
 
 class Kinematics(eqx.Module):
@@ -39,7 +56,8 @@ class Kinematics(eqx.Module):
     gradient
         L11, L22, L33, L12 at unit rate.
     recorded
-        Weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, σ11 − σ22 in extension.
+        Weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, or one of its normal
+        stress differences; σ11 − σ22 in extension.
     intensity
         √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in uniaxial
         extension.
@@ -57,6 +75,16 @@ class Kinematics(eqx.Module):
         """Return the recorded stress of σ11, σ22, σ33, σ12."""
         return jnp.tensordot(self.recorded, components, axes=1)
 
+    @property
+    def is_shear(self) -> Bool[Array, "*batch"]:
+        """Whether it is simple shear, made by a rotational rheometer."""
+        return self.gradient[..., 3] == 1.0
+
+    @property
+    def records_torque(self) -> Bool[Array, "*batch"]:
+        """Whether the torque is what is recorded: σ12 in shear."""
+        return self.recorded[..., 3] == 1.0
+
     def equivalent_shear_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return the stress whose work at the shear rate of equal intensity is that of the flow."""
         return jnp.tensordot(self.gradient, components, axes=1) / self.intensity
@@ -70,8 +98,15 @@ def kind_of(kinematics: Kinematics | None) -> FlowKind:
     return next(kind for kind in KINDS if np.array_equal(_GRADIENT[kind], gradient))
 
 
-def kinematics_of(kind: str) -> Kinematics:
+def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinematics:
     """Return the kinematics of a flow by its name.
+
+    Parameters
+    ----------
+    kind
+        Of `KINDS`.
+    quantity
+        What is recorded; by default σ12 in shear and the tensile stress in extension.
 
     Raises
     ------
@@ -82,16 +117,27 @@ def kinematics_of(kind: str) -> Kinematics:
         raise InputError(f"Unknown flow {kind!r}; the flows are {', '.join(KINDS)}.")
     gradient = np.array(_GRADIENT[kind])
     rate = gradient * np.array([2.0, 2.0, 2.0, 1.0])  # γ̇ = L + Lᵀ
-    recorded = np.array(_GRADIENT["shear"] if kind == "shear" else _TENSION)
+    recorded = np.array(_RECORDED[quantity or recorded_name(kind)])
     intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
     return Kinematics(
         *(jnp.asarray(part) for part in (gradient, recorded, intensity, recorded @ rate))
     )
 
 
-def recorded_name(kind: str) -> Literal["sigma12", "tensile_stress"]:
-    """Return what is recorded in a flow, as studies and results spell it."""
+def recorded_name(kind: str) -> RecordedQuantity:
+    """Return what is recorded in a flow by default: σ12, or the tensile stress."""
     return "sigma12" if kind == "shear" else "tensile_stress"
+
+
+def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:
+    """Return what is recorded, as studies and results spell it."""
+    if kinematics is None:
+        return "sigma12"
+    if kind_of(kinematics) != "shear":
+        return "tensile_stress"
+    recorded = np.asarray(kinematics.recorded)
+    names: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
+    return next(name for name in names if np.array_equal(_RECORDED[name], recorded))
 
 
 def of_one_kind(each: Sequence[Kinematics | None]) -> list[Kinematics] | list[None]:
@@ -107,9 +153,8 @@ def stack_kinematics(each: Sequence[Kinematics | None]) -> Kinematics | None:
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *of_one_kind(each))
 
 
-def recorded_quantity(kinds: Iterable[str]) -> str:
-    """Return in words what is recorded in flows of these kinds."""
-    shear = {kind == "shear" for kind in kinds}
-    return " and ".join(
-        name for name, here in (("σ12", True in shear), ("tensile stress", False in shear)) if here
-    )
+def in_words(quantities: Iterable[str]) -> str:
+    """Return in words what is recorded, of several quantities."""
+    found = set(quantities)
+    names = [words for quantity, words in _IN_WORDS.items() if quantity in found]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

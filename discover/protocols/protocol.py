@@ -15,9 +15,11 @@ from discover.programs import compiled
 from discover.protocols.kinematics import (
     FlowKind,
     Kinematics,
+    RecordedQuantity,
     kind_of,
     kinematics_of,
     of_one_kind,
+    quantity_of,
 )
 from tensor_library.kinematics import VelocityGradient
 
@@ -59,6 +61,11 @@ class FlowProtocol(eqx.Module):
     def flow(self) -> FlowKind:
         """Name of the flow."""
         return kind_of(self.kinematics)
+
+    @property
+    def quantity(self) -> RecordedQuantity:
+        """What is recorded, as studies and results spell it."""
+        return quantity_of(self.kinematics)
 
     def recorded_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return what a rheometer records of σ11, σ22, σ33, σ12 in this flow."""
@@ -240,6 +247,11 @@ def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     """
     found = kinematics_of(kind)
     return replace(protocol, kinematics=None if kind == "shear" else found)
+
+
+def recording(protocol: FlowProtocol, quantity: RecordedQuantity) -> FlowProtocol:
+    """Return the same flow with another stress of it recorded: N1 or N2 in shear."""
+    return replace(protocol, kinematics=kinematics_of(protocol.flow, quantity))
 
 
 def stack_protocols(protocols: Sequence[FlowProtocol]) -> FlowProtocol:

@@ -7,9 +7,9 @@ from typing import Any
 from discover.equations.mathml import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
-from discover.report.wording import RULES, effect_title
+from discover.report.wording import FIGURE_SYMBOLS, RULES, effect_title
 
-_SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
+_COMPARED = ("sigma12", "N1", "N2")
 
 
 def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
@@ -31,7 +31,7 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
         failed=[study for study in studies if study.status == "failed"],
         waiting=sum(study.status == "waiting" for study in studies),
         learners=[learner_title(name) for name in learners],
-        symbols=list(_SYMBOLS.values()),
+        symbols=[FIGURE_SYMBOLS[quantity] for quantity in _COMPARED],
         comparisons=[
             {
                 "study": study,
@@ -77,7 +77,7 @@ def _cells(row: Any, learners: Sequence[str]) -> list[dict[str, Any]]:
             {
                 "law": "–" if found is None else _law(terms),
                 "size": len(terms),
-                "errors": [errors.get(quantity) for quantity in _SYMBOLS],
+                "errors": [errors.get(quantity) for quantity in _COMPARED],
             }
         )
     return cells

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
-from discover.protocols.kinematics import recorded_quantity
+from discover.protocols.kinematics import in_words
 from discover.report import comparison_tables as tables
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
@@ -125,8 +125,8 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         return {
             "columns": titles,
             "error_rows": tables.error_rows(comparison),
-            "recorded": recorded_quantity(f.protocol.flow for f in comparison.flows_of("training")),
-            "extension": not all(flow.in_shear for flow in flows),
+            "recorded": in_words(f.protocol.quantity for f in comparison.flows_of("training")),
+            "extension": not all(flow.records_shear_stress for flow in flows),
         }
 
     def classical() -> Content | None:

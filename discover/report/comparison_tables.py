@@ -12,9 +12,9 @@ from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
-from discover.report.plots.flows import SYMBOLS
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
+    FIGURE_SYMBOLS,
     RULES,
     interval,
     known,
@@ -247,7 +247,7 @@ def proposals(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {
             "title": proposal.experiment.title,
-            "observed": ", ".join(SYMBOLS[name] for name in proposal.observed),
+            "observed": ", ".join(FIGURE_SYMBOLS[name] for name in proposal.observed),
             "falling": f"{len(proposal.falling)} of {len(following.laws) - 1}",
             "weakest": min(filter(known, proposal.evidence.values()), default=None),
         }
@@ -328,7 +328,7 @@ def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
         "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
         "reason": rival.reason,
         "errors": rival.errors_to_chosen,
-        "separated": f"{SYMBOLS.get(place['quantity'], place['quantity'])} in "
+        "separated": f"{FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
         f"{titles.get(place['protocol'], place['protocol'])}"
         if place
         else "nothing that was tried",

@@ -156,7 +156,8 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
         runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
         errors = {flow.name: comparison.errors(name, flow) for flow in flows}
-        recorded = "σ12" if all(flow.in_shear for flow in flows) else "the recorded stress"
+        shear = all(flow.records_shear_stress for flow in flows)
+        recorded = "σ12" if shear else "the recorded stress"
         said = [
             f"{symbol} by {percent(value)}"
             for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))

@@ -9,7 +9,6 @@ import pandas as pd
 from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
-from discover.protocols.kinematics import recorded_name
 from discover.study.run_folder import RunFolder
 
 COLUMNS = (
@@ -56,7 +55,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
             if predicted is None:
                 continue
             limits = _limits(comparison, who, flow)
-            for quantity in QUANTITIES if flow.in_shear else QUANTITIES[:1]:
+            for quantity in QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]:
                 low, high = limits.get(quantity, (np.nan, np.nan))
                 parts.append(
                     _lines(
@@ -65,7 +64,7 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
                         time_s=flow.times,
                         strain=flow.strain,
                         rate_1_s=flow.rate,
-                        quantity=quantity if flow.in_shear else recorded_name(flow.protocol.flow),
+                        quantity=quantity if flow.records_shear_stress else flow.protocol.quantity,
                         source=_SOURCES.get(who, who),
                         value=predicted[quantity],
                         low95=low,
@@ -101,7 +100,7 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
             time_s=record.time,
             strain=record.strain,
             rate_1_s=record.rate,
-            quantity=recorded_name(record.flow),
+            quantity=record.quantity,
             source=source,
             value=predicted,
             low95=np.nan,

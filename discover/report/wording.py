@@ -9,16 +9,20 @@ from discover.learners.registry import learner_title
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
-TENSILE = "σ₁₁ − σ₂₂"
-"""Symbol of the tensile stress."""
+FIGURE_SYMBOLS = {
+    "sigma12": "σ₁₂",
+    "N1": "N₁",
+    "N2": "N₂",
+    "tensile_stress": "σ₁₁ − σ₂₂",
+    "strain": "γ",
+}
+"""Symbols of what is recorded, as figures write them."""
 
 
-def recorded_symbol(flows: Iterable[str]) -> str:
-    """Return the symbol of the stress that is recorded in these flows."""
-    kinds = {flow == "shear" for flow in flows}
-    if len(kinds) > 1:
-        return "stress"
-    return TENSILE if kinds == {False} else "σ₁₂"
+def recorded_symbol(quantities: Iterable[str]) -> str:
+    """Return the symbol of what is recorded, or ``stress`` for several kinds of it."""
+    found = set(quantities)
+    return FIGURE_SYMBOLS[found.pop()] if len(found) == 1 else "stress"
 
 
 _LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}

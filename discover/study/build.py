@@ -15,7 +15,6 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
-from discover.protocols.kinematics import recorded_name
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Study
@@ -134,7 +133,10 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out
-    named, fit_names = _by_observation(dataset, data.observe, named, data.fit)
+    if data.observe is not None:
+        dataset, named, fit_names = _observed(dataset, data.observe, named, data.fit)
+    else:
+        fit_names = tuple(data.fit or (name for name in dataset.names if name not in named))
     held_out = dataset.select(named)
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
@@ -148,26 +150,48 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     return StudyData(dataset, fit, held_out, each)
 
 
-def _by_observation(
+def _observed(
     dataset: Dataset,
-    observe: Sequence[str] | None,
+    observe: Sequence[str],
     held_out: Sequence[str],
     fit: Sequence[str] | None,
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the runs held out and those fitted; what is recorded and not observed only judges."""
-    judges = [
-        run.name
-        for run in dataset
-        if observe is not None and recorded_name(run.flow) not in observe
-    ]
-    both = [name for name in judges if name in (fit or ())]
-    if both:
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
+    """Return the data with every quantity as a record, those held out, and those fitted.
+
+    What is recorded and not observed only judges.
+    """
+    dataset.select([*held_out, *(fit or ())])  # names that do not exist are refused
+    whole = dataset.quantity_by_quantity()
+    missing = set(observe) - {run.quantity for run in whole}
+    if missing:
         raise InputError(
-            f"[data] fit names {both[0]!r}, whose stress is not in observe = "
-            f"{list(observe or ())}. Leave the run out of fit, or add its stress to observe."
+            f"[data] observe names {sorted(missing)[0]}, which no run of {dataset.name!r} has. "
+            f"Write some of {', '.join(sorted({run.quantity for run in whole}))}."
         )
-    held_out = (*held_out, *(name for name in judges if name not in held_out))
-    return held_out, tuple(fit or (name for name in dataset.names if name not in held_out))
+    wanted = dataset.names if fit is None else fit
+    by_name = {run.name: [] for run in dataset}
+    for run in whole:
+        by_name[run.source].append(run)
+    for name in fit or ():
+        if not any(run.quantity in observe for run in by_name[name]):
+            raise InputError(
+                f"[data] fit names {name!r}, which recorded nothing that is in observe = "
+                f"{list(observe)}. Leave the run out of fit, or add what it recorded to observe."
+            )
+    fitted = [
+        run.name
+        for name in wanted
+        if name not in held_out
+        for run in by_name[name]
+        if run.quantity in observe
+    ]
+    judging = [
+        run.name
+        for name in (*held_out, *(name for name in wanted if name not in held_out))
+        for run in by_name[name]
+        if run.name not in fitted
+    ]
+    return whole, tuple(judging), tuple(fitted)
 
 
 def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:

@@ -76,7 +76,7 @@ class Data(Section):
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
     rate_before: str | None = None
-    observe: tuple[Literal["sigma12", "tensile_stress"], ...] | None = None
+    observe: tuple[Literal["sigma12", "tensile_stress", "N1", "N2"], ...] | None = None
     sequence: str | None = None
 
     @model_validator(mode="after")

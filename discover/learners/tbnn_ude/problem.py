@@ -107,7 +107,7 @@ def make_problem(
         protocols, [run.time for run in runs], strain_step=strain_step, phase_step=phase_step
     )
     n = grids.sample_index.shape[1]
-    target = np.stack([np.pad(run.stress, (0, n - len(run)), mode="edge") for run in runs])
+    target = np.stack([np.pad(run.recorded, (0, n - len(run)), mode="edge") for run in runs])
     return TrainingProblem(
         stack_protocols(protocols),
         grids,

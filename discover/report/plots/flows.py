@@ -22,9 +22,8 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import TENSILE, recorded_symbol
+from discover.report.wording import FIGURE_SYMBOLS, recorded_symbol
 
-SYMBOLS = {"sigma12": "σ₁₂", "N1": "N₁", "N2": "N₂"}
 START_UP_SHOWN = 10.0
 
 
@@ -69,7 +68,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel in row[1:]:
                 _frame(panel, comparison, flow, quantity, last)
-            row[0].set_ylabel(SYMBOLS[quantity] + stress_unit)
+            row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
         axes[0, 0].set_title(literal(flow.title))
         for column, (kind, (_, label)) in enumerate(closed.items(), 1):
@@ -91,7 +90,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
 def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
     stress_unit, time_label, _ = units(comparison)
-    quantities = QUANTITIES if flow.in_shear else QUANTITIES[:1]
+    quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
     with figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
         if not flow.is_truth:
@@ -102,7 +101,8 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
                     panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
             _frame(panel, comparison, flow, quantity, shown)
-            panel.set_ylabel((SYMBOLS[quantity] if flow.in_shear else TENSILE) + stress_unit)
+            drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
+            panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
             panel.set_xlabel(time_label)
         legend_above(drawing, axes)
         return picture(
@@ -116,7 +116,7 @@ def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
     stress_unit, time_label, _ = units(comparison)
-    recorded = recorded_symbol(flow.protocol.flow for flow in flows)
+    recorded = recorded_symbol(flow.protocol.quantity for flow in flows)
     columns = min(4, len(flows))
     rows = -(-len(flows) // columns)
     with figure(rows, columns, height=1.8) as (drawing, axes):

@@ -23,7 +23,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import TENSILE, effect_title, percent, recorded_symbol
+from discover.report.wording import FIGURE_SYMBOLS, effect_title, percent, recorded_symbol
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
@@ -38,11 +38,16 @@ def _through_decades(record: RunRecord) -> bool:
 
 
 def _recorded(records: Sequence[RunRecord]) -> str:
-    return recorded_symbol(record.flow for record in records)
+    return recorded_symbol(record.quantity for record in records)
 
 
 def _what_is_drawn(records: Sequence[RunRecord]) -> str:
-    return f" Stress is σ₁₂ in shear, {TENSILE} in extension." * (_recorded(records) == "stress")
+    found = {record.quantity for record in records}
+    kinds = {quantity: FIGURE_SYMBOLS[quantity] for quantity in FIGURE_SYMBOLS if quantity in found}
+    tension = kinds.pop("tensile_stress", "")
+    told = [f"{' or '.join(kinds.values())} in shear"] * bool(kinds)
+    told += [f"{tension} in extension"] * bool(tension)
+    return f" Stress is {', '.join(told)}." * (len(found) > 1)
 
 
 def runs_picture(result: LoopResult) -> Picture:

@@ -2,7 +2,7 @@
 
 from discover.comparison.comparison import Comparison
 from discover.identify.experiments import OBSERVED
-from discover.report.plots.flows import SYMBOLS, units
+from discover.report.plots.flows import units
 from discover.report.plots.style import (
     BEFORE,
     GREEN,
@@ -15,7 +15,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import readable
+from discover.report.wording import FIGURE_SYMBOLS, readable
 
 _COLOURS = (NETWORK, GREEN, PURPLE, YELLOW, BEFORE)
 _DASHES = ("--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
@@ -51,7 +51,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
             low, high = best.curves[0, :, column].min(), best.curves[0, :, column].max()
             margin = 0.6 * (high - low) or 0.5
             panel.set_ylim(low - margin, high + margin)
-            panel.set_ylabel(SYMBOLS[quantity] + stress_unit)
+            panel.set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
             panel.set_xlabel(time_label)
         legend_above(drawing, axes, columns=2)
         return picture(

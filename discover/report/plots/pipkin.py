@@ -12,7 +12,6 @@ from discover.comparison.flows import QUANTITIES
 from discover.comparison.identifiability import EXACT
 from discover.comparison.next_measurement import IdentifiabilityCell
 from discover.learners.registry import learner_title
-from discover.report.plots.flows import SYMBOLS
 from discover.report.plots.style import (
     GREEN,
     INK,
@@ -24,7 +23,7 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import percent
+from discover.report.wording import FIGURE_SYMBOLS, percent
 
 _STRONGEST = 0.55  # more would drown the number in the cell
 _LOWEST, _HIGHEST = 1e-4, 1.0
@@ -44,7 +43,7 @@ def error_map_picture(comparison: Comparison) -> Picture | None:
             for panel, quantity in zip(row, QUANTITIES, strict=True):
                 cells = {place: errors[quantity] for place, errors in table.items()}
                 _draw_cells(panel, cells, NETWORK)
-                panel.set_title(f"{SYMBOLS[quantity]}, {title}")
+                panel.set_title(f"{FIGURE_SYMBOLS[quantity]}, {title}")
                 _mark_training(panel, comparison, cells)
         _label(axes)
         legend_above(drawing, axes)
@@ -75,7 +74,7 @@ def identifiability_picture(comparison: Comparison) -> Picture | None:
                     color=GREEN, label="measuring it here is expected to rule out every rival",
                 )  # fmt: skip
             also = "" if quantity == "sigma12" else " measured besides σ₁₂"
-            panel.set_title(f"{SYMBOLS[quantity]}{also}")
+            panel.set_title(f"{FIGURE_SYMBOLS[quantity]}{also}")
             if comparison.noise is not None:  # otherwise runs have no Wi in these units
                 _mark_training(panel, comparison, differences(mine, quantity))
         _label(axes)
