@@ -131,12 +131,12 @@ def run_close_loop(
     from discover.closed_loop import run_loop, run_loop_on_each
     from discover.report.loop_report import write_loop
     from discover.report.verdicts import loop_verdict
-    from discover.study.build import declared_model, load_study_data
+    from discover.study.build import declared_model, forward_model, load_study_data
 
     progress("loading data", 0.0)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
-    declared = declared_for_loop(model)
+    declared = forward_model(model)
     stages = study.loop.max_effects + 1
     each = data_of_study.each
     if each:
@@ -218,9 +218,10 @@ def fit_declared(model, dataset):
         return model
     from discover.closed_loop import run_loop
     from discover.laws import make_law
+    from discover.study.build import forward_model
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name
-    fitted = run_loop(dataset, declared_for_loop(model), effects=["stress_offset"], max_effects=0)
+    fitted = run_loop(dataset, forward_model(model), effects=["stress_offset"], max_effects=0)
     values: dict[str, float] = {
         name: entry.value for name, entry in fitted.declared_parameters.items()
     }
@@ -241,32 +242,3 @@ def fit_declared(model, dataset):
 def _scaled(modes, values, name, factor):
     """Return a constant of the modes as fitted: itself for one mode, a factor on several."""
     return np.array([values[name]]) if name in values else modes * values.get(factor, 1.0)
-
-
-def declared_for_loop(model):
-    """Return the declared model as the closed loop takes it, with all that is left to be fitted."""
-    from discover.closed_loop import DeclaredModel
-    from discover.laws.registry import LAWS
-
-    options = {
-        "solvent_viscosity": model.solvent_viscosity,
-        "linear_error": 0.0 if model.spectrum is None else model.spectrum.relative_error,
-        "effects": model.effects,
-    }
-    if not model.law.linear_relaxation or model.law_name not in LAWS:
-        return DeclaredModel(
-            model.law,
-            model.modulus,
-            model.relaxation_time,
-            fit_modulus="modulus_Pa" in model.free,
-            fit_relaxation_time="relaxation_time_s" in model.free,
-            **options,
-        )
-    return DeclaredModel.named(
-        model.law_name,
-        model.parameters,
-        model.modulus,
-        model.relaxation_time,
-        free=model.free,
-        **options,
-    )

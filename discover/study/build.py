@@ -11,6 +11,7 @@ from discover.dataset.load import load_dataset
 from discover.dataset.run import SLOWEST_RATE, require_signal
 from discover.effects import KnownEffect, known_effects
 from discover.errors import InputError
+from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
@@ -250,6 +251,27 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         spectrum,
         model.solvent_viscosity_Pa_s,
         effects,
+    )
+
+
+def forward_model(declared: DeclaredModel) -> ForwardDeclared:
+    """Return a study's declared model as forward models take it, with all that is to be fitted."""
+    spectrum = declared.spectrum
+    modes = declared.modulus, declared.relaxation_time
+    options = {
+        "solvent_viscosity": declared.solvent_viscosity,
+        "linear_error": 0.0 if spectrum is None else spectrum.relative_error,
+        "effects": declared.effects,
+    }
+    if declared.law.linear_relaxation and declared.law_name in LAWS:
+        named = declared.law_name, declared.parameters
+        return ForwardDeclared.named(*named, *modes, free=declared.free, **options)
+    return ForwardDeclared(
+        declared.law,
+        *modes,
+        fit_modulus="modulus_Pa" in declared.free,
+        fit_relaxation_time="relaxation_time_s" in declared.free,
+        **options,
     )
 
 
