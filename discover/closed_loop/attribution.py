@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.closed_loop.least_squares import Fit
 from discover.effects import AbstractEffect
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 
 ALIAS_COSINE = 0.99
 """Signatures that agree to this cosine are the same to first order."""
@@ -68,7 +68,7 @@ class Attribution:
 
 def attribute(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     leaders: int,

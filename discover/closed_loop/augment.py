@@ -18,7 +18,7 @@ from discover.closed_loop.least_squares import (
     part_errors,
     run_errors,
 )
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.statistics import least_squares_covariance
 from discover.statistics.residual import judging, summarise
 
@@ -109,7 +109,7 @@ def evidence(
 
 def refit(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     leaders: Sequence[CandidateScore],
     n_candidates: int,
@@ -158,9 +158,7 @@ def refit(
     return choices
 
 
-def _restarted(
-    model: AugmentedModel, batch: RunBatch, fits: Sequence[Fit], prior: Prior
-) -> list[Fit]:
+def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: Prior) -> list[Fit]:
     """Return fits of which the best were also started from other inner times and exponents.
 
     In these a misfit has several minima: where two effects share a misfit, the inner time at which
@@ -254,7 +252,7 @@ def _near(best: Choice, other: Choice) -> bool:
 
 def prune(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     n_candidates: int,
@@ -289,7 +287,7 @@ def prune(
 
 def drop_undecided(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     n_candidates: int,
@@ -326,7 +324,7 @@ def drop_undecided(
 
 def _drop(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     optional: Callable[[Fit, list[str]], list[str]],
@@ -355,7 +353,7 @@ def taken_out(model: AugmentedModel, fit: Fit, effect: str) -> tuple[np.ndarray,
 
 def _weakest(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     optional: Sequence[str],
     n_candidates: int,
@@ -374,7 +372,7 @@ def _weakest(
     return float(support[weakest]), optional[weakest], fits[weakest]
 
 
-def intervals(model: AugmentedModel, batch: RunBatch, fit: Fit) -> dict[int, tuple[float, float]]:
+def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[float, float]]:
     """Return the 95 % interval of each fitted parameter, by position.
 
     From the curvature at the fit and the noise that its residual shows; see

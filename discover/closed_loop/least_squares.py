@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 
 _LARGEST_DAMPING = 1e7
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
@@ -87,7 +87,7 @@ class Fit:
 
 def fit_batch(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     starts: Sequence[np.ndarray],
     free: Sequence[Sequence[int]],
     max_steps: int = 60,
@@ -238,7 +238,7 @@ def _step(jacobian, residual, damping, known=None):
 
 
 def left_out_errors(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> Float[np.ndarray, " runs"]:
     """Return the relative error of each run left out of the fit; see `left_out_parts`."""
     return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
@@ -256,7 +256,7 @@ def run_errors(
 
 
 def left_out_parts(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
     """Return which samples are left out together, and the squared residuals without them.
 

@@ -15,6 +15,7 @@ from discover.dataset.run_table import oscillation
 from discover.dataset.table import Table, read_table
 from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
+from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
 from discover.protocols.protocol import FlowProtocol, in_flow, measured_rate, start_up
 
@@ -64,14 +65,17 @@ def read_run(
     stress = table.required(units.SHEAR_STRESS if in_shear else units.TENSILE_STRESS)
     if strain is None and test.step_strain:
         strain = np.full(len(time), test.step_strain)
-    _check_sign(name, time, rate, stress)
+    if test.control == "rate":
+        _check_sign(name, time, rate, stress)
     normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
     second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
     if len(time) > MOST_SAMPLES:
         keep, metadata["thinned"] = thin(time, rate, stress)
         time, rate, stress = time[keep], rate[keep], stress[keep]
         normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
-    if derived:
+    if test.control == "stress" and strain is not None:
+        protocol, derived, source = _imposed(name, time, stress), True, "what the fluid answered"
+    elif derived:
         protocol = measured_rate(time, rate)
         source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
     else:
@@ -94,6 +98,13 @@ def read_run(
         metadata=metadata,
     )
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
+
+
+def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
+    try:
+        return imposed_stress(time, stress)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
 
 
 def _rate(
