@@ -132,8 +132,8 @@ def load_dataset(
         If something in the folder is wrong; the message says what, where and how to mend it.
     """
     root = resolve_folder(folder, base)
-    tables = read_material_functions(root)
     index = read_index(root)
+    tables = read_material_functions(root, index.columns["file"])
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
     aside = [reason_to_set_aside(index, row, before is not None) for row in range(len(index))]

@@ -1,7 +1,7 @@
 """Tables of material functions beside the runs, as runs that can be fitted with them."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,13 +24,15 @@ COMPLIANCE = units.Quantity("compliance", "compliance_1_Pa", "1/Pa")
 RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa", "Pa")
 
 
-def read_material_functions(root: Path) -> dict[str, Run]:
+def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, Run]:
     """Return the tables of a data folder as runs, by kind: those of `TABLES`.
 
     Parameters
     ----------
     root
         The folder.
+    runs
+        Files that ``runs.csv`` names: they are runs, whatever they are called.
 
     Raises
     ------
@@ -40,7 +42,7 @@ def read_material_functions(root: Path) -> dict[str, Run]:
     found = {}
     for kind, read in _READERS.items():
         path = root / f"{kind}.csv"
-        if not os.path.lexists(path):
+        if path.name in runs or not os.path.lexists(path):
             continue
         if not path.resolve().is_relative_to(root.resolve()):
             raise InputError(

@@ -224,8 +224,8 @@ class Run:
 
 
 def same_samples(one: Run, other: Run) -> bool:
-    """Return whether two runs hold the same times and stresses, under whatever names."""
-    return np.array_equal(one.time, other.time) and np.array_equal(one.stress, other.stress)
+    """Return whether two runs hold the same times and values, under whatever names."""
+    return np.array_equal(one.time, other.time) and np.array_equal(one.recorded, other.recorded)
 
 
 def require_signal(runs: Sequence[Run]) -> None:

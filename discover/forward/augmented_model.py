@@ -181,8 +181,7 @@ class _Program:
                     )
                     for size in (0.0, 1.0)
                 )
-                true = (imposed - nothing) / (unit - nothing)
-                imposed = jnp.where(run.times < 0.0, imposed, true)
+                imposed = (imposed - nothing) / (unit - nothing)
         inertia = _where_in_shear(flow, inertia, jnp.zeros(()))
         imposed = _where_in_shear(flow, imposed, run.imposed)
         return strain_at_stress(dynamics, run.times, imposed, inertia, flow)[run.sample_index]

@@ -11,6 +11,9 @@ from discover.simulate.exponential_runge_kutta import KrogstadWeights, krogstad_
 # The rate enters a law linearly but for terms that name it, for which one more step is enough
 _NEWTON_STEPS = 2
 
+# Of (h ω)² with the ringing ω of tool and fluid: from where on a step follows it
+_RESOLVED = 0.1
+
 
 def strain_at_stress(
     dynamics: Dynamics,
@@ -48,14 +51,19 @@ def strain_at_stress(
 
     def step(carry, inputs):
         stress, levels, before, strain = carry
-        target, h, w = inputs
+        (from_, target), h, w = inputs
         sheared, felt = dynamics.sheared(stress, before, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         ahead = _after(dynamics, levels, felt, sheared, h)
         slow = dynamics.combined("time_factor", ahead)
         scale = dynamics.combined("modulus_factor", ahead)
-        wanted = target / scale - dynamics.recorded(stress, flow) + inertia / (h * scale) * before
-        viscosity = (dynamics.viscosity + inertia / h) / scale
+        already = scale * dynamics.recorded(stress, flow)
+        # backward Euler where the tool hardly counts, the trapezoidal rule where it swings
+        swings = jnp.abs(inertia) / (
+            jnp.abs(inertia) + h * (dynamics.viscosity + _RESOLVED * h * jnp.sum(modes.modulus))
+        )
+        late = 1.0 - 0.5 * swings
+        unbalanced = (1.0 - late) * (from_ - already - dynamics.viscosity * before)
 
         def stage(state):
             """Return the rate of a stage, and what of its slope is not linear relaxation."""
@@ -63,7 +71,9 @@ def strain_at_stress(
             def missing(rate):
                 change = dynamics.change(state, rate, slow, flow)
                 moved = h * dynamics.recorded(change / modes.relaxation_time, flow)
-                return moved + viscosity * rate - wanted
+                last = rate + swings * (rate - before)
+                left = target - already - scale * moved - dynamics.viscosity * last
+                return inertia * (last - before) / h - unbalanced - late * left
 
             rate = before
             for _ in range(_NEWTON_STEPS):
@@ -80,12 +90,13 @@ def strain_at_stress(
         sheared_after, felt = dynamics.sheared(after, mean, flow)
         levels = _after(dynamics, levels, felt, 0.5 * (sheared + scale * sheared_after), h)
         strain = strain + h * mean
-        return (after, levels, mean, strain), strain
+        last = mean + swings * (mean - before)
+        return (after, levels, last, strain), strain
 
     stress, levels = dynamics.rest()
     zero = jnp.zeros((), dtype=stress.dtype)
     start = (stress, levels, zero, zero)
-    _, strain = jax.lax.scan(step, start, (imposed[1:], width, weights))
+    _, strain = jax.lax.scan(step, start, ((imposed[:-1], imposed[1:]), width, weights))
     strain = jnp.concatenate([jnp.zeros(1), strain])
     if dynamics.series is None:
         return strain
