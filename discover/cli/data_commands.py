@@ -58,19 +58,23 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
     from discover.dataset.run_table import run_line
 
     dataset = load_dataset(name)
+    tables = [run_line(run) for run in dataset.material_functions.values()]
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
     if as_json:
         typer.echo(
-            json.dumps({"name": dataset.name, "runs": rows, "lve_points": n_sweep}, indent=2)
+            json.dumps(
+                {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep},
+                indent=2,
+            )
         )
         return
     say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
     typer.echo(
         f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
     )
-    for row in rows:
+    for row in (*rows, *tables):
         words = ", ".join([row["flow"], *(key for key in ("N1", "N2") if row[key])])
         say(
             f"{row['run']:<32}{row['samples']:>8}{row['duration_s']:>12.4g}"

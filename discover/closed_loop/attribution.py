@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discover.effects import AbstractEffect
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 
 ALIAS_COSINE = 0.99
@@ -68,7 +68,7 @@ class Attribution:
 
 def attribute(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     leaders: int,

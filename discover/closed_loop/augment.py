@@ -13,7 +13,7 @@ from discover.closed_loop.left_out import (
     part_errors,
     run_errors,
 )
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, intervals
 from discover.statistics.residual import judging, summarise
 
@@ -104,7 +104,7 @@ def evidence(
 
 def refit(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     leaders: Sequence[CandidateScore],
     n_candidates: int,
@@ -153,9 +153,7 @@ def refit(
     return choices
 
 
-def _restarted(
-    model: AugmentedModel, batch: RunBatch, fits: Sequence[Fit], prior: Prior
-) -> list[Fit]:
+def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: Prior) -> list[Fit]:
     """Return fits of which the best were also started from other inner times and exponents.
 
     In these a misfit has several minima: where two effects share a misfit, the inner time at which
@@ -249,7 +247,7 @@ def _near(best: Choice, other: Choice) -> bool:
 
 def prune(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     n_candidates: int,
@@ -284,7 +282,7 @@ def prune(
 
 def drop_undecided(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     n_candidates: int,
@@ -321,7 +319,7 @@ def drop_undecided(
 
 def _drop(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     active: Sequence[str],
     optional: Callable[[Fit, list[str]], list[str]],
@@ -350,7 +348,7 @@ def taken_out(model: AugmentedModel, fit: Fit, effect: str) -> tuple[np.ndarray,
 
 def _weakest(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     optional: Sequence[str],
     n_candidates: int,

@@ -9,14 +9,19 @@ from discover.closed_loop.result import ErrorPair
 from discover.closed_loop.run_record import RunRecord
 from discover.dataset import Run
 from discover.errors import InputError
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.protocols import strains
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
-    """Return the strain of a run at its samples: recorded, or of its commanded rate."""
+    """Return the strain of a run at its samples: recorded, or of its commanded rate.
+
+    That of a steady state is not known, and nan.
+    """
     if run.strain is not None:
         return run.strain
+    if run.protocol.control == "steady":
+        return np.full(len(run), np.nan)
     return strains(run.protocol, run.time)
 
 
@@ -37,6 +42,9 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
         )
     cut = []
     for run in runs:
+        if run.protocol.control == "steady":
+            cut.append(run)
+            continue
         strain = np.abs(strain_of(run))
         keep = (strain >= low) & (strain <= high)
         if np.count_nonzero(keep) < 3:
@@ -51,7 +59,7 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
 
 def record_runs(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     runs: Sequence[Run],
     thetas: Sequence[np.ndarray],
     held_out: bool,
@@ -88,6 +96,7 @@ def record_runs(
                 conditions=_conditions(run, order),
                 flow=run.flow,
                 quantity=run.quantity,
+                control=run.protocol.control,
             )
         )
     return records

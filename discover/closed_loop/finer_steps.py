@@ -9,7 +9,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.effects import AbstractEffect, SeriesElement
 from discover.errors import InputError
-from discover.forward import AugmentedModel, RunBatch, make_batch
+from discover.forward import AugmentedModel, Batch, make_batch
 from discover.forward.least_squares import Fit
 from discover.protocols import smooth_between_samples
 
@@ -18,7 +18,7 @@ _STRAIN_STEP = 0.05
 
 def on_finer_steps(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     runs: Sequence[Run],
     fit: Fit,
     active: Sequence[str],
@@ -51,7 +51,7 @@ def on_finer_steps(
 
 def change_on_finer_steps(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     runs: Sequence[Run],
     theta: np.ndarray,
     active: Sequence[str],
@@ -86,7 +86,7 @@ def change_on_finer_steps(
     try:
         fine_batch = make_batch(finer, strain_step=_STRAIN_STEP)
     except InputError:
-        return np.zeros(np.shape(batch.stress))
+        return np.zeros(np.shape(batch.recorded))
     change = small.residuals([values], fine_batch)[0] - small.residuals([values], batch)[0]
     return change if np.all(np.isfinite(change)) else np.zeros_like(change)
 

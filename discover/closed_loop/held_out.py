@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, jacobians
 from discover.statistics import least_squares_covariance
 from discover.statistics.unseen import Unseen
@@ -38,7 +38,7 @@ class HeldOut:
 
 def held_out(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     theta: np.ndarray,
     resolution: NumericalResolution,
@@ -61,18 +61,19 @@ def held_out(
         derivative = jacobians(model, resolution.batch, [theta], residual, [fit.free])[0]
         root, correlation = _uncertainty(batch, fit)
     columns = np.tensordot(root, derivative, axes=(0, 0))
-    weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.stress)
+    weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.recorded)
     kept = [w > 0 for w in weight]
+    sizes = [even(w[seen]) for w, seen in zip(weight, kept, strict=True)]
     unseen = Unseen(
-        [row[seen] / w[seen] for row, w, seen in zip(residual[0], weight, kept, strict=True)],
-        [record[seen] for record, seen in zip(records, kept, strict=True)],
-        [columns[:, i, seen] / weight[i, seen] for i, seen in enumerate(kept)],
+        [residual[0, i, seen] / weight[i, seen] / sizes[i] for i, seen in enumerate(kept)],
+        [records[i, seen] / sizes[i] for i, seen in enumerate(kept)],
+        [columns[:, i, seen] / weight[i, seen] / sizes[i] for i, seen in enumerate(kept)],
         correlation,
     )
     return HeldOut(residual[0], resolution, unseen)
 
 
-def _uncertainty(batch: RunBatch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def _uncertainty(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Return a root of the constants' covariance, shape (free, free), and the noise's correlation.
 
     A column is a combination of the constants that varies by one standard deviation.

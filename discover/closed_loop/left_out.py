@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, gauss_newton_step
 
 _MISSED = 10.0
 
 
 def left_out_errors(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> Float[np.ndarray, " runs"]:
     """Return the relative error of each run left out of the fit; see `left_out_parts`."""
     return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
@@ -30,7 +30,7 @@ def run_errors(
 
 
 def left_out_parts(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, prior: Prior = NO_PRIOR
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
 ) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
     """Return which samples are left out together, and the squared residuals without them.
 

@@ -368,7 +368,7 @@ def _settle(search: Search, runs: Sequence[Run], max_effects: int, say) -> None:
     """
     small = []
     for run in runs:
-        if run.flow != "shear" or not run.from_rest:
+        if run.flow != "shear" or not run.from_rest or run.protocol.control != "rate":
             continue  # a fluid that flowed before is not at small strain
         reached = np.maximum.accumulate(np.abs(strain_of(run)))
         keep = reached <= LINEAR_STRAIN

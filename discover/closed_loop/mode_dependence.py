@@ -11,7 +11,7 @@ import numpy as np
 
 from discover.closed_loop.augment import INDISTINGUISHABLE, evidence
 from discover.effects import ModeDependence
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 from discover.statistics.residual import summarise
 
@@ -20,7 +20,7 @@ _STARTS = (-0.5, 0.5)
 
 def names_not_needed(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     fit: Fit,
     names: Sequence[str],
     prior: Prior = NO_PRIOR,

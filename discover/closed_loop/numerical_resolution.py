@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from discover.closed_loop.finer_steps import change_on_finer_steps
 from discover.dataset import Run
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics.residual import judging
 
@@ -33,7 +33,7 @@ class NumericalResolution:
         The model with all candidates; the runs, laid out for it and as they are.
     """
 
-    def __init__(self, model: AugmentedModel, batch: RunBatch, runs: Sequence[Run]):
+    def __init__(self, model: AugmentedModel, batch: Batch, runs: Sequence[Run]):
         self.model, self.batch, self.runs = model, batch, runs
         sizes = [float(np.sqrt(np.mean(run.recorded**2))) or 1.0 for run in runs]
         self.rounding = np.array(

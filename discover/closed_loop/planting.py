@@ -163,7 +163,9 @@ class Planter:
         self.declared = DeclaredModel.named(base_law, BASE_LAWS[base_law], MODULUS, RELAXATION_TIME)
         flows = {**FIT_FLOWS, **HELD_OUT_FLOWS}
         self._runs = [_empty_run(name, flow) for name, flow in flows.items()]
-        self._batch = make_batch(self._runs, strain_step=_STRAIN_STEP)
+        batch = make_batch(self._runs, strain_step=_STRAIN_STEP)
+        assert isinstance(batch, RunBatch)  # all of them are transients
+        self._batch = batch
         self._fitted = np.arange(len(flows)) < len(FIT_FLOWS)
         self._effects = named_effects()
         unscaled = AugmentedModel(self.declared, list(self._effects.values()))

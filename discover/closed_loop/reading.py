@@ -10,7 +10,6 @@ from scipy.stats import permutation_test, rankdata
 
 from discover.closed_loop.run_record import RunRecord
 from discover.closed_loop.waves import Wave, oscillation, read_wave
-from discover.protocols.kinematics import KINDS
 
 _BINS = 24
 _DECADES = 30.0
@@ -178,8 +177,12 @@ def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
         Which prediction: 0 for the declared model, −1 for the augmented one.
     """
     # strains, rates and stresses of a shear and of an extension have no scale in common
-    commonest = max(KINDS, key=lambda kind: sum(r.flow == kind for r in records))
-    records = [r for r in records if r.flow == commonest]
+    # only records of one kind fall together; a steady state knows neither time nor strain
+    kinds = [(r.flow, r.quantity) for r in records if r.is_transient]
+    if not kinds:
+        return Reading((), (), ())
+    commonest = max(kinds, key=kinds.count)
+    records = [r for r in records if r.is_transient and (r.flow, r.quantity) == commonest]
     waves = tuple(w for r in records if (w := read_wave(r, model)) is not None)
     return Reading(_collapses(records, model), _trends(records, model), waves)
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.protocols.kinematics import FlowKind
+from discover.protocols.kinematics import Control, FlowKind
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,9 @@ class RunRecord:
     flow
         Which flow it is.
     quantity
-        What is recorded: ``sigma12``, ``tensile_stress``, ``N1`` or ``N2`` in Pa.
+        What is recorded: ``sigma12``, ``tensile_stress``, ``N1`` or ``N2`` in Pa, or ``strain``.
+    control
+        What was imposed. Where it is ``steady``, time only counts the samples.
     """
 
     name: str
@@ -48,12 +50,18 @@ class RunRecord:
     conditions: dict[str, float] = field(default_factory=dict)
     flow: FlowKind = "shear"
     quantity: str = "sigma12"
+    control: Control = "rate"
 
     def line(self) -> dict[str, Any]:
         """Return the run as one line of a table: its errors, the declared model's first."""
         stages = ["declared", *(f"stage_{i}" for i in range(1, len(self.errors)))]
         errors = dict(zip(stages, map(float, self.errors), strict=True))
         return {"run": self.name, "held_out": self.held_out, **errors}
+
+    @property
+    def is_transient(self) -> bool:
+        """Whether it goes on in time."""
+        return self.control != "steady"
 
     @property
     def residual(self) -> Float[np.ndarray, "stages n"]:

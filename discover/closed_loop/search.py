@@ -28,7 +28,7 @@ from discover.closed_loop.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
-from discover.forward import AugmentedModel, RunBatch, make_batch
+from discover.forward import AugmentedModel, Batch, make_batch
 from discover.forward.least_squares import (
     NO_PRIOR,
     Fit,
@@ -75,8 +75,8 @@ class Search(SearchState):
     def __init__(
         self,
         model: AugmentedModel,
-        batch: RunBatch,
-        held_batch: RunBatch | None,
+        batch: Batch,
+        held_batch: Batch | None,
         n_candidates: int,
         admitted: Callable[[AbstractEffect], bool],
         tolerated: ToleratedMisfit,
@@ -236,10 +236,7 @@ class Search(SearchState):
         if not names:
             return ""
         bounds = intervals(self.model, self.batch, self.fit)
-        ends = np.take_along_axis(
-            np.asarray(self.batch.times)[:, ::2], np.asarray(self.batch.sample_index), axis=1
-        )
-        longest = float(np.max(ends))
+        longest = self.batch.longest
         for name in names:
             reason = at_an_end(self.model, self.fit.theta, [name]) or undetermined(
                 self.model, self.fit.theta, bounds, name, longest

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
-from discover.forward import AugmentedModel, RunBatch
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics import holds_signal
 from discover.statistics.dead_records import CHANCE
@@ -25,9 +25,7 @@ def records_are_silent(runs: Sequence[Run]) -> bool:
     return not holds_signal([run.recorded for run in runs], [run.rate for run in runs])
 
 
-def fluid_is_silent(
-    model: AugmentedModel, batch: RunBatch, fit: Fit, active: Sequence[str]
-) -> bool:
+def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Sequence[str]) -> bool:
     """Return whether a fit explains the records as well without its fluid.
 
     The fluid is switched off, and what it had lowered the misfit by is held against what as many

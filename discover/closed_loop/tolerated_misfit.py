@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.numerical_resolution import NumericalResolution
+from discover.forward import even
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left
 from discover.statistics.residual import STRUCTURE, Expectation, tells_noise
@@ -36,7 +37,7 @@ class ToleratedMisfit:
     @property
     def records(self) -> Float[np.ndarray, "runs n"]:
         """Measured stress in Pa, padded."""
-        return np.asarray(self.resolution.batch.stress)
+        return np.asarray(self.resolution.batch.recorded)
 
     def on(self, resolution: NumericalResolution) -> "ToleratedMisfit":
         """Return the same expectation of other runs."""
@@ -56,8 +57,9 @@ class ToleratedMisfit:
         """Return what weighted residuals hold, by the test that judges a comparison too."""
         rows, records = [], []
         for row, w, record in zip(residual, self.weight, self.records, strict=True):
-            rows.append(row[w > 0] / w[w > 0])
-            records.append(record[w > 0])
+            seen = w[w > 0]
+            rows.append(row[w > 0] / seen / even(seen))
+            records.append(record[w > 0] / even(seen))
         return what_is_left(rows, records, self.expectation)
 
     def explained(self, fit: Fit, active: Sequence[str]) -> bool:

@@ -32,6 +32,7 @@ from discover.comparison.training import (
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.comparison.unseen_runs import hold_against_unseen
 from discover.dataset import Dataset
+from discover.dataset.material_functions import at_measured_rate
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
@@ -91,6 +92,7 @@ def compare(
     options = study.compare
     data = load_study_data(study, seed) if data is None else data
     _require_one_split(data)
+    data = _at_rates(data)
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
@@ -203,6 +205,29 @@ def compare(
         explanation=explanation,
         classical=classical,
         warnings=() if silent_records else tuple(disagreements(outcomes, judged, bands)),
+    )
+
+
+def _at_rates(data: StudyData) -> StudyData:
+    """Return data in which every run follows a rate in time, which is what the learners fit.
+
+    What has none is refused among the runs to fit, and set aside among those that only judge.
+    """
+    if all(run.protocol.control == "rate" for run in (*data.fit, *data.held_out)):
+        return data
+    fit = replace(data.fit, runs=tuple(at_measured_rate(run) for run in data.fit))
+    held, aside = [], dict(data.dataset.set_aside)
+    for run in data.held_out:
+        try:
+            held.append(at_measured_rate(run))
+        except InputError as error:
+            aside[run.name] = str(error).removesuffix(".")
+    held_out = replace(data.held_out, runs=tuple(held))
+    return replace(
+        data,
+        dataset=replace(data.dataset, runs=(*fit.runs, *held), set_aside=aside),
+        fit=fit,
+        held_out=held_out,
     )
 
 

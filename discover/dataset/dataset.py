@@ -33,6 +33,8 @@ class Dataset(NotebookView):
         Where the data come from, in words.
     set_aside
         Runs of the folder that cannot be fitted, by name, with the reason.
+    material_functions
+        Tables beside the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Dataset(NotebookView):
     linear_sweep: LinearSweep | None = None
     provenance: str = ""
     set_aside: Mapping[str, str] = field(default_factory=dict)
+    material_functions: Mapping[str, Run] = field(default_factory=dict)
 
     def __post_init__(self):
         names = [run.name for run in self.runs]
@@ -161,6 +164,31 @@ class Dataset(NotebookView):
             If a run does not exist.
         """
         return replace(self, runs=tuple(self._named(name) for name in names))
+
+    def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":
+        """Return the data with tables beside the runs as runs among them.
+
+        Parameters
+        ----------
+        kinds
+            Of `material_functions`; by default all.
+
+        Raises
+        ------
+        InputError
+            If the data have no such table.
+        """
+        there = self.material_functions
+        for kind in kinds or ():
+            if kind not in there:
+                raise InputError(
+                    f"The data set {self.name!r} has no {kind}.csv; it has "
+                    f"{', '.join(f'{name}.csv' for name in there) or 'no such table'}."
+                )
+        chosen = list(there) if kinds is None else kinds
+        added = [there[kind] for kind in chosen]
+        left = {kind: run for kind, run in there.items() if kind not in chosen}
+        return replace(self, runs=(*self.runs, *added), material_functions=left)
 
     def quantity_by_quantity(self) -> "Dataset":
         """Return the data with N1 and N2, where recorded, as records of their own beside σ12.

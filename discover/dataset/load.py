@@ -1,4 +1,4 @@
-"""Load a folder of measured runs: ``runs.csv``, one CSV a run, optionally ``lve.csv``."""
+"""Load a folder of measured runs: ``runs.csv``, one CSV a run, and tables beside them."""
 
 import os
 from pathlib import Path
@@ -11,6 +11,7 @@ from discover.dataset.dataset import Dataset
 from discover.dataset.differentiation import DEFAULT_WINDOW
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.sequence import in_sequence
 from discover.dataset.table import Table, read_bytes, read_table, shown
@@ -22,6 +23,9 @@ DATA_VARIABLE = "DISCOVER_DATA"
 
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
+
+DATA_FILES = (INDEX_FILE, SWEEP_FILE, "amplitude_sweep.csv", *(f"{kind}.csv" for kind in TABLES))
+"""Files of which a folder needs one to be a data set."""
 
 
 def folder_roots(base: str | Path | None = None) -> list[Path]:
@@ -49,7 +53,7 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
     Raises
     ------
     InputError
-        If there is no such folder, or it has no ``runs.csv``.
+        If there is no such folder, or it has none of `DATA_FILES`.
     """
     try:
         path = Path(folder).expanduser()
@@ -58,7 +62,7 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
     candidates = [path] if path.is_absolute() else [root / path for root in folder_roots(base)]
     # os.path answers False where Path raises: no permission, names too long, zero bytes
     for candidate in candidates:
-        if os.path.isfile(candidate / INDEX_FILE):
+        if any(os.path.isfile(candidate / name) for name in DATA_FILES):
             return candidate
     for candidate in candidates:
         if os.path.isdir(candidate):
@@ -68,7 +72,8 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
                 )
             raise InputError(
                 f"The folder {str(folder)!r} has no {INDEX_FILE}. A data folder needs one, with a "
-                "column 'file' and one line a run."
+                "column 'file' and one line a run, or one of the tables "
+                f"{', '.join(DATA_FILES[1:])}."
             )
         if os.path.isfile(candidate):
             raise InputError(
@@ -128,6 +133,7 @@ def load_dataset(
     """
     root = resolve_folder(folder, base)
     index = read_index(root)
+    tables = read_material_functions(root, index.columns["file"])
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
     aside = [reason_to_set_aside(index, row, before is not None) for row in range(len(index))]
@@ -149,7 +155,7 @@ def load_dataset(
         )
         for row in used
     )
-    if sequence is not None:
+    if sequence is not None and runs:
         runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
     return Dataset(
         name=root.resolve().name,
@@ -161,6 +167,7 @@ def load_dataset(
             for name, reason in zip(index.columns["file"], aside, strict=True)
             if reason is not None
         },
+        material_functions=tables,
     )
 
 
@@ -196,13 +203,15 @@ def _provenance(root: Path) -> str:
 
 
 def read_index(root: Path) -> Table:
-    """Return ``runs.csv``, checked for its column ``file``.
+    """Return ``runs.csv``, checked for its column ``file``; no lines where there is no such file.
 
     Raises
     ------
     InputError
         If the column is missing, or a name in it is empty, repeated or outside the folder.
     """
+    if not os.path.lexists(root / INDEX_FILE):
+        return Table(INDEX_FILE, {"file": []}, [])
     index = read_table(root / INDEX_FILE)
     if "file" not in index.columns:
         raise InputError(

@@ -15,6 +15,7 @@ from discover.dataset.run_table import oscillation
 from discover.dataset.table import Table, read_table
 from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
+from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
 from discover.protocols.protocol import FlowProtocol, in_flow, measured_rate, start_up
 
@@ -26,6 +27,9 @@ _CONSTANT = 1e-6
 # From rest a passive fluid cannot return more work than it was given. A record that is noise around
 # zero comes near 0, one with the wrong sign near -1
 _WRONG_SIGN = -0.5
+
+# Samples that a moving cubic needs
+_FEWEST_SMOOTHED = 5
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
@@ -64,14 +68,17 @@ def read_run(
     stress = table.required(units.SHEAR_STRESS if in_shear else units.TENSILE_STRESS)
     if strain is None and test.step_strain:
         strain = np.full(len(time), test.step_strain)
-    _check_sign(name, time, rate, stress)
+    if test.control == "rate":
+        _check_sign(name, time, rate, stress)
     normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
     second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
     if len(time) > MOST_SAMPLES:
         keep, metadata["thinned"] = thin(time, rate, stress)
         time, rate, stress = time[keep], rate[keep], stress[keep]
         normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
-    if derived:
+    if test.control == "stress" and strain is not None:
+        protocol, derived, source = _imposed(name, time, stress), True, "what the fluid answered"
+    elif derived:
         protocol = measured_rate(time, rate)
         source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
     else:
@@ -96,6 +103,13 @@ def read_run(
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
 
 
+def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
+    try:
+        return imposed_stress(time, stress)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
 def _rate(
     table: Table,
     test: DeclaredTest,
@@ -114,6 +128,9 @@ def _rate(
         _refuse_another_flow(table, test)
         # said in the words of the commoner mistake
         strain = table.required(quantity)
+    if test.control == "stress" and len(time) < _FEWEST_SMOOTHED:
+        # the strain is what is fitted; the rate is only told
+        return np.gradient(strain, time) if len(time) > 1 else np.zeros(1), True
     try:
         rate = differentiate(time, strain, window)
     except InputError as error:

@@ -144,7 +144,7 @@ class Run:
 
     @property
     def recorded(self) -> Float[np.ndarray, " n"]:
-        """The values of that quantity, in Pa, shape (n,).
+        """The values of that quantity, in Pa or dimensionless, shape (n,).
 
         Raises
         ------
@@ -154,6 +154,7 @@ class Run:
         values = {
             "N1": self.first_normal_stress_difference,
             "N2": self.second_normal_stress_difference,
+            "strain": self.strain,
         }.get(self.quantity, self.stress)
         if values is None:
             raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
@@ -223,8 +224,8 @@ class Run:
 
 
 def same_samples(one: Run, other: Run) -> bool:
-    """Return whether two runs hold the same times and stresses, under whatever names."""
-    return np.array_equal(one.time, other.time) and np.array_equal(one.stress, other.stress)
+    """Return whether two runs hold the same times and values, under whatever names."""
+    return np.array_equal(one.time, other.time) and np.array_equal(one.recorded, other.recorded)
 
 
 def require_signal(runs: Sequence[Run]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from discover.dataset.run import SLOWEST_RATE, Run
+from discover.protocols.control import jumps_at_start
 
 # share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
 # many where the stress was commanded, and noise
@@ -25,11 +26,11 @@ def run_line(run: Run) -> dict[str, Any]:
         The run.
     """
     flow = _flow(run)
-    wave = oscillation(run) if flow == _VARYING else None
+    wave = oscillation(run) if flow in (_VARYING, "given stress") else None
     normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
     return {
         "run": run.name,
-        "flow": flow if not wave else "oscillation" if run.from_rest else "steady alternation",
+        "flow": _oscillating(run) if wave and flow == _VARYING else flow,
         "samples": len(run),
         "duration_s": float(run.time[-1]),
         "largest_rate_1_s": float(np.max(np.abs(run.rate))),
@@ -42,6 +43,10 @@ def run_line(run: Run) -> dict[str, Any]:
 
 
 def _flow(run: Run) -> str:
+    if run.protocol.control == "steady":
+        return "flow curve"
+    if run.protocol.control == "stress":
+        return "creep" if jumps_at_start(run.protocol) else "given stress"
     if not run.flows:
         return "rest"
     size = max(float(np.max(np.abs(run.rate))), abs(run.rate_before), SLOWEST_RATE)
@@ -54,6 +59,10 @@ def _flow(run: Run) -> str:
         return "cessation" if run.rate_before or run.from_rest else "relaxation after a step strain"
     kind = "step of rate" if run.rate_before else "start-up"
     return kind if run.flow == "shear" else f"{run.flow} extension, {kind}"
+
+
+def _oscillating(run: Run) -> str:
+    return "oscillation" if run.from_rest else "steady alternation"
 
 
 def oscillation(run: Run) -> tuple[float, float] | None:

@@ -100,6 +100,9 @@ class AbstractEffect(ABC):
     visible: str = ""
     complexity: int = 1
     kind: ClassVar[Kind]
+    acts_on_steady_states: ClassVar[bool] = False
+    """Of an effect of the instrument or a state: whether it changes what is steady, sample by
+    sample, without regard to time or strain."""
 
 
 @dataclass(frozen=True)
@@ -308,3 +311,7 @@ class SignalEffect(AbstractEffect):
     @abstractmethod
     def recorded_stress(self, values: Float[Array, " p"], record: Record) -> Float[Array, " n"]:
         """Return the stress recorded, from the one that would be recorded without this effect."""
+
+    def inertia(self, values: Float[Array, " p"]) -> Float[Array, ""]:
+        """Return I of σ_rec = σ + I dγ̇/dt in Pa s², which a given stress accelerates too."""
+        return jnp.zeros_like(values[0])

@@ -6,15 +6,17 @@ declared law, then those of every candidate effect. At zero amplitude an effect 
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
-from discover.forward.run_batch import RunBatch, data_scales, make_batch
+from discover.forward.run_batch import Batch, RunBatch, data_scales, even, make_batch
 
 __all__ = [
     "MODULUS",
     "RELAXATION_TIME",
     "AugmentedModel",
+    "Batch",
     "DeclaredModel",
     "FreeParameter",
     "RunBatch",
     "data_scales",
+    "even",
     "make_batch",
 ]

@@ -30,8 +30,18 @@ from discover.effects import (
 )
 from discover.forward.added_terms import AddedTerms, InUse
 from discover.forward.declared import DeclaredModel
-from discover.forward.integrator import Modes, Series, integrate
-from discover.forward.run_batch import RunBatch
+from discover.forward.dynamics import Dynamics, Modes, Series
+from discover.forward.imposed_stress import strain_at_stress
+from discover.forward.integrator import integrate
+from discover.forward.run_batch import (
+    Batch,
+    MixedBatch,
+    Part,
+    RunBatch,
+    SteadyBatch,
+    StressBatch,
+)
+from discover.forward.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
@@ -105,7 +115,14 @@ class _Program:
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
 
-    def _predict_run(self, numbers, used, theta, run):
+    def _predict_run(self, numbers, used, theta, run: Part):
+        if isinstance(run, SteadyBatch):
+            return self._predict_steady_states(numbers, used, theta, run)
+        if isinstance(run, StressBatch):
+            return self._predict_strain(numbers, used, theta, run)
+        return self._predict_transient(numbers, used, theta, run)
+
+    def _predict_transient(self, numbers, used, theta, run: RunBatch):
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -121,13 +138,58 @@ class _Program:
             changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
             rate = _where_in_shear(flow, changed, rate)
         times = run.times[::2]
-        stress, felt = self._integrate(numbers, used, theta, times, rate, flow)
+        dynamics = self._dynamics(numbers, used, theta, flow)
+        stress, felt = integrate(dynamics, times, rate, flow)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
-            changed = effect.recorded_stress(self._values(theta, effect), record)
-            stress = changed if flow is None else jnp.where(flow.records_torque, changed, stress)
+            stress = self._as_recorded(theta, effect, record, flow)
         return stress[run.sample_index]
+
+    def _predict_steady_states(self, numbers, used, theta, run: SteadyBatch):
+        flow = run.kinematics
+        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
+        rate = run.rate
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+                changed = effect.felt_rate(self._values(theta, effect), places, rate)
+                rate = _where_in_shear(flow, changed, rate)
+        dynamics = self._dynamics(numbers, used, theta, flow)
+        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
+        dynamics = dynamics._replace(states=kept)
+        stress, felt = steady_states(dynamics, rate, flow)
+        stress = stress + self._beside(numbers, theta, felt, flow)
+        for effect in self._signal:
+            if effect.acts_on_steady_states:
+                record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
+                stress = self._as_recorded(theta, effect, record, flow)
+        return stress
+
+    def _predict_strain(self, numbers, used, theta, run: StressBatch):
+        flow = run.kinematics
+        dynamics = self._dynamics(numbers, used, theta, flow)
+        imposed, inertia = run.imposed, jnp.zeros(())
+        still = jnp.zeros_like(imposed)
+        for effect in reversed(self._signal):
+            values = self._values(theta, effect)
+            inertia = inertia + effect.inertia(values) * run.clock_factor**2
+            if effect.acts_on_steady_states:
+                # the true stress of a recorded one: these effects are linear in it
+                nothing, unit = (
+                    effect.recorded_stress(
+                        values, Record(run.times, still, still + size, run.clock_factor)
+                    )
+                    for size in (0.0, 1.0)
+                )
+                imposed = (imposed - nothing) / (unit - nothing)
+        inertia = _where_in_shear(flow, inertia, jnp.zeros(()))
+        imposed = _where_in_shear(flow, imposed, run.imposed)
+        return strain_at_stress(dynamics, run.times, imposed, inertia, flow)[run.sample_index]
+
+    def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
+        """Return the stress after an effect of the torque's signal, where that is recorded."""
+        changed = effect.recorded_stress(self._values(theta, effect), record)
+        return changed if flow is None else jnp.where(flow.records_torque, changed, record.stress)
 
     def _beside(self, numbers, theta, rate, flow: Kinematics | None):
         """Return the recorded stress of the solvent and of what effects add beside the modes.
@@ -170,7 +232,7 @@ class _Program:
 
         return differing
 
-    def _integrate(self, numbers, used, theta, times, rate, flow: Kinematics | None):
+    def _dynamics(self, numbers, used, theta, flow: Kinematics | None) -> Dynamics:
         law = self._law(numbers, theta)
         # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
@@ -198,21 +260,17 @@ class _Program:
         series = None
         if self._series:
             pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
-            slip, compliance = (sum(column) for column in zip(*pairs, strict=True))
-            viscosity = self._beside(numbers, theta, jnp.ones(1), flow)[0]
-            both = jnp.stack([jnp.asarray(slip), jnp.asarray(compliance)])
+            both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
             slip, compliance = _where_in_shear(flow, both, jnp.zeros(2))
-            series = Series(slip, compliance, viscosity)
-        return integrate(
+            series = Series(slip, compliance)
+        return Dynamics(
             modes_rate,
             law.linear_relaxation,
             Modes(modulus, relaxation_time),
             extra,
             {effect: self._values(theta, effect) for effect in self._states},
             series,
-            times,
-            rate,
-            flow,
+            self._beside(numbers, theta, jnp.ones(1), flow)[0],
         )
 
 
@@ -324,23 +382,32 @@ class AugmentedModel:
         at = self.slices[name]
         return list(range(at.start, at.stop))
 
-    def predict(self, theta, batch: RunBatch) -> Float[np.ndarray, "runs n"]:
-        """Return the predicted records, in Pa."""
+    def predict(self, theta, batch: Batch) -> Float[np.ndarray, "runs n"]:
+        """Return the predicted records: stresses in Pa, and strains of runs at a given stress."""
         return self.predictions([theta], batch)[0]
 
     def predictions(
-        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch
+        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
     ) -> Float[np.ndarray, "trials runs n"]:
-        """Return the predicted records of any number of parameter vectors, in Pa."""
+        """Return the predicted records of any number of parameter vectors."""
+        if not isinstance(batch, MixedBatch):
+            return self._of_part(thetas, batch)
+        out = np.zeros((len(thetas), *batch.recorded.shape))
+        for rows, part in zip(batch.rows, batch.parts, strict=True):
+            found = self._of_part(thetas, part)
+            out[:, rows, : found.shape[2]] = found
+        return out
+
+    def _of_part(self, thetas, part: Part) -> Float[np.ndarray, "trials runs n"]:
         program = self._program
 
         def one(theta: np.ndarray) -> np.ndarray:
             used = program.in_use(theta)
-            return np.asarray(program.predict(self._numbers, used, theta, batch))
+            return np.asarray(program.predict(self._numbers, used, theta, part))
 
         trials, out = list(thetas), []
         # the first of a shape alone, so that the program is compiled once
-        shape = (batch.times.shape, batch.stress.shape)
+        shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         if shape not in program.met:
             out.append(one(trials.pop(0)))
             program.met.add(shape)
@@ -352,8 +419,8 @@ class AugmentedModel:
         return np.stack(out)
 
     def residuals(
-        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: RunBatch
+        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the weighted residuals of parameter vectors; not finite where one fails."""
-        difference = self.predictions(thetas, batch) - np.asarray(batch.stress)
+        difference = self.predictions(thetas, batch) - np.asarray(batch.recorded)
         return difference * np.asarray(batch.weight)

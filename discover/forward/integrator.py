@@ -5,42 +5,21 @@ fluid, with steps that are exact for constant coefficients, and the deformation 
 series with the fluid take away. What no candidate needs is not compiled.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.effects import StateEffect
+from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
 from discover.simulate.exponential_runge_kutta import (
     KrogstadWeights,
     krogstad_weights,
-    phi_functions,
+    relax,
 )
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
-
-
-class Modes(NamedTuple):
-    """Modes: moduli in Pa, relaxation times in s, both shape (k,)."""
-
-    modulus: Float[Array, " k"]
-    relaxation_time: Float[Array, " k"]
-
-
-class Series(NamedTuple):
-    """Elements in series with the fluid.
-
-    Slip s in 1/(Pa s), compliance C in 1/Pa, and the viscosity in Pa s of the torque beside the
-    modes.
-    """
-
-    slip: Float[Array, ""]
-    compliance: Float[Array, ""]
-    viscosity: Float[Array, ""]
 
 
 def _weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 10 k"]:
@@ -50,27 +29,13 @@ def _weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 1
     return jnp.stack(krogstad_weights(z, h), axis=1)
 
 
-def _relax(effect: StateEffect, values, state, shear_rate, stress, width):
+def _relax(effect: StateEffect, values, state, rate, stress, width):
     """Return the state after a step in which source and decay are constant."""
-    source, decay = effect.source_and_decay(values, shear_rate, stress)
-    z = -decay * width
-    return state * jnp.exp(z) + source * width * phi_functions(z)[0]
-
-
-def _combined(factor: str, states: dict[StateEffect, Array], levels):
-    total = jnp.ones(())
-    for (effect, values), level in zip(states.items(), levels, strict=True):
-        total = total * getattr(effect, factor)(values, level)
-    return total
+    return relax(*effect.source_and_decay(values, rate, stress), state, width)
 
 
 def integrate(
-    slope: Callable,
-    linear_relaxation: bool,
-    declared: Modes,
-    extra: Modes | None,
-    states: dict[StateEffect, Float[Array, " p"]],
-    series: Series | None,
+    dynamics: Dynamics,
     times: Float[Array, " s"],
     rate: Float[Array, " m"],
     flow: Kinematics | None = None,
@@ -79,72 +44,47 @@ def integrate(
 
     Parameters
     ----------
-    slope
-        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
-        shape (k,), in simple shear, else four components, shape (4, k).
-    linear_relaxation
-        Whether −σ is part of it; it is then integrated exactly.
-    declared, extra
-        The declared modes, and those of effects. Apart, because the weights of the declared ones
-        depend on no trial and are then computed once for all trials.
-    states
-        State effects and their parameters.
-    series
-        Elements in series with the fluid.
+    dynamics
+        The fluid, with what gives way in series with it.
     times, rate
         Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
     flow
         Which flow has this rate; None is simple shear.
     """
     width = jnp.diff(times)
-    weights = [_weights(declared.relaxation_time, width, linear_relaxation)]
-    modes = declared
-    if extra is not None:
-        weights.append(_weights(extra.relaxation_time, width, linear_relaxation))
-        modes = Modes(*(jnp.concatenate(pair) for pair in zip(declared, extra, strict=True)))
-    modulus, relaxation_time = modes
-    slope = jax.jit(slope)  # so that it is traced once, and not at each of the four stages
+    states, series = dynamics.states, dynamics.series
+    linear_relaxation = dynamics.linear_relaxation
+    weights = [_weights(dynamics.declared.relaxation_time, width, linear_relaxation)]
+    if dynamics.extra is not None:
+        weights.append(_weights(dynamics.extra.relaxation_time, width, linear_relaxation))
+    # so that it is traced once, and not at each of the four stages
+    slope = jax.jit(lambda stress, rate, slow: dynamics.change(stress, rate, slow, flow))
+    combined = dynamics.combined
 
-    def gradient(shear_rate):
-        return shear_rate if flow is None else flow.gradient[:, None] * shear_rate
-
-    def recorded(stress):
-        return (stress[3] if flow is None else flow.stress(stress)) @ modulus
-
-    def sheared(stress, shear_rate):
-        # what a state feels: a shear of the same intensity that does the same work
-        if flow is None:
-            return stress[3] @ modulus, shear_rate
-        return flow.equivalent_shear_stress(stress) @ modulus, flow.intensity * shear_rate
-
-    def remainder(stress, shear_rate, factor):
-        # with all times longer by a factor the law holds in its own time, which runs slower
-        if states:
-            change = slope(stress, gradient(factor * relaxation_time * shear_rate)) / factor
-        else:
-            change = slope(stress, gradient(relaxation_time * shear_rate))
+    def remainder(stress, rate, slow):
+        change = slope(stress, rate, slow)
         return change + stress if linear_relaxation else change
 
     def step(carry, inputs):
         stress, levels, missing, compliance_rate = carry
         (first_rate, middle_rate, last_rate), h, parts = inputs
         w = KrogstadWeights(*(parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)))
-        scale = _combined("modulus_factor", states, levels)
-        shear_before, felt_rate = sheared(stress, middle_rate)
+        scale = combined("modulus_factor", levels)
+        shear_before, felt_rate = dynamics.sheared(stress, middle_rate, flow)
         shear_before = scale * shear_before
         predicted = [
             [_relax(e, v, s, felt_rate, shear_before, share * h) for share in (0.5, 1.0)]
             for (e, v), s in zip(states.items(), levels, strict=True)
         ]
-        slow_first = _combined("time_factor", states, levels)
-        slow_middle = _combined("time_factor", states, [p[0] for p in predicted])
-        slow_last = _combined("time_factor", states, [p[1] for p in predicted])
+        slow_first = combined("time_factor", levels)
+        slow_middle = combined("time_factor", [p[0] for p in predicted])
+        slow_last = combined("time_factor", [p[1] for p in predicted])
 
         n1 = remainder(stress, first_rate + compliance_rate, slow_first)
         if series is not None:
-            scale_last = _combined("modulus_factor", states, [p[1] for p in predicted])
+            scale_last = combined("modulus_factor", [p[1] for p in predicted])
             n1, compliance_rate = _compliance_rate(
-                series, modes, scale_last, stress, shear_before, missing, compliance_rate, n1, w,
+                dynamics, scale_last, stress, shear_before, missing, compliance_rate, n1, w,
                 first_rate, last_rate, h, times[-1],
             )  # fmt: skip
         middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
@@ -154,32 +94,27 @@ def integrate(
         after = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
 
         # the states once more, now with the mean of the stress at both ends
-        shear_after, felt_rate = sheared(after, middle_rate)
-        stress_after = recorded(after)
+        shear_after, felt_rate = dynamics.sheared(after, middle_rate, flow)
+        stress_after = dynamics.recorded(after, flow)
         if states:
-            guess = _combined("modulus_factor", states, [p[1] for p in predicted]) * shear_after
+            guess = combined("modulus_factor", [p[1] for p in predicted]) * shear_after
             middle_stress = 0.5 * (shear_before + guess)
             levels = tuple(
                 _relax(e, v, s, felt_rate, middle_stress, h)
                 for (e, v), s in zip(states.items(), levels, strict=True)
             )
-            factor = _combined("modulus_factor", states, levels)
+            factor = combined("modulus_factor", levels)
             shear_after, stress_after = factor * shear_after, factor * stress_after
         if series is not None:
             torque = 0.5 * (
                 shear_before + shear_after
-                + series.viscosity * (first_rate + last_rate + compliance_rate)
+                + dynamics.viscosity * (first_rate + last_rate + compliance_rate)
             )  # fmt: skip
             missing = missing + compliance_rate * h + series.slip * h * torque
         return (after, levels, missing, compliance_rate), (stress_after, compliance_rate)
 
     zero = jnp.zeros(())
-    start = (
-        jnp.zeros((4, len(modulus))),
-        tuple(jnp.full((), effect.rest, dtype=modulus.dtype) for effect in states),
-        zero,
-        zero,
-    )
+    start = (*dynamics.rest(), zero, zero)
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
     _, (stress, compliance_rate) = jax.lax.scan(step, start, (rates, width, tuple(weights)))
     felt = rate[::2]
@@ -191,7 +126,18 @@ def integrate(
 
 
 def _compliance_rate(
-    series, modes, scale, stress, before, missing, earlier, n1, w, first_rate, last_rate, h, end
+    dynamics: Dynamics,
+    scale,
+    stress,
+    before,
+    missing,
+    earlier,
+    n1,
+    w,
+    first_rate,
+    last_rate,
+    h,
+    end,
 ):
     """Return the slope with it, and the rate that the series elements take in this step.
 
@@ -199,12 +145,13 @@ def _compliance_rate(
     stress at the end is predicted by one exponential Euler step, linear in the rate; what the
     prediction misses is carried in `missing` to the next step.
     """
+    series, modes, viscous = dynamics.series, dynamics.modes, dynamics.viscosity
+    assert series is not None
     full, whole = w.full, w.b1 + 2.0 * w.b23 + w.b4
     stretch = modes.relaxation_time * (1.0 + stress[1])
     predicted = scale * ((full * stress[3] + whole * n1[3]) @ modes.modulus)
     stiffness = scale * ((whole * stretch) @ modes.modulus)
     compliance = series.compliance + 0.5 * series.slip * h
-    viscous = series.viscosity
     # torque at the ends for the rate that was given way to before
     predicted = predicted + viscous * (last_rate + earlier)
     before = before + viscous * (first_rate + earlier)

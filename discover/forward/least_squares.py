@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.stats import t as student
 
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.run_batch import RunBatch
+from discover.forward.run_batch import Batch
 from discover.statistics import least_squares_covariance
 
 _LARGEST_DAMPING = 1e7
@@ -89,7 +89,7 @@ class Fit:
 
 def fit_batch(
     model: AugmentedModel,
-    batch: RunBatch,
+    batch: Batch,
     starts: Sequence[np.ndarray],
     free: Sequence[Sequence[int]],
     max_steps: int = 60,
@@ -240,7 +240,7 @@ def gauss_newton_step(jacobian, residual, damping, known=None):
     return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
 
 
-def intervals(model: AugmentedModel, batch: RunBatch, fit: Fit) -> dict[int, tuple[float, float]]:
+def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[float, float]]:
     """Return the 95 % interval of each fitted parameter, by position.
 
     From the curvature at the fit and the noise that its residual shows; see

@@ -1,6 +1,7 @@
 """Protocols: the rate of deformation in time, the flow that has it, and what came before."""
 
 from discover import first_use as first_use  # double precision, before any array is made
+from discover.protocols.control import imposed_stress, steady_rates
 from discover.protocols.history import after_alternation, after_steady_flow, after_step_strain
 from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
@@ -26,6 +27,7 @@ __all__ = [
     "after_alternation",
     "after_steady_flow",
     "after_step_strain",
+    "imposed_stress",
     "in_flow",
     "kinematics_of",
     "measured_rate",
@@ -37,6 +39,7 @@ __all__ = [
     "smooth_between_samples",
     "stack_protocols",
     "start_up",
+    "steady_rates",
     "step_rates",
     "strains",
 ]

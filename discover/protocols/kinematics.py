@@ -17,7 +17,10 @@ from discover.errors import InputError
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 
-RecordedQuantity = Literal["sigma12", "tensile_stress", "N1", "N2"]
+RecordedQuantity = Literal["sigma12", "tensile_stress", "N1", "N2", "strain"]
+
+Control = Literal["rate", "stress", "steady"]
+"""What a protocol imposes: a rate, a stress, or rates each held until the flow is steady."""
 
 KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
 """Flows by name; the first is the default everywhere."""

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from discover.errors import InputError
 from discover.programs import compiled
 from discover.protocols.kinematics import (
+    Control,
     FlowKind,
     Kinematics,
     RecordedQuantity,
@@ -42,6 +43,10 @@ class FlowProtocol(eqx.Module):
         Time in s, zero or negative, until which the fluid was at rest.
     kinematics
         Which flow has this rate; None is simple shear, for which a scalar is enough.
+    control
+        ``rate``; ``stress`` where the table holds the recorded stress that is imposed, in Pa, and
+        the strain is what is recorded; ``steady`` where each sample is a steady state at its rate,
+        and time only counts the samples.
     """
 
     table_times: Float[Array, " m"]
@@ -51,6 +56,7 @@ class FlowProtocol(eqx.Module):
     phases: Float[Array, " c"]
     begins: Float[Array, ""] = eqx.field(default=0.0, converter=jnp.asarray)
     kinematics: Kinematics | None = None
+    control: Control = eqx.field(static=True, default="rate")
 
     def velocity_gradient(self, time: Float[Array, ""]) -> VelocityGradient:
         """Return L(t) in 1/s: its four components, or the scalar shear rate in simple shear."""
@@ -65,7 +71,7 @@ class FlowProtocol(eqx.Module):
     @property
     def quantity(self) -> RecordedQuantity:
         """What is recorded, as studies and results spell it."""
-        return quantity_of(self.kinematics)
+        return "strain" if self.control == "stress" else quantity_of(self.kinematics)
 
     def recorded_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return what a rheometer records of σ11, σ22, σ33, σ12 in this flow."""
@@ -225,7 +231,7 @@ def smooth_between_samples(protocol: FlowProtocol) -> FlowProtocol | None:
     jump = np.flatnonzero((np.diff(knots) <= 0.0) & (knots[1:] == 0.0))
     first = int(jump[-1]) + 1 if jump.size and float(protocol.begins) < 0.0 else 0
     read = knots[first:]
-    if len(read) < _FEWEST_KNOTS or np.any(np.diff(read) <= 0.0):
+    if protocol.control != "rate" or len(read) < _FEWEST_KNOTS or np.any(np.diff(read) <= 0.0):
         return None
     places = np.arange(_BETWEEN * (len(read) - 1) + 1) / _BETWEEN
     dense = np.interp(places, np.arange(len(read)), read)

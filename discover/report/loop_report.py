@@ -148,7 +148,7 @@ def _run_rows(result: LoopResult) -> list[dict[str, Any]]:
             "name": record.name,
             "held_out": record.held_out,
             "samples": record.time.size,
-            "end": float(record.time[-1]),
+            "end": float(record.time[-1]) if record.is_transient else None,
             "rate": float(np.max(np.abs(record.rate))),
             "stress": float(np.sqrt(np.mean(record.measured**2))),
             "before": float(record.errors[0]),

@@ -90,7 +90,10 @@ def _loop_sure(result: LoopResult) -> str:
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
+    linear = result.remaining.get("linear_error") or 0.0
     noise = f"where noise explains {percent(result.noise_floor)}"
+    if linear > result.noise_floor:
+        noise += f" and the misfit of the linear sweep by its modes {percent(linear)}"
     if not result.remaining.get("noise_known", True):
         noise = "of which nobody knows how much is noise"
     parts.append(f"on the fitted runs {told}, {noise}")

@@ -87,6 +87,17 @@ def krogstad_weights(
     )
 
 
+def relax(
+    source: Float[Array, ""],
+    decay: Float[Array, ""],
+    state: Float[Array, ""],
+    width: Float[Array, ""],
+) -> Float[Array, ""]:
+    """Return s after a step of ds/dt = source − decay · s with both of them constant, exactly."""
+    z = -decay * width
+    return state * jnp.exp(z) + source * width * phi_functions(z)[0]
+
+
 class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     """Fourth-order exponential Runge–Kutta method   [Krogstad 2005, JCP 203, 72].
 

@@ -20,6 +20,9 @@ _FEWEST_HISTORY_STEPS = 100
 # Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
 _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
 
+# Of a run at a given stress: steps of a jump, growth of those after it, steps between samples
+_JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.08, 2
+
 # A rate is constant while it changes by less than this fraction from sample to sample
 _CHANGE = 0.05
 
@@ -121,6 +124,57 @@ def make_grid(
         + [anchors[-1:]]
     )
     return grid, np.searchsorted(grid, times)
+
+
+def stress_grid(
+    protocol: FlowProtocol,
+    times: Float[np.ndarray, " n"],
+    strain: Float[np.ndarray, " n"],
+    strain_step: float = 0.25,
+) -> Float[np.ndarray, " s"]:
+    """Return step times for a run at a given stress.
+
+    Every sample and every kink of the imposed stress is a step. A jump, which takes a short time,
+    is gone through in even steps, and what follows it in steps that grow with the time since.
+    Between samples no step takes more than `strain_step` of the strain recorded there.
+
+    Parameters
+    ----------
+    protocol
+        With the imposed stress as its table.
+    times, strain
+        Of the samples, shape (n,).
+    strain_step
+        Largest strain of one step.
+    """
+    begins, end = float(protocol.begins), float(times[-1])
+    knots = np.asarray(protocol.table_times)
+    levels = np.asarray(protocol.table_rates)
+    knots_inside = knots[(knots >= begins) & (knots <= end)]
+    gap = float(np.min(np.diff(times))) if len(times) > 1 else end
+    parts = [np.array([begins]), times, knots_inside]
+    jumps = (np.diff(knots) < 0.5 * gap) & (np.diff(levels) != 0.0)
+    for start, stop in zip(knots[:-1][jumps], knots[1:][jumps], strict=True):
+        parts.append(np.linspace(start, stop, _JUMP_STEPS + 1))
+        later = times[times > stop]
+        if later.size:
+            count = int(np.ceil(np.log((end - start) / (stop - start)) / np.log1p(_GROWTH)))
+            parts.append(start + np.geomspace(stop - start, end - start, max(count, 2)))
+    anchors = np.unique(np.concatenate(parts))
+    anchors = anchors[(anchors >= begins) & (anchors <= end)]
+    moved = np.abs(np.diff(np.interp(anchors, times, strain)))
+    pieces = np.maximum(_STEPS_BETWEEN, np.ceil(moved / strain_step)).astype(int)
+    if np.sum(pieces) > MAX_GRID_POINTS:
+        raise InputError(
+            f"A run at a given stress with {len(times)} samples and strains up to "
+            f"{np.max(np.abs(strain)):g} would need {np.sum(pieces)} steps (at most "
+            f"{MAX_GRID_POINTS}). Check the unit of the strain, or thin the run."
+        )
+    filled = [
+        a + (b - a) * np.arange(n) / n
+        for a, b, n in zip(anchors[:-1], anchors[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*filled, anchors[-1:]])
 
 
 def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:

@@ -8,6 +8,7 @@ import numpy as np
 from discover.dataset import Dataset, LinearSweep
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
+from discover.dataset.material_functions import TABLES
 from discover.dataset.run import SLOWEST_RATE, require_signal
 from discover.effects import KnownEffect, known_effects
 from discover.errors import InputError
@@ -134,10 +135,11 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out
+    dataset, named, fit = _with_tables(dataset, study, named)
     if data.observe is not None:
-        dataset, named, fit_names = _observed(dataset, data.observe, named, data.fit)
+        dataset, named, fit_names = _observed(dataset, data.observe, named, fit)
     else:
-        fit_names = tuple(data.fit or (name for name in dataset.names if name not in named))
+        fit_names = tuple(fit or (name for name in dataset.names if name not in named))
     held_out = dataset.select(named)
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
@@ -149,6 +151,29 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     fit = dataset.select(fit_names)
     require_signal(fit.runs)
     return StudyData(dataset, fit, held_out, each)
+
+
+def _with_tables(
+    dataset: Dataset, study: Study, held_out: tuple[str, ...]
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...] | None]:
+    """Return the data with the tables beside the runs among them, those held out, and those fitted.
+
+    A table judges, unless the study says that it is fitted or there is nothing else to fit.
+    """
+    data = study.data
+    asked = {kind: getattr(data, kind) for kind in TABLES if getattr(data, kind) is not None}
+    dataset.with_material_functions(list(asked))  # those that are not there are refused
+    tables = dataset.material_functions
+    roles = {kind: asked.get(kind, "judge" if len(dataset) else "fit") for kind in tables}
+    if data.held_out == "each":
+        # each run judges in turn, and nothing beside them
+        roles = {kind: role for kind, role in roles.items() if role == "fit" or kind in asked}
+    if not roles:
+        return dataset, held_out, data.fit
+    fitted = tuple(tables[kind].name for kind, role in roles.items() if role == "fit")
+    judging = tuple(tables[kind].name for kind, role in roles.items() if role == "judge")
+    fit = None if data.fit is None else (*data.fit, *(n for n in fitted if n not in data.fit))
+    return dataset.with_material_functions(list(roles)), (*held_out, *judging), fit
 
 
 def _observed(
@@ -325,15 +350,28 @@ def _linear_start(dataset: Dataset) -> dict[str, float]:
     """Return a modulus and relaxation time of the right order from the runs themselves.
 
     The relaxation time is that of the slowest change a run can show, a tenth of the median
-    duration; the modulus follows from the largest stress over rate times that.
+    duration, or the inverse of a flow curve's middle rate; the modulus follows from the largest
+    stress over rate times that.
     """
-    time = 0.1 * float(np.median([run.time[-1] for run in dataset]))
-    viscosity = np.median(
-        [
-            np.max(np.abs(run.stress)) / np.max(np.abs(run.rate))
-            for run in dataset
-            if np.max(np.abs(run.rate)) > SLOWEST_RATE and np.any(run.stress)
-        ]
-        or [1.0]
-    )
-    return {"modulus_Pa": float(viscosity / max(time, 1e-300)), "relaxation_time_s": time}
+    times = [
+        1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
+        if run.protocol.control == "steady"
+        else 0.1 * run.time[-1]
+        for run in dataset
+    ]
+    time = float(np.median(times))
+    viscosities = [
+        np.max(np.abs(run.stress)) / np.max(np.abs(run.rate))
+        for run in dataset
+        if np.max(np.abs(run.rate)) > SLOWEST_RATE and np.any(run.stress)
+    ]
+    moduli = [
+        float(np.max(np.abs(run.stress)) / np.max(np.abs(run.strain)))
+        for run in dataset
+        if run.strain is not None and np.any(run.strain)
+    ]
+    if viscosities or not moduli:
+        modulus = float(np.median(viscosities or [1.0])) / max(time, 1e-300)
+    else:
+        modulus = float(np.median(moduli))
+    return {"modulus_Pa": modulus, "relaxation_time_s": time}

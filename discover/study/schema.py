@@ -55,6 +55,10 @@ def _not_tiny(value: float) -> float:
 Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
 
 
+Role = Literal["fit", "judge"] | None
+"""What a table beside the runs is for; by default it judges, unless there is no run to fit."""
+
+
 class Synthetic(Section):
     """Data computed from a known law instead of measured."""
 
@@ -76,8 +80,11 @@ class Data(Section):
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
     rate_before: str | None = None
-    observe: tuple[Literal["sigma12", "tensile_stress", "N1", "N2"], ...] | None = None
+    observe: tuple[Literal["sigma12", "tensile_stress", "N1", "N2", "strain"], ...] | None = None
     sequence: str | None = None
+    flow_curve: Role = None
+    relaxation: Role = None
+    creep: Role = None
 
     @model_validator(mode="after")
     def _one_source(self):

@@ -27,8 +27,10 @@ from discover.dataset.load import (
     read_index,
     resolve_folder,
 )
+from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.run import Run, require_signal
+from discover.dataset.run_table import run_line
 from discover.dataset.table import Table, read_table, shown
 from discover.errors import InputError
 
@@ -98,14 +100,24 @@ def check_folder(
     for text, files in converted.items():
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
-    for run in runs:
+    transients = [run for run in runs if run.protocol.control == "rate"]
+    for run in transients:
         doubts = list(doubts_of_start(run, sweep, spectrum))
         if not doubts and spectrum is None:
             doubts = doubts_of_unseen_start(run)
         findings += doubts
-    findings += against_linear_theory(runs, sweep, spectrum)
-    findings += doubts_among_runs(runs)
-    findings += _folder(root, index, runs)
+    findings += against_linear_theory(transients, sweep, spectrum)
+    findings += doubts_among_runs(transients)
+    try:
+        tables = read_material_functions(root, index.columns["file"])
+    except InputError as error:
+        tables = {}
+        findings.append(Finding("error", "tables", "", str(error)))
+    for table in tables.values():
+        what = f"{table.name} is taken for a {run_line(table)['flow']}"
+        text = f"{what}, {len(table)} samples: it judges, unless the study says that it is fitted."
+        findings.append(Finding("note", "tables", table.name, text))
+    findings += _folder(root, index, [*runs, *tables.values()])
     rank = {"error": 0, "warning": 1, "note": 2}
     return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
 
@@ -232,11 +244,12 @@ def _sweep(
 
 def _digest(run: Run) -> bytes:
     """Return what tells runs of different samples apart, however many there are."""
-    return hashlib.sha256(run.time.tobytes() + run.stress.tobytes()).digest()
+    return hashlib.sha256(run.time.tobytes() + run.recorded.tobytes()).digest()
 
 
 def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
-    listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE}
+    tables = {f"{kind}.csv" for kind in TABLES}
+    listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE, *tables}
     try:
         others = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
     except OSError:

@@ -48,6 +48,9 @@ def doubts_of_run(run: Run) -> Iterator[Finding]:
         yield warn(
             "samples", f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
         )
+    if run.protocol.control != "rate":
+        yield from _at_given_stress(run)
+        return
     if not run.flows:
         yield warn(
             "rate",
@@ -76,6 +79,27 @@ def doubts_of_run(run: Run) -> Iterator[Finding]:
             yield from _normal_stress(run)
     else:
         yield from _cycles(run)
+
+
+def _at_given_stress(run: Run) -> Iterator[Finding]:
+    """Yield what is doubtful of the strain that a given stress was answered with."""
+    strain = run.recorded
+    if np.ptp(strain) <= 1e-9 * np.max(np.abs(strain)):
+        yield Finding(
+            "warning",
+            "strain",
+            run.name,
+            f"The strain in {run.name} is the same in every sample, whatever the stress. Check "
+            "the column.",
+        )
+    elif float(strain @ run.stress) < 0.0:
+        yield Finding(
+            "warning",
+            "strain",
+            run.name,
+            f"The strain in {run.name} goes against the stress that is imposed. Change the sign "
+            "of one of the two columns.",
+        )
 
 
 def spikes(run: Run) -> Float[np.ndarray, " k"]:

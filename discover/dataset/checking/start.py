@@ -46,7 +46,7 @@ def doubts_of_start(
     sweep, spectrum
         The linear sweep and its relaxation modes, if there are any.
     """
-    if not _is_loaded_at_first(run):
+    if run.protocol.control != "rate" or not _is_loaded_at_first(run):
         return
     size, first = _largest_and_first(run)
     if _only_falls(run):

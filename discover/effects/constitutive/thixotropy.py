@@ -12,6 +12,7 @@ class Thixotropy(StateEffect):
     """
 
     rest = 1.0
+    acts_on_steady_states = True
 
     def source_and_decay(self, values, shear_rate, stress):
         """Return 1/t_b and 1/t_b + k |γ̇|."""

@@ -6,6 +6,8 @@ from discover.effects.base import EffectParameter, KinematicEffect
 class RateGain(KinematicEffect):
     """The rate felt is (1 + g) times the commanded one."""
 
+    acts_on_steady_states = True
+
     def felt_rate(self, values, instrument_times, shear_rate):
         """Return (1 + g) γ̇."""
         del instrument_times

@@ -8,6 +8,8 @@ from discover.effects.base import EffectParameter, SeriesElement
 class WallSlip(SeriesElement):
     """Slip in proportion to the stress, γ̇_felt = γ̇ − s σ   [Navier 1823; Yoshimura 1988]."""
 
+    acts_on_steady_states = True
+
     def slip_and_compliance(self, values):
         """Return s and 0."""
         return values[0], jnp.zeros_like(values[0])

@@ -8,6 +8,8 @@ from discover.effects.base import EffectParameter, SignalEffect
 class BearingFriction(SignalEffect):
     """A torque against the motion, of constant size, is recorded with the stress (Coulomb)."""
 
+    acts_on_steady_states = True
+
     def recorded_stress(self, values, record):
         """Return σ + σ_f sign(γ̇), with the rate of the tool, whatever the fluid feels of it."""
         return record.stress + values[0] * jnp.sign(record.tool_rate)

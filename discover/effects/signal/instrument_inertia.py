@@ -26,6 +26,10 @@ class InstrumentInertia(SignalEffect):
         # the rate is per second of material time; the tool moves on the instrument's clock
         return record.stress + values[0] * record.clock_factor * at_points
 
+    def inertia(self, values):
+        """Return I."""
+        return values[0]
+
 
 EFFECT = InstrumentInertia(
     name="instrument_inertia",

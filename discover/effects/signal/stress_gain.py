@@ -6,6 +6,8 @@ from discover.effects.base import EffectParameter, SignalEffect
 class StressGain(SignalEffect):
     """The stress recorded is (1 + g) times the true one."""
 
+    acts_on_steady_states = True
+
     def recorded_stress(self, values, record):
         """Return (1 + g) σ."""
         return (1.0 + values[0]) * record.stress

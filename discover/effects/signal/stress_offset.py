@@ -6,6 +6,8 @@ from discover.effects.base import EffectParameter, SignalEffect
 class StressOffset(SignalEffect):
     """A constant is added to the stress recorded."""
 
+    acts_on_steady_states = True
+
     def recorded_stress(self, values, record):
         """Return σ + σ₀."""
         return record.stress + values[0]

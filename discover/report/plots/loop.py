@@ -34,11 +34,26 @@ _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the dura
 
 
 def _through_decades(record: RunRecord) -> bool:
-    return runs_through_decades(record.time, record.rate)
+    at_rest = record.control == "stress"  # in creep the stress is constant, and not the rate
+    return runs_through_decades(record.time, np.ones(1) if at_rest else record.rate)
 
 
 def _recorded(records: Sequence[RunRecord]) -> str:
     return recorded_symbol(record.quantity for record in records)
+
+
+def _label(records: Sequence[RunRecord]) -> str:
+    symbol = _recorded(records)
+    return symbol if all(r.quantity == "strain" for r in records) else f"{symbol} (Pa)"
+
+
+def _as_flow_curve(panel, record: RunRecord) -> None:
+    """Draw stress over rate with logarithmic axes, from a little below the least that was seen."""
+    seen = record.measured[record.measured > 0.0]
+    panel.set_xscale("log")
+    if seen.size == record.measured.size:
+        panel.set_yscale("log")
+        panel.set_ylim(0.5 * float(np.min(seen)), 3.0 * float(np.max(seen)))
 
 
 def _what_is_drawn(records: Sequence[RunRecord]) -> str:
@@ -60,7 +75,8 @@ def runs_picture(result: LoopResult) -> Picture:
             panel.set_visible(False)
         for panel, record in zip(axes.ravel(), records, strict=False):
             every = max(1, record.time.size // 60)
-            draw_run(panel, record, record.time, slice(None, None, every), slice(None))
+            along = record.time if record.is_transient else np.abs(record.rate)
+            draw_run(panel, record, along, slice(None, None, every), slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -68,13 +84,20 @@ def runs_picture(result: LoopResult) -> Picture:
             panel.set_ylim(low - margin, high + margin)
             if _through_decades(record):
                 make_logarithmic(panel.xaxis)
-            if high > _THOUSANDS:
+            if not record.is_transient:
+                _as_flow_curve(panel, record)
+            elif high > _THOUSANDS:
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
-        for panel in axes[-1]:
-            panel.set_xlabel("time (s)")
-        for panel in axes[:, 0]:
-            panel.set_ylabel(f"{_recorded(records)} (Pa)")
+        below = {panel for panel in axes[-1]}
+        for panel, record in zip(axes.ravel(), records, strict=False):
+            if not record.is_transient:
+                panel.set_xlabel("shear rate (1/s)")
+            elif panel in below:
+                panel.set_xlabel("time (s)")
+        for row in range(rows):
+            panel_records = records[row * columns : (row + 1) * columns]
+            axes[row, 0].set_ylabel(_label(panel_records[:1]))
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -140,11 +163,15 @@ def shortened(name: str, longest: int = 30) -> str:
 
 def residual_picture(result: LoopResult) -> Picture:
     """Return the residual against time and strain, before and after."""
-    start_ups = all(map(_through_decades, result.records))
+    records = [record for record in result.records if record.is_transient]
+    only_steady = not records
+    records = records or list(result.records)
+    start_ups = only_steady or all(map(_through_decades, records))
+    labels = ("shear rate (1/s)", _label(records)) if only_steady else ("time (s)", "strain")
     with figure(2, 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
             limit = 0.0
-            for record in result.records:
+            for record in records:
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
                     "color": _HELD if record.held_out else _FIT,
@@ -152,25 +179,28 @@ def residual_picture(result: LoopResult) -> Picture:
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
                 }
-                axes[row, 0].plot(record.time, relative, **style)
+                along = (
+                    (record.rate, record.measured) if only_steady else (record.time, record.strain)
+                )
+                axes[row, 0].plot(along[0], relative, **style)
                 # a logarithmic axis has no place for strains against the positive direction
-                strain = np.abs(record.strain) if start_ups else record.strain
-                axes[row, 1].plot(strain, relative, **style)
+                axes[row, 1].plot(np.abs(along[1]) if start_ups else along[1], relative, **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
-            for panel, label in ((axes[row, 0], "time (s)"), (axes[row, 1], "strain")):
+            for panel, label in zip(axes[row], labels, strict=True):
                 if start_ups:
                     make_logarithmic(panel.xaxis)
                 panel.set_xlabel(label if row else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-            axes[row, 0].set_ylabel(f"residual (% of rms {_recorded(result.records)})")
+            axes[row, 0].set_ylabel(f"residual (% of rms {_recorded(records)})")
             axes[row, 0].set_title(title, loc="left")
         legend_above(drawing, axes)
         return picture(
             drawing,
             "residual",
-            "Prediction minus measurement, over each run's root-mean-square stress, against time "
-            "and strain. Note the different scales above and below. What is left should look like "
+            "Prediction minus measurement, over each run's root-mean-square stress, against "
+            + ("rate and stress" if only_steady else "time and strain")
+            + ". Note the different scales above and below. What is left should look like "
             "noise around zero; anything else is an effect still missing.",
         )
 

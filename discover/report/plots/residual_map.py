@@ -50,19 +50,24 @@ class ResidualRow:
 
 def loop_residual_map(result: LoopResult) -> Picture:
     """Return the residual of every run before and after, over time or strain."""
-    records = sorted(result.records, key=lambda r: (r.held_out, np.max(np.abs(r.rate))))
-    started = all(runs_through_decades(r.time, r.rate) for r in records)
+    transients = [record for record in result.records if record.is_transient]
+    steady = not transients
+    records = sorted(
+        transients or result.records, key=lambda r: (r.held_out, np.max(np.abs(r.rate)))
+    )
+    started = steady or all(runs_through_decades(r.time, r.rate) for r in records)
     panels = {}
     for stage, title in ((0, "declared model"), (-1, "augmented model")):
         panels[title] = [
             ResidualRow(
                 f"{shortened(r.name)}{' (held out)' if r.held_out else ''}",
-                r.strain if started else r.time,
+                r.rate if steady else r.strain if started else r.time,
                 r.relative_residual[stage],
             )
             for r in records
         ]
-    return _draw(panels, "strain" if started else "time (s)", started, "from slow to fast")
+    label = "shear rate (1/s)" if steady else "strain" if started else "time (s)"
+    return _draw(panels, label, started, "from slow to fast")
 
 
 def comparison_residual_map(comparison: Comparison) -> Picture | None:

@@ -1,0 +1,99 @@
+"""The fluid and what gives way in series with it, as the integrators take them."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.effects import StateEffect
+from discover.protocols.kinematics import Kinematics
+
+
+class Modes(NamedTuple):
+    """Modes: moduli in Pa, relaxation times in s, both shape (k,)."""
+
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+
+
+class Series(NamedTuple):
+    """Elements in series with the fluid: slip s in 1/(Pa s) and compliance C in 1/Pa."""
+
+    slip: Float[Array, ""]
+    compliance: Float[Array, ""]
+
+
+class Dynamics(NamedTuple):
+    """How the modes change, and what changes with them.
+
+    Attributes
+    ----------
+    slope
+        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
+        shape (k,), in simple shear, else four components, shape (4, k).
+    linear_relaxation
+        Whether −σ is part of it; it is then integrated exactly.
+    declared, extra
+        The declared modes, and those of effects. Apart, because the weights of the declared ones
+        depend on no trial and are then computed once for all trials.
+    states
+        State effects and their parameters.
+    series
+        Elements in series with the fluid; None where there can be none.
+    viscosity
+        Recorded stress beside the modes at unit rate, in Pa s.
+    """
+
+    slope: Callable
+    linear_relaxation: bool
+    declared: Modes
+    extra: Modes | None
+    states: dict[StateEffect, Float[Array, " p"]]
+    series: Series | None
+    viscosity: Float[Array, ""]
+
+    @property
+    def modes(self) -> Modes:
+        """All modes, the declared ones first."""
+        if self.extra is None:
+            return self.declared
+        return Modes(
+            *(jnp.concatenate(pair) for pair in zip(self.declared, self.extra, strict=True))
+        )
+
+    def rest(self) -> tuple[Float[Array, "4 k"], tuple[Float[Array, ""], ...]]:
+        """Return modes and states at rest."""
+        modulus = self.modes.modulus
+        levels = (jnp.full((), effect.rest, dtype=modulus.dtype) for effect in self.states)
+        return jnp.zeros((4, len(modulus))), tuple(levels)
+
+    def combined(self, factor: str, levels) -> Float[Array, ""]:
+        """Return the product of a factor of all states: ``modulus_factor`` or ``time_factor``."""
+        total = jnp.ones(())
+        for (effect, values), level in zip(self.states.items(), levels, strict=True):
+            total = total * getattr(effect, factor)(values, level)
+        return total
+
+    def change(self, stress, rate, slow, flow: Kinematics | None):
+        """Return dσ/dt of each mode in its own time, with all times longer by a factor.
+
+        With all times longer the law holds in its own time, which runs slower.
+        """
+        gradient = rate if flow is None else flow.gradient[:, None] * rate
+        if not self.states:
+            return self.slope(stress, self.modes.relaxation_time * gradient)
+        return self.slope(stress, slow * self.modes.relaxation_time * gradient) / slow
+
+    def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
+        """Return the recorded stress of the modes in Pa, without the factor of the states."""
+        return (stress[3] if flow is None else flow.stress(stress)) @ self.modes.modulus
+
+    def sheared(self, stress, rate, flow: Kinematics | None):
+        """Return the stress and the rate that a state feels.
+
+        Those of a shear of the same intensity that does the same work.
+        """
+        if flow is None:
+            return stress[3] @ self.modes.modulus, rate
+        return flow.equivalent_shear_stress(stress) @ self.modes.modulus, flow.intensity * rate

@@ -1,0 +1,82 @@
+"""Steady states of a fluid, one for each rate of a flow curve."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.forward.dynamics import Dynamics
+from discover.protocols.kinematics import Kinematics
+
+# Pseudo-time steps, from a fraction of the fastest time of the flow to where a step is Newton's
+_STEPS, _FIRST, _LAST = 60, 0.05, 1e8
+
+
+def steady_states(
+    dynamics: Dynamics, rates: Float[Array, " n"], flow: Kinematics | None = None
+) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+    """Return the recorded stress of the modes in Pa and the felt rate in 1/s in steady flow.
+
+    Each state is approached from rest by linearly implicit Euler steps in pseudo-time that grow
+    until they are Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]. Where a law has
+    several steady states it is the one that a start-up leads to; where it has none, or the flow
+    runs away, the values are not finite or far off.
+
+    Parameters
+    ----------
+    dynamics
+        The fluid; of elements in series only slip acts.
+    rates
+        Of the tool, in 1/s, shape (n,); zero is rest.
+    flow
+        Which flow has these rates; None is simple shear.
+    """
+
+    def one(rate):
+        return _approach(dynamics, rate, flow)
+
+    return jax.vmap(one)(rates)
+
+
+def _approach(dynamics: Dynamics, rate, flow):
+    modes = dynamics.modes
+    stress, levels = dynamics.rest()
+    intensity = 1.0 if flow is None else flow.intensity
+    weissenberg = intensity * jnp.abs(rate) * modes.relaxation_time
+    first = _FIRST / (1.0 + weissenberg)
+    growth = (_LAST / first) ** (1.0 / (_STEPS - 1))
+
+    def step(carry, number):
+        stress, levels, felt = carry
+        slow = dynamics.combined("time_factor", levels)
+
+        def change(state):
+            return dynamics.change(state, felt, slow, flow)
+
+        now, tangent = jax.linearize(change, stress)
+        # each mode changes by itself: four directions give the tangent of all of them
+        unit = jnp.eye(4)[:, :, None] * jnp.ones(stress.shape)
+        jacobian = jnp.moveaxis(jax.vmap(tangent)(unit), 2, 0)  # mode, direction, component
+        width = first * growth**number
+        matrix = jnp.eye(4) / width[:, None, None] - jnp.swapaxes(jacobian, 1, 2)
+        stress = stress + jnp.linalg.solve(matrix, now.T[:, :, None])[:, :, 0].T
+        sheared, sheared_rate = dynamics.sheared(stress, felt, flow)
+        sheared = dynamics.combined("modulus_factor", levels) * sheared
+        levels = tuple(
+            _steady_level(effect, values, sheared_rate, sheared)
+            for effect, values in dynamics.states.items()
+        )
+        if dynamics.series is not None:
+            # σ/γ̇ changes more slowly than σ: the iteration converges however strong the slip
+            viscosity = dynamics.viscosity + sheared / jnp.where(felt == 0.0, 1.0, felt)
+            felt = rate / (1.0 + dynamics.series.slip * viscosity)
+        return (stress, levels, felt), None
+
+    start = (stress, levels, jnp.asarray(rate, dtype=stress.dtype))
+    (stress, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(_STEPS, dtype=float))
+    scale = dynamics.combined("modulus_factor", levels)
+    return scale * dynamics.recorded(stress, flow), felt
+
+
+def _steady_level(effect, values, rate, stress):
+    source, decay = effect.source_and_decay(values, rate, stress)
+    return source / decay

@@ -1,0 +1,83 @@
+"""Protocols that impose a stress, or rates each held until the flow is steady."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.protocols.protocol import FlowProtocol, measured_rate
+
+# A step of stress: over this share of the time to the next sample. A jump of the record is one
+# that exceeds this share of its largest stress, between samples that differ by less than the other
+_AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.3, 0.05
+
+
+def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
+    """Return rates each held until the flow is steady: a flow curve, one sample for each rate.
+
+    Parameters
+    ----------
+    rates
+        In 1/s.
+    """
+    counted = np.arange(1.0, len(rates) + 1.0)
+    return replace(measured_rate(counted, rates), control="steady")
+
+
+def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:
+    """Return the stress at samples as what is imposed, from rest at t = 0.
+
+    It goes in straight lines from sample to sample but where it jumps: at t = 0 if the first
+    samples hold one level, and between two levels (creep and recovery), where the jump comes right
+    after the last sample of the first. A jump takes a thousandth of the time to the next sample.
+
+    Parameters
+    ----------
+    times
+        In s, from 0 on, increasing, shape (n,), two at least.
+    stress
+        The recorded stress in Pa, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two samples, or no stress.
+    """
+    times, stress = np.asarray(times, dtype=float), np.asarray(stress, dtype=float)
+    size = float(np.max(np.abs(stress), initial=0.0))
+    if len(times) < 2 or size == 0.0:
+        raise InputError(
+            "A test at a given stress needs two samples or more and a stress other than 0; got "
+            f"{len(times)} samples, the largest stress {size:g} Pa. Leave the run out."
+        )
+    change = np.abs(np.diff(stress))
+    level = change < _LEVEL * size
+    knots, levels = list(times[times > 0.0]), list(stress[times > 0.0])
+    gap = float(times[1] - times[0]) if times[0] == 0.0 else float(times[0])
+    begins = 0.0
+    if level[0] and abs(stress[0]) > _JUMP * size:
+        begins = -_AT_ONCE * gap
+        knots, levels = [begins, 0.0, *knots], [0.0, stress[0], *levels]
+    else:
+        knots, levels = [0.0, *knots], [stress[0] if times[0] == 0.0 else 0.0, *levels]
+    for i in np.flatnonzero(change > _JUMP * size):
+        before = i == 0 or level[i - 1]
+        after = i + 1 == len(level) or level[i + 1]
+        if before and after:
+            at = times[i] + _AT_ONCE * (times[i + 1] - times[i])
+            place = int(np.searchsorted(knots, at))
+            knots.insert(place, at)
+            levels.insert(place, stress[i + 1])
+    return replace(
+        measured_rate(np.array(knots), np.array(levels)),
+        control="stress",
+        begins=jnp.asarray(begins),
+    )
+
+
+def jumps_at_start(protocol: FlowProtocol) -> bool:
+    """Return whether a stress is imposed at once at t = 0, as in creep."""
+    return protocol.control == "stress" and float(protocol.begins) < 0.0

@@ -1,0 +1,116 @@
+"""Tables beside the runs, and runs at a given stress, from files written by hand."""
+
+import numpy as np
+import pytest
+
+from discover.comparison import compare
+from discover.dataset import load_dataset
+from discover.errors import InputError
+from discover.study import parse_study
+from discover.study.build import load_study_data
+
+TABLES = {
+    "flow_curve.csv": "shear_rate_1_s,stress_kPa,N1_Pa\n1,0.02,5\n0.1,0.003,0.1\n10,0.1,90\n",
+    "relaxation.csv": "time_s,relaxation_modulus_Pa\n0.1,90\n1,40\n10,1\n",
+    "creep.csv": "time_s,compliance_1_Pa\n0.1,0.01\n1,0.02\n10,0.11\n",
+}
+RUN = "time_s,shear_rate_1_s,stress_Pa\n0.1,1,9\n0.5,1,40\n1,1,63\n2,1,86\n"
+
+
+def write(folder, files):
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def study(folder, **data):
+    return parse_study({"data": {"folder": str(folder), **data}})
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
+    folder = write(tmp_path, {name: TABLES[name]})
+    assert len(load_dataset(folder)) == 0
+    data = load_study_data(study(folder))
+    assert data.fit.names == (name,)
+    assert not len(data.held_out)
+
+
+def test_a_flow_curve_is_sorted_by_rate_and_converted(tmp_path):
+    run = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
+    np.testing.assert_allclose(run.rate, [0.1, 1.0, 10.0])
+    np.testing.assert_allclose(run.stress, [3.0, 20.0, 100.0])
+    np.testing.assert_allclose(run.observing("N1").recorded, [0.1, 5.0, 90.0])
+    assert run.protocol.control == "steady"
+
+
+def test_creep_and_relaxation_are_looked_at_where_they_are_linear(tmp_path):
+    tables = load_dataset(write(tmp_path, TABLES)).material_functions
+    creep, relaxation = tables["creep"], tables["relaxation"]
+    assert creep.quantity == "strain"
+    np.testing.assert_allclose(creep.strain / creep.stress, [0.01, 0.02, 0.11])
+    np.testing.assert_allclose(relaxation.stress / relaxation.strain, [90.0, 40.0, 1.0])
+    assert max(creep.strain.max(), relaxation.strain.max()) <= 0.01 * (1.0 + 1e-12)
+
+
+def test_a_table_beside_runs_judges_unless_it_is_fitted(tmp_path):
+    folder = write(tmp_path, {**TABLES, "runs.csv": "file\na.csv\n", "a.csv": RUN})
+    judging = load_study_data(study(folder))
+    assert judging.fit.names == ("a.csv",)
+    assert set(judging.held_out.names) == set(TABLES)
+    fitted = load_study_data(study(folder, flow_curve="fit"))
+    assert fitted.fit.names == ("a.csv", "flow_curve.csv")
+    assert set(fitted.held_out.names) == {"relaxation.csv", "creep.csv"}
+
+
+def test_what_is_recorded_and_not_observed_judges(tmp_path):
+    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    data = load_study_data(study(folder, flow_curve="fit", observe=["N1"]))
+    assert data.fit.names == ("flow_curve.csv (N1)",)
+    assert data.held_out.names == ("flow_curve.csv",)
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"creep": "fit"}, "has no creep.csv; it has flow_curve.csv"),
+        ({"observe": ["N2"]}, "observe names N2, which no run of .* has"),
+        ({"flow_curve": "use"}, "flow_curve"),
+    ],
+)
+def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
+    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    with pytest.raises(InputError, match=message):
+        load_study_data(study(folder, **keys))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("flow_curve.csv", "shear_rate_1_s,stress_Pa\n0,1\n1,2\n", "shear_rate .* line 2 holds 0"),
+        ("flow_curve.csv", "shear_rate_1_s\n1\n", "no column .*stress"),
+        ("creep.csv", "time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
+        ("creep.csv", "time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),
+        ("relaxation.csv", "time_s,relaxation_modulus_Pa\n", "relaxation.csv"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_file_and_line(tmp_path, name, text, message):
+    with pytest.raises(InputError, match=message):
+        load_dataset(write(tmp_path, {name: text}))
+
+
+def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
+    files = {
+        "runs.csv": "file,control\ncreep.csv,stress\n",
+        "creep.csv": "time_s,stress_Pa,strain\n0.1,5,0.01\n1,5,0.02\n10,5,0.11\n20,5,0.2\n",
+    }
+    run = load_dataset(write(tmp_path, files))["creep.csv"]
+    assert run.quantity == "strain"
+    np.testing.assert_allclose(run.recorded, [0.01, 0.02, 0.11, 0.2])
+    assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
+
+
+def test_the_comparison_refuses_what_its_learners_cannot_follow(tmp_path):
+    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    with pytest.raises(InputError, match=r"is a flow curve, .* discover close-loop fits it"):
+        compare(study(folder))
