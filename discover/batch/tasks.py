@@ -129,6 +129,7 @@ def run_close_loop(
     if there is not None:
         return there
     from discover.closed_loop import run_loop, run_loop_on_each
+    from discover.dataset.conditions import material_and_temperature
     from discover.report.loop_report import write_loop
     from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, forward_model, load_study_data
@@ -177,7 +178,8 @@ def run_close_loop(
         f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
-    write_loop(result, folder, study.name, summary, study.text)
+    conditions = material_and_temperature(data_of_study.dataset)
+    write_loop(result, folder, study.name, summary, study.text, conditions=conditions)
     ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
     return ended

@@ -89,6 +89,8 @@ class Comparison(PageView, NotebookView):
         The known part as an equation; None where it is not wanted.
     explanation
         Whether any law explains the training runs.
+    conditions
+        Material and temperature, where runs.csv names them.
     known_of
         The same for a learner, with the constants that were fitted along with it.
     known_effects
@@ -124,6 +126,7 @@ class Comparison(PageView, NotebookView):
     known_of: Mapping[str, Equation | None] = field(default_factory=dict)
     known_effects: Sequence[KnownEffect] = ()
     stood_for: tuple[str, ...] = ()
+    conditions: str = ""
 
     _page = "discover.report.in_memory:comparison_page"
 
@@ -272,6 +275,7 @@ class Comparison(PageView, NotebookView):
             "study": self.name,
             **self.explanation.to_json(),
             "data": self.data_summary,
+            "conditions": self.conditions,
             "known_part": self.known_part,
             "seed": self.seed,
             "learners": learners,

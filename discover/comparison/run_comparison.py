@@ -32,6 +32,7 @@ from discover.comparison.training import (
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.comparison.unseen_runs import hold_against_unseen
 from discover.dataset import Dataset
+from discover.dataset.conditions import material_and_temperature
 from discover.dataset.material_functions import at_measured_rate
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -179,6 +180,8 @@ def compare(
                 for law in CLASSICAL
             ]
             classical = classical_along(known.along, each, flows)
+    if known.along is not None and known.along.moves_modes:
+        statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -201,6 +204,7 @@ def compare(
         known=known_equation(model),
         known_of={name: known_equation(frame.model) for name, frame in frames.items()},
         known_effects=known.effects,
+        conditions=material_and_temperature(data.dataset),
         stood_for=() if known.along is None else known.along.twins,
         explanation=explanation,
         classical=classical,
@@ -378,6 +382,9 @@ def _require_one_split(data: StudyData) -> None:
         )
 
 
+_MODES_NOT_IN_BANDS = (
+    "A factor on the modes was fitted along, and its interval is in no band of N1 or N2."
+)
 _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 
 

@@ -15,6 +15,7 @@ from discover.comparison.flows import QUANTITIES, Flow
 from discover.comparison.identifiability import EXACT, SEPARATED, Rival, law_structure
 from discover.identify import Structure
 from discover.identify.bands import PredictionBand
+from discover.identify.relations import spell_briefly
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
 
@@ -228,7 +229,7 @@ def _without_structure(
         if example is not None:
             text += (
                 " Checked by simulation: "
-                + " ".join(f"{value:+.3g} {name}" for name, value in example.terms.items())
+                + spell_briefly(example.terms)
                 + f" gives the same σ12 but an N2 that differs by "
                 f"{100.0 * (example.errors_to_chosen['N2'] or 0.0):.2g} % of N1."
             )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.relations import spell
+from discover.identify.relations import spell_briefly
 
 EXACT = 1e-13
 """Singular value, relative to the largest of unit columns, that counts as zero.
@@ -48,7 +48,7 @@ class Direction:
     @property
     def text(self) -> str:
         """One sentence for a reader."""
-        what = spell(self.coefficients)
+        what = spell_briefly(self.coefficients)
         seen = [
             f"{name} ({self.changes[name]:.2g})"
             for name in ("N1", "N2")

@@ -68,6 +68,19 @@ def spell(coefficients: Mapping[str, float | int]) -> str:
     return text or "0"
 
 
+MOST_SPELLED = 4
+"""Terms that a sentence bears; more are a table."""
+
+
+def spell_briefly(coefficients: Mapping[str, float | int]) -> str:
+    """Return a sum of terms as `spell` does, of many terms only how many and the two largest."""
+    if len(coefficients) <= MOST_SPELLED:
+        return spell(coefficients)
+    largest = sorted(coefficients, key=lambda name: -abs(coefficients[name]))[:2]
+    first = spell({name: coefficients[name] for name in largest})
+    return f"{first} with {len(coefficients) - 2} smaller terms"
+
+
 @lru_cache(maxsize=8)
 def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     """Return every linear relation among the terms of a library in simple shear.

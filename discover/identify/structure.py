@@ -23,7 +23,7 @@ from discover.identify.directions import Direction, weak_directions
 from discover.identify.exact_series import compare_series
 from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.identify.laws_side_by_side import LawTerms, dense, joint_library
-from discover.identify.relations import TermRelation, spell, term_relations
+from discover.identify.relations import TermRelation, spell_briefly, term_relations
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
@@ -354,8 +354,8 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
         size = "" if examples[0].at_any_size else ", to first order"
         text = (
             f"{quantity} is not determined by {what}: {len(examples[0].coefficients)} terms more, "
-            f"h = {spell(examples[0].coefficients)} in any amount, change {quantity} and leave "
-            f"{what} as it is{size}.{unfelt}"
+            f"h = {spell_briefly(examples[0].coefficients)} in any amount, change {quantity} and "
+            f"leave {what} as it is{size}.{unfelt}"
         )
         return QuantityVerdict(quantity, "undetermined", text)
     if unfelt:

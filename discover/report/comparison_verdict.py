@@ -68,11 +68,20 @@ def _found(comparison: Comparison) -> str:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         parts.append(
             f"put into words, the neural network's largest term is "
-            f"{significant(largest.coefficient)} {readable(largest.term)}"
+            f"{significant(largest.coefficient)} {readable(largest.term)}{_of_projection(network)}"
         )
     elif network is not None and "tbnn_ude" in explanation.by:
         parts.append("put into words, the neural network found no term")
     return sentence([*parts, *_where_usable(comparison)])
+
+
+def _of_projection(network: LearnerOutcome) -> str:
+    """Return how well the words describe the network; empty where nobody asked."""
+    missed = network.details.get("projection_misfit")
+    if missed is None:
+        return ""
+    n = len(network.terms)
+    return f" ({n} term{'s' if n > 1 else ''} miss{'' if n > 1 else 'es'} {percent(missed)} of it)"
 
 
 _LIMITS = {

@@ -38,6 +38,7 @@ def write_loop(
     summary: str,
     study_text: str = "",
     run: dict | None = None,
+    conditions: str = "",
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
@@ -53,6 +54,8 @@ def write_loop(
         The study file, shown at the end.
     run
         What the page says of the run that made it, where that was no command.
+    conditions
+        Material and temperature, for the title.
 
     Returns
     -------
@@ -77,7 +80,7 @@ def write_loop(
     write_predictions(loop_predictions(result), folder)
     page = render(
         "loop.html",
-        name=name,
+        name=f"{name}, {conditions}" if conditions else name,
         summary=summary,
         result=result,
         questions=QUESTIONS,

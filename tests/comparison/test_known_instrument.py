@@ -81,6 +81,12 @@ def test_what_a_learner_cannot_be_told_is_refused(effects, words):
     assert words in str(caught.value)
 
 
+def test_an_effect_of_no_size_is_none_and_refused_by_nobody():
+    effects = {"tool_compliance": {"compliance": 0.0}, "transducer_lag": {"tau": 0.0}}
+    declared = with_known(declared_fluid(None, oscillations(gain=1.0)), effects)
+    assert absorbed(declared).effects == ()
+
+
 def trained(learner, study, model, runs, seed=0, progress=None, library=None):
     law = make_law("giesekus", {"alpha": MOBILITY})
     term = RecoveredTerm("sigma.sigma", MOBILITY, MOBILITY, (0.29, 0.31))

@@ -11,7 +11,11 @@ from discover.laws.expansion import law_of_terms
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.study.build import DeclaredModel
 
-_ONLY_LOOP = "Leave it out of [model] effects, or use discover close-loop, which knows it."
+ONLY_LOOP = (
+    "Leave it out of [model] effects, or, where it comes from an earlier result, give it an "
+    "amplitude of 0 there; discover close-loop knows it."
+)
+"""What to do with an effect that no learner can be told of."""
 _RATES = (1.0, 2.0)
 
 
@@ -30,16 +34,18 @@ def absorbed(declared: DeclaredModel) -> DeclaredModel:
     InputError
         If a learner cannot be given an effect as something known.
     """
+    # at zero amplitude an effect is none
+    declared = replace(declared, effects=tuple(k for k in declared.effects if k.values[0] != 0.0))
     for known in declared.effects:
         if isinstance(known.effect, StateEffect):
             raise InputError(
                 f"compare cannot take {known.name} as known: it gives the fluid a state that no "
-                f"law of stress and rate carries. {_ONLY_LOOP}"
+                f"law of stress and rate carries. {ONLY_LOOP}"
             )
         if isinstance(known.effect, SeriesElement):
             raise InputError(
                 f"compare cannot take {known.name} as known: the rate that the fluid feels would "
-                f"depend on the law that is looked for. {_ONLY_LOOP}"
+                f"depend on the law that is looked for. {ONLY_LOOP}"
             )
         if isinstance(known.effect, ConstitutiveEffect):
             declared = _with_effect(declared, known, known.effect)
@@ -56,7 +62,7 @@ def _with_effect(
     if shares is None:
         raise InputError(
             f"compare cannot take {known.name} as known: what it adds to the law is no sum of "
-            f"library terms. {_ONLY_LOOP}"
+            f"library terms. {ONLY_LOOP}"
         )
     law = declared.law
     for share in shares:
@@ -68,7 +74,7 @@ def _with_effect(
     if not np.isclose(beside[1], _RATES[1] * beside[0], rtol=1e-9):
         raise InputError(
             f"compare cannot take {known.name} as known: a learner is told of no stress beside the "
-            f"modes but a solvent's. {_ONLY_LOOP}"
+            f"modes but a solvent's. {ONLY_LOOP}"
         )
     modulus, relaxation_time = declared.modulus, declared.relaxation_time
     if isinstance(effect, ModeEffect):

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from discover.comparison.instrument.absorbed import ONLY_LOOP
 from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Record, SignalEffect
 from discover.errors import InputError
 from discover.forward import RunBatch, make_batch
@@ -93,8 +94,7 @@ def corrected(
         if np.max(row) > _POINTWISE:
             raise InputError(
                 f"compare cannot take {known.name} as known: it mixes the stress of earlier times "
-                "into the record, which cannot be undone in noise. Leave it out of [model] "
-                "effects, or use discover close-loop, which knows it."
+                f"into the record, which cannot be undone in noise. {ONLY_LOOP}"
             )
     found, made = {}, {}
     moves = any(isinstance(known.effect, KinematicEffect) for known in effects)

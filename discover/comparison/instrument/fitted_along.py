@@ -152,6 +152,11 @@ class FittedAlong:
         return found
 
     @property
+    def moves_modes(self) -> bool:
+        """Whether moduli or relaxation times are among them."""
+        return any(name in self.positions for name in MODE_CONSTANTS)
+
+    @property
     def free(self) -> list[int]:
         """Positions of the constants."""
         return list(self.positions.values())

@@ -50,7 +50,8 @@ def project(
     """Return the few library terms that best stand for a law's extra term.
 
     Forward selection with backward elimination on the value of h at the states of `cloud`. The
-    result describes the network; it is not fitted to the data.
+    result describes the network; it is not fitted to the data. There is one term at least, however
+    badly it describes h: the misfit says how badly.
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def project(
             if j not in support
         }
         best = min(trials.values())
-        if best > 0.9 * misfit:  # not worth a term
+        if support and best > 0.9 * misfit:  # not worth a term beside the others
             break
         near = [j for j, value in trials.items() if value <= SIMILAR * best + 1e-9]
         support.append(min(near, key=lambda j: (library.complexities[j], j)))
