@@ -67,9 +67,9 @@ def main() -> None:
     enable_compilation_cache()
     from discover.closed_loop import run_loop
     from discover.closed_loop.before_after import cut_to_strain
-    from discover.closed_loop.least_squares import fit_batch
     from discover.effects import make_effect
     from discover.forward.augmented_model import AugmentedModel
+    from discover.forward.least_squares import fit_batch
     from discover.forward.run_batch import data_scales, make_batch
     from discover.laws import Fluid, make_law
     from discover.simulate import simulate

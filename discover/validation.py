@@ -141,7 +141,7 @@ def _keys(model: type[BaseModel], location: tuple[Any, ...]) -> str:
         inner = [] if field is None else list(_models(field.annotation))
         if inner:
             model = inner[0]
-    return ", ".join(model.model_fields)
+    return ", ".join(field.alias or name for name, field in model.model_fields.items())
 
 
 def _models(annotation: Any):

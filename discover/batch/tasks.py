@@ -129,15 +129,14 @@ def run_close_loop(
     if there is not None:
         return there
     from discover.closed_loop import run_loop, run_loop_on_each
-    from discover.laws.registry import LAWS
     from discover.report.loop_report import write_loop
     from discover.report.verdicts import loop_verdict
-    from discover.study.build import declared_model, load_study_data
+    from discover.study.build import declared_model, forward_model, load_study_data
 
     progress("loading data", 0.0)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
-    declared = declared_for_loop(model)
+    declared = forward_model(model)
     stages = study.loop.max_effects + 1
     each = data_of_study.each
     if each:
@@ -174,13 +173,26 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {LAWS[model.law_name].described(model.parameters)}, {modes}. "
+        f"Declared model: {_described(model)}, {modes}{_beside(model)}. "
+        f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
     write_loop(result, folder, study.name, summary, study.text)
     ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
     return ended
+
+
+def _described(model) -> str:
+    from discover.laws.registry import LAWS
+
+    named = LAWS.get(model.law_name)
+    return model.law_name if named is None else named.described(model.parameters)
+
+
+def _beside(model) -> str:
+    """Return the effects of the declared model, in words."""
+    return f", beside them {', '.join(e.text for e in model.effects)}" if model.effects else ""
 
 
 def fit_declared(model, dataset):
@@ -206,9 +218,10 @@ def fit_declared(model, dataset):
         return model
     from discover.closed_loop import run_loop
     from discover.laws import make_law
+    from discover.study.build import forward_model
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name
-    fitted = run_loop(dataset, declared_for_loop(model), effects=["stress_offset"], max_effects=0)
+    fitted = run_loop(dataset, forward_model(model), effects=["stress_offset"], max_effects=0)
     values: dict[str, float] = {
         name: entry.value for name, entry in fitted.declared_parameters.items()
     }
@@ -229,30 +242,3 @@ def fit_declared(model, dataset):
 def _scaled(modes, values, name, factor):
     """Return a constant of the modes as fitted: itself for one mode, a factor on several."""
     return np.array([values[name]]) if name in values else modes * values.get(factor, 1.0)
-
-
-def declared_for_loop(model):
-    """Return the declared model as the closed loop takes it, with all that is left to be fitted."""
-    from discover.closed_loop import DeclaredModel
-
-    options = {
-        "solvent_viscosity": model.solvent_viscosity,
-        "linear_error": 0.0 if model.spectrum is None else model.spectrum.relative_error,
-    }
-    if not model.law.linear_relaxation:
-        return DeclaredModel(
-            model.law,
-            model.modulus,
-            model.relaxation_time,
-            fit_modulus="modulus_Pa" in model.free,
-            fit_relaxation_time="relaxation_time_s" in model.free,
-            **options,
-        )
-    return DeclaredModel.named(
-        model.law_name,
-        model.parameters,
-        model.modulus,
-        model.relaxation_time,
-        free=model.free,
-        **options,
-    )

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discover.closed_loop.least_squares import Fit
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
 
 ALIAS_COSINE = 0.99
 """Signatures that agree to this cosine are the same to first order."""
@@ -151,7 +151,7 @@ def attribute(
     # too; but they must not crowd out candidates of another kind
     twins.sort(key=lambda i: (waiting[i].complexity, -candidates[i].reduction))
     leading = heads[:leaders] + twins[:leaders]
-    if model.declared.free_positions:
+    if model.free_positions:
         # constants that were fitted without an effect may stand where every small amount of it is
         # worse: what points the wrong way is refitted from a finite amount
         silent = [i for i in order if candidates[i].reduction <= 0.0]

@@ -5,21 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
 
 from discover.closed_loop.attribution import CandidateScore, with_other_inner
-from discover.closed_loop.least_squares import (
+from discover.closed_loop.left_out import (
     FEWEST_FOLDS,
-    NO_PRIOR,
-    Fit,
-    Prior,
-    fit_batch,
     left_out_parts,
     part_errors,
     run_errors,
 )
 from discover.forward import AugmentedModel, Batch
-from discover.statistics import least_squares_covariance
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, intervals
 from discover.statistics.residual import judging, summarise
 
 IMPROVEMENT = 0.98
@@ -370,30 +365,3 @@ def _weakest(
     ]
     weakest = int(np.argmin(support))
     return float(support[weakest]), optional[weakest], fits[weakest]
-
-
-def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[float, float]]:
-    """Return the 95 % interval of each fitted parameter, by position.
-
-    From the curvature at the fit and the noise that its residual shows; see
-    `discover.statistics.least_squares_covariance`.
-    """
-    if not fit.free:
-        return {}
-    n_runs, n = fit.residual.shape
-    design = fit.jacobian.reshape(len(fit.free), -1).T
-    rows = np.arange(n_runs * n).reshape(n_runs, n)
-    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
-    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
-    independent = max(noise.effective_samples - len(fit.free), 1.0)
-    half = student.ppf(0.975, independent) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    bounds = {}
-    for position, h in zip(fit.free, half, strict=True):
-        value, low, high = fit.theta[position], model.low[position], model.high[position]
-        # a time must be positive, and what may be as short as that may be nothing
-        floor = 0.0 if 0.0 < low < 1e-6 * value else low
-        bounds[position] = (
-            float(floor if value - h < low else value - h),
-            float(min(value + h, high)),
-        )
-    return bounds

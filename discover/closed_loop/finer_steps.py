@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.least_squares import Fit
 from discover.dataset import Run
-from discover.effects import SeriesElement
+from discover.effects import AbstractEffect, SeriesElement
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, make_batch
+from discover.forward.least_squares import Fit
 from discover.protocols import smooth_between_samples
 
 _STRAIN_STEP = 0.05
@@ -38,7 +38,7 @@ def on_finer_steps(
     fit, active
         The fit and the effects in it.
     """
-    effects = [effect for effect in model.effects if effect.name in active]
+    effects = _in_use(model, active)
     if not any(isinstance(effect, SeriesElement) for effect in effects):
         return fit
     change = change_on_finer_steps(model, batch, runs, fit.theta, active)
@@ -75,7 +75,7 @@ def change_on_finer_steps(
     Zero where finer steps would be too many, or would not stay finite.
     """
     # without the candidates that were not chosen there is little to compile
-    effects = [effect for effect in model.effects if effect.name in active]
+    effects = _in_use(model, active)
     small = AugmentedModel(model.declared, effects)
     values = small.zero()
     shared = 2 + len(model.declared.free_parameters)
@@ -89,6 +89,11 @@ def change_on_finer_steps(
         return np.zeros(np.shape(batch.recorded))
     change = small.residuals([values], fine_batch)[0] - small.residuals([values], batch)[0]
     return change if np.all(np.isfinite(change)) else np.zeros_like(change)
+
+
+def _in_use(model: AugmentedModel, active: Sequence[str]) -> list[AbstractEffect]:
+    names = {*active, *(known.name for known in model.declared.effects)}
+    return [effect for effect in model.effects if effect.name in names]
 
 
 def _with_smooth_rate(run: Run) -> Run:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.least_squares import Fit, jacobians
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel, Batch, even
+from discover.forward.least_squares import Fit, jacobians
 from discover.statistics import least_squares_covariance
 from discover.statistics.unseen import Unseen
 

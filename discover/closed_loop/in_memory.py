@@ -1,6 +1,6 @@
 """A closed loop on data that a program holds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,11 +9,11 @@ from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import LoopResult
 from discover.dataset import Dataset
 from discover.errors import InputError
-from discover.forward import DeclaredModel
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
 from discover.study.build import DeclaredModel as DeclaredFluid
-from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid
+from discover.study.build import forward_model
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 
 
 def close_loop(
@@ -22,6 +22,7 @@ def close_loop(
     *,
     held_out: HeldOut = (),
     free: Sequence[str] = (),
+    known_effects: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] | None = None,
     **options: Any,
 ) -> LoopResult:
@@ -39,6 +40,10 @@ def close_loop(
     free
         What of the base is fitted along: parameters of its law, which must be one with a name, and
         ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
+    known_effects
+        Effects that are known beside the base, as ``[model] effects`` in a study, such as
+        ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
+        model and not proposed again.
     progress
         Called with a line of text now and then.
     **options
@@ -62,7 +67,7 @@ def close_loop(
         )
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
-    declared = _declared(fluid, free)
+    declared = forward_model(with_known(fluid, known_effects, free))
     options |= {"fit": divided.fit.names, "progress": progress}
     if divided.each:
         result = run_loop_on_each(divided.dataset, declared, **options)
@@ -80,28 +85,3 @@ def close_loop(
 def _described(fluid: DeclaredFluid) -> str:
     named = LAWS.get(fluid.law_name)
     return fluid.law_name if named is None else named.described(fluid.parameters)
-
-
-def _declared(fluid: DeclaredFluid, free: Sequence[str]) -> DeclaredModel:
-    options: dict[str, Any] = {
-        "solvent_viscosity": fluid.solvent_viscosity,
-        "linear_error": 0.0 if fluid.spectrum is None else fluid.spectrum.relative_error,
-    }
-    if isinstance(free, str):
-        raise InputError(f"free must be a list of names; got {free!r}. Write [{free!r}].")
-    modes = fluid.modulus, fluid.relaxation_time
-    if fluid.law_name in LAWS and fluid.law.linear_relaxation:
-        return DeclaredModel.named(fluid.law_name, fluid.parameters, *modes, free=free, **options)
-    unknown = [name for name in free if name not in ("modulus_Pa", "relaxation_time_s")]
-    if unknown:
-        raise InputError(
-            f"{unknown[0]!r} cannot be fitted: the law {fluid.law_name} has no name. Register it "
-            "with register_law."
-        )
-    return DeclaredModel(
-        fluid.law,
-        *modes,
-        fit_modulus="modulus_Pa" in free,
-        fit_relaxation_time="relaxation_time_s" in free,
-        **options,
-    )

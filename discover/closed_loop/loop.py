@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augment import FEWEST_SAMPLES, intervals
+from discover.closed_loop.augment import FEWEST_SAMPLES
 from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.before_after import (
     cut_to_strain,
@@ -17,9 +17,14 @@ from discover.closed_loop.before_after import (
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
-from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.result import LoopResult, Stage, StageParameter
+from discover.closed_loop.result import (
+    DeclaredEffect,
+    KnownParameter,
+    LoopResult,
+    Stage,
+    StageParameter,
+)
 from discover.closed_loop.search import Search
 from discover.closed_loop.search_checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.silence import fluid_is_silent, records_are_silent
@@ -39,6 +44,7 @@ from discover.effects import (
     make_effect,
     named_effects,
 )
+from discover.equations import Equation, law_terms
 from discover.errors import InputError
 from discover.forward import (
     MODULUS,
@@ -48,6 +54,7 @@ from discover.forward import (
     data_scales,
     make_batch,
 )
+from discover.forward.least_squares import Fit, intervals
 from discover.laws import Fluid
 from discover.statistics import isolated
 from discover.statistics.residual import Expectation, fast_part, summarise
@@ -136,6 +143,9 @@ def run_loop(
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
     _require_samples(fitted_runs, declared)
+    known = {effect.name for effect in declared.effects}
+    candidates = [effect for effect in candidates if effect.name not in known]
+    _require_possible(declared, [*fitted_runs, *held_runs])
     # of one mode nothing can differ from another's
     asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
     model = AugmentedModel(declared, asked, data_scales(fitted_runs))
@@ -219,7 +229,9 @@ def run_loop(
         rankings=tuple(search.rankings),
         records=tuple(records),
         declared_parameters=_declared_parameters(declared, current, bounds),
-        fluid=_fluid(model, current, active),
+        declared_effects=_declared_effects(model, current, bounds),
+        declared_law=_declared_law(declared, current),
+        fluid=_fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )
 
@@ -287,13 +299,25 @@ def _needed(run: Run, most: int) -> int:
 
 def _require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
     """Refuse what any law would fit."""
-    count, constants = sum(len(run) for run in runs), len(declared.free_positions)
+    count, constants = sum(len(run) for run in runs), declared.free_constants
     if count < FEWEST_SAMPLES + constants:
         raise InputError(
             f"The runs to fit ([data] fit) hold {count} samples in all, for {constants} constants "
             f"to be fitted; at least {FEWEST_SAMPLES + constants} are needed to tell a law from "
             "another. Sample more often, or declare the constants."
         )
+
+
+def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
+    """Refuse a known effect that the rates of these runs contain already."""
+    measured = [run.name for run in runs if run.rate_is_measured]
+    for known in declared.effects:
+        if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
+            raise InputError(
+                f"The known effect {known.name} lies between the command and the tool, and the "
+                f"rate of {measured[0]} was measured at the tool, so it contains it already. Leave "
+                "the effect out."
+            )
 
 
 def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
@@ -415,6 +439,34 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
         value, low, high = (float(v) for v in values)
         out[name] = StageParameter(value, (low, high), unit)
     return out
+
+
+def _declared_effects(model: AugmentedModel, fit: Fit, bounds) -> tuple[DeclaredEffect, ...]:
+    """Return the known effects with their values in the final model."""
+    found = []
+    for known in model.declared.effects:
+        parameters = {
+            p.name: KnownParameter(float(fit.theta[at]), bounds.get(at), p.unit)
+            for p, at in zip(known.effect.parameters, model.positions(known.name), strict=True)
+        }
+        found.append(DeclaredEffect(known.name, known.effect.kind, parameters))
+    return tuple(found)
+
+
+def _declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
+    """Return the declared law with its modes as fitted; None where it is no sum of terms."""
+    law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
+    try:
+        terms = law_terms(law)
+    except InputError:
+        return None
+    return Equation(
+        terms,
+        tuple(map(float, declared.modulus * np.exp(fit.theta[0]))),
+        tuple(map(float, declared.relaxation_time * np.exp(fit.theta[1]))),
+        law.linear_relaxation,
+        float(declared.solvent_viscosity),
+    )
 
 
 def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:

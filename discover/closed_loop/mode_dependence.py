@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.closed_loop.augment import INDISTINGUISHABLE, evidence
-from discover.closed_loop.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 from discover.effects import ModeDependence
 from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 from discover.statistics.residual import summarise
 
 _STARTS = (-0.5, 0.5)

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.finer_steps import change_on_finer_steps
-from discover.closed_loop.least_squares import Fit
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
 from discover.statistics.residual import judging
 
 COMPUTED = 1e-6

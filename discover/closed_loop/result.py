@@ -74,6 +74,32 @@ class Stage:
 
 
 @dataclass(frozen=True)
+class KnownParameter:
+    """A parameter of an effect that was declared; its 95 % interval, where it was fitted."""
+
+    value: float
+    ci95: tuple[float, float] | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class DeclaredEffect:
+    """An effect that was part of the declared model.
+
+    Attributes
+    ----------
+    effect, kind
+        Its name and kind.
+    parameters
+        Its parameters in the final model.
+    """
+
+    effect: str
+    kind: str
+    parameters: dict[str, KnownParameter]
+
+
+@dataclass(frozen=True)
 class Fold:
     """A loop that left one run out, where each run is held out in turn.
 
@@ -117,6 +143,11 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_parameters
         What was fitted of the declared model: modulus in Pa and relaxation time in s, or for
         several modes a common factor on each, and parameters of the law.
+    declared_effects
+        Effects that were part of the declared model, and so are no finding.
+    declared_law
+        The declared law with its modes as finally fitted, without effects; None where it cannot be
+        written out.
     fluid
         The augmented fluid, without instrument effects; None where an effect gives it a state that
         no law of stress and rate can carry.
@@ -138,6 +169,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
     rankings: tuple[tuple[CandidateScore, ...], ...] = field(repr=False, default=())
     records: tuple[RunRecord, ...] = field(repr=False, default=())
     declared_parameters: dict[str, StageParameter] = field(default_factory=dict)
+    declared_effects: tuple[DeclaredEffect, ...] = ()
+    declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
@@ -266,6 +299,10 @@ class LoopResult(PageView, HasEquation, NotebookView):
             "residual": {
                 name: reading.to_json()
                 for name, reading in zip(("declared", "augmented"), self.readings, strict=True)
+            },
+            "declared": {
+                "law": None if self.declared_law is None else equation_to_json(self.declared_law),
+                "effects": [asdict(effect) for effect in self.declared_effects],
             },
             "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
             "ranking": [

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore, attribute
+from discover.closed_loop.attribution import CandidateScore, attribute, with_other_inner
 from discover.closed_loop.augment import (
     BARE_MENTION,
     IMPROVEMENT,
@@ -13,20 +13,12 @@ from discover.closed_loop.augment import (
     choose,
     drop_undecided,
     evidence,
-    intervals,
     prune,
     refit,
     simplest,
     taken_out,
 )
-from discover.closed_loop.least_squares import (
-    NO_PRIOR,
-    Fit,
-    Prior,
-    fit_batch,
-    jacobians,
-    left_out_errors,
-)
+from discover.closed_loop.left_out import left_out_errors
 from discover.closed_loop.mode_dependence import names_not_needed
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.physical_range import at_an_end, undetermined
@@ -37,6 +29,14 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, make_batch
+from discover.forward.least_squares import (
+    NO_PRIOR,
+    Fit,
+    Prior,
+    fit_batch,
+    intervals,
+    jacobians,
+)
 from discover.statistics.residual import summarise
 
 _ROUNDS, _POLISHES = 3, 5
@@ -90,8 +90,9 @@ class Search(SearchState):
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""
-        known = effect.name in self.refused or isinstance(effect, ModeDependence)
-        return not known and self.admitted(effect)
+        known = effect.name in {known.name for known in self.model.declared.effects}
+        refused = effect.name in self.refused or isinstance(effect, ModeDependence)
+        return not known and not refused and self.admitted(effect)
 
     @property
     def prior(self) -> Prior:
@@ -147,7 +148,7 @@ class Search(SearchState):
         InputError
             If it cannot be integrated through the runs.
         """
-        free = self.model.declared.free_positions
+        free = self.model.free_positions
         starts = [self.model.zero()]
         if self.model.declared.fit_relaxation_time:
             starts += [self.model.zero() for _ in _TIME_STARTS]
@@ -155,6 +156,7 @@ class Search(SearchState):
                 start[1] = np.log(factor)
                 if self.model.declared.fit_modulus:
                     start[0] = -start[1]  # the viscosity is known better than either
+        starts += self._starts_of_known()
         fits = fit_batch(self.model, self.batch, starts, [free] * len(starts))
         usable = [fit for fit in fits if fit.usable]
         self.fit = min(usable, key=lambda fit: fit.cost, default=fits[0])
@@ -165,6 +167,24 @@ class Search(SearchState):
             )
         self.path = [self.fit.theta]
         self._leave_out()
+
+    def _starts_of_known(self) -> list[np.ndarray]:
+        """Return starts from other inner times and exponents of known effects to be fitted."""
+        starts = []
+        for known in self.model.declared.effects:
+            if not set(known.free) & {p.name for p in known.effect.parameters[1:]}:
+                continue
+            fixed = [
+                position
+                for position, value in zip(
+                    self.model.positions(known.name), known.values, strict=True
+                )
+                if value is not None
+            ]
+            for other in with_other_inner(self.model, self.model.zero(), known.effect):
+                other[fixed] = self.model.zero()[fixed]
+                starts.append(other)
+        return starts
 
     def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
         """Add effects until none earns its place, and see that each still deserves its own.
@@ -457,7 +477,7 @@ class Search(SearchState):
 
     def _fit(self, active: Sequence[str], values: np.ndarray) -> Fit:
         positions = [
-            *self.model.declared.free_positions,
+            *self.model.free_positions,
             *(p for name in active for p in self.model.positions(name)),
         ]
         start = self.model.zero()

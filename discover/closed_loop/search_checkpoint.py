@@ -10,8 +10,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.search_state import SearchState
+from discover.forward.least_squares import Fit
 
 
 @runtime_checkable

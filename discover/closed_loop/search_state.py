@@ -3,8 +3,8 @@
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.least_squares import Fit
 from discover.forward import AugmentedModel
+from discover.forward.least_squares import Fit
 
 
 class SearchState:

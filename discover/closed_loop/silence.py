@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from discover.closed_loop.least_squares import Fit
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
 from discover.statistics import holds_signal
 from discover.statistics.dead_records import CHANCE
 from discover.statistics.residual import judging, summarise
@@ -43,10 +43,11 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
     declared = model.declared
     off = replace(declared, modulus=_OFF * declared.modulus, solvent_viscosity=0.0)
     theta, fluid = fit.theta.copy(), max(len(declared.free_positions), 1)
+    on = {*active, *(known.name for known in declared.effects)}
     for effect in model.effects:
-        if effect.name in active and isinstance(effect, ConstitutiveEffect):
+        if effect.name in on and isinstance(effect, ConstitutiveEffect):
             at = model.positions(effect.name)
-            theta[at] = model.zero()[at]
+            theta[at[0]] = 0.0
             fluid += len(at)
     without = AugmentedModel(off, model.effects).residuals([theta], batch)[0]
     weight = np.asarray(batch.weight)

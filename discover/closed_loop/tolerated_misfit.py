@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.forward import even
+from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left
 from discover.statistics.residual import STRUCTURE, Expectation, tells_noise
 from discover.statistics.whiteness import SIGNIFICANCE

@@ -1,7 +1,7 @@
 """What a rheologist would fit first: the classical laws, to the same runs with the same modes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ left goes a parabola, so that the constant is known better than any noise asks f
 _SMALLEST = 1e-3
 """A constant below this fraction of its range shows in no flow; trials are geometric from there."""
 
-_FLOOR = 1e-5
+FLOOR = 1e-5
 """Relative misfit below which data count as reproduced: what the integration promises."""
 
 
@@ -48,6 +48,8 @@ class ClassicalFit:
         `extended_bic`, the price being that of five laws; None likewise.
     errors
         Relative L2 errors by flow that no fit saw, then by quantity.
+    along
+        Constants of modes and instrument that were fitted along with it, by name.
     """
 
     law: str
@@ -55,6 +57,7 @@ class ClassicalFit:
     misfit: float | None
     criterion: float | None
     errors: Mapping[str, Mapping[str, float | None]]
+    along: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -74,6 +77,7 @@ class ClassicalFit:
             "misfit": self.misfit,
             "criterion": self.criterion,
             "at_bound": self.at_bound,
+            **({"fitted_along": dict(self.along)} if self.along else {}),
             "errors": {name: dict(row) for name, row in self.errors.items()},
         }
 
@@ -126,8 +130,8 @@ def fit_classical_laws(
             }
             fits.append(ClassicalFit(name, {}, None, None, nothing))
             continue
-        parameters = {} if value is None else {_parameter(name): float(value)}
-        criterion = extended_bic(max(misfit, _FLOOR), samples, len(parameters), 0, len(CLASSICAL))
+        parameters = {} if value is None else {parameter_of(name): float(value)}
+        criterion = extended_bic(max(misfit, FLOOR), samples, len(parameters), 0, len(CLASSICAL))
         errors = {
             flow.name: of_recorded(relative_errors(_stresses(rows[at]), flow.reference), flow)
             for flow, rows in zip(judged, predicted[name][len(training) :], strict=True)
@@ -136,14 +140,15 @@ def fit_classical_laws(
     return fits
 
 
-def _parameter(name: str) -> str:
+def parameter_of(name: str) -> str:
+    """Return the constant of a classical law."""
     return next(iter(LAWS[name].parameters))
 
 
 def _first_trials(name: str) -> list[float | None]:
     if not LAWS[name].parameters:
         return [None]
-    low, high = LAWS[name].parameters[_parameter(name)]
+    low, high = LAWS[name].parameters[parameter_of(name)]
     return [low, *(low + (high - low) * np.geomspace(_SMALLEST, 1.0, _TRIALS - 1))]
 
 
@@ -169,8 +174,9 @@ def _narrowed(
     return [*np.linspace(low, high, len(values))]
 
 
-def _contender(name: str, value: float | None, known_relaxation: bool) -> Contender:
-    parameters = {} if value is None else {_parameter(name): float(value)}
+def contender(name: str, value: float | None, known_relaxation: bool) -> Contender:
+    """Return a classical law with this value of its constant as a sum of terms."""
+    parameters = {} if value is None else {parameter_of(name): float(value)}
     terms = true_terms(name, parameters, known_relaxation)
     assert terms is not None  # the classical laws are sums of library terms
     inner = {key: number for term in terms for key, number in term.inner.items()}
@@ -184,7 +190,7 @@ def _predictions(
     known_relaxation: bool,
 ) -> dict[str, list[Float[np.ndarray, "trials _ 3"]]]:
     """Return σ12, N1 and N2 of every trial by law and flow; not finite where one runs away."""
-    laws = [_contender(name, value, known_relaxation) for name in trials for value in trials[name]]
+    laws = [contender(name, value, known_relaxation) for name in trials for value in trials[name]]
     protocols, times = [flow.protocol for flow in flows], [flow.times for flow in flows]
     predicted = predict_laws(fluid_of(laws, base), protocols, times)
     out, start = {}, 0

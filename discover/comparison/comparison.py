@@ -16,6 +16,7 @@ from discover.comparison.outcome import LearnerOutcome, plain
 from discover.comparison.range import Placement, place
 from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.comparison.truth import TrueTerm
+from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure import Structure
 from discover.notebook_view import NotebookView, table_of
@@ -88,6 +89,12 @@ class Comparison(PageView, NotebookView):
         The known part as an equation; None where it is not wanted.
     explanation
         Whether any law explains the training runs.
+    known_of
+        The same for a learner, with the constants that were fitted along with it.
+    known_effects
+        Effects of the instrument that are known.
+    stood_for
+        Terms that were not searched, since the constants that are fitted along stand for them.
     classical
         The classical laws fitted to the same runs.
     warnings
@@ -114,6 +121,9 @@ class Comparison(PageView, NotebookView):
     explanation: Explanation = field(default_factory=Explanation)
     classical: Sequence[ClassicalFit] = ()
     warnings: tuple[str, ...] = ()
+    known_of: Mapping[str, Equation | None] = field(default_factory=dict)
+    known_effects: Sequence[KnownEffect] = ()
+    stood_for: tuple[str, ...] = ()
 
     _page = "discover.report.in_memory:comparison_page"
 
@@ -215,9 +225,10 @@ class Comparison(PageView, NotebookView):
 
     def equation(self, learner: str) -> Equation:
         """Return the law that a learner found, with its modes and the box where it was tested."""
-        if self.known is None:
+        known = self.known_of.get(learner, self.known)
+        if known is None:
             raise ValueError("This comparison does not say what its known part is.")
-        return outcome_equation(self.known, self.outcomes[learner], self.flows, self.name)
+        return outcome_equation(known, self.outcomes[learner], self.flows, self.name)
 
     def to_json(self) -> dict[str, Any]:
         """Return the comparison as ``comparison.json`` holds it."""
@@ -243,6 +254,15 @@ class Comparison(PageView, NotebookView):
                 },
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "intervals_hold": IN_LIBRARY if self.explanation.in_library else "no",
+                "constants": {
+                    key: {
+                        "value": constant.value,
+                        "ci95": None if constant.ci95 is None else list(constant.ci95),
+                        "unit": constant.unit,
+                    }
+                    for key, constant in outcome.constants.items()
+                },
+                "effects": [self._effect(known, outcome) for known in self.known_effects],
                 "train_seconds": outcome.train_seconds,
                 "message": outcome.message,
                 "law": None if self.known is None else equation_to_json(self.equation(name)),
@@ -266,6 +286,7 @@ class Comparison(PageView, NotebookView):
                 {"term": t.term, "coefficient": t.coefficient, "inner": dict(t.inner)}
                 for t in self.truth
             ],
+            "stood_for_by_constants": list(self.stood_for),
             "classical": {fit.law: fit.to_json() for fit in self.classical},
             "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
             "rivals": [rival.to_json() for rival in self.rivals],
@@ -282,6 +303,17 @@ class Comparison(PageView, NotebookView):
             "next_measurement": self.next_measurement.to_json(),
         }
         return plain(content)
+
+    @staticmethod
+    def _effect(known: KnownEffect, outcome: LearnerOutcome) -> dict[str, Any]:
+        """Return a known effect as it was with a learner."""
+        parameters = {}
+        for parameter, value in zip(known.effect.parameters, known.values, strict=True):
+            fitted = outcome.constants.get(f"{known.name}.{parameter.name}")
+            limits = None if fitted is None or fitted.ci95 is None else list(fitted.ci95)
+            number = value if fitted is None else fitted.value
+            parameters[parameter.name] = {"value": number, "ci95": limits, "unit": parameter.unit}
+        return {"effect": known.name, "kind": known.effect.kind, "parameters": parameters}
 
     def _errors(self, who: str, flows: Sequence[Flow]) -> dict[str, dict[str, float | None]]:
         return {flow.name: of_recorded(self.errors(who, flow), flow) for flow in flows}

@@ -54,6 +54,8 @@ class Flow:
         None.
     oscillatory
         Whether Lissajous curves make sense.
+    commanded
+        The protocol before an instrument that is known changed it, for titles; None where none did.
     """
 
     name: str
@@ -66,6 +68,11 @@ class Flow:
     is_truth: bool = False
     training_end: float | None = None
     oscillatory: bool = False
+    commanded: FlowProtocol | None = None
+
+    @property
+    def _imposed(self) -> FlowProtocol:
+        return self.protocol if self.commanded is None else self.commanded
 
     @property
     def key(self) -> str:
@@ -83,14 +90,14 @@ class Flow:
     @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
-        amplitudes = np.asarray(self.protocol.amplitudes)
-        frequencies = np.abs(np.asarray(self.protocol.frequencies)[amplitudes != 0.0])
+        amplitudes = np.asarray(self._imposed.amplitudes)
+        frequencies = np.abs(np.asarray(self._imposed.frequencies)[amplitudes != 0.0])
         return float(np.max(frequencies)) if frequencies.size else None
 
     @property
     def amplitude(self) -> float:
         """Largest amplitude of the oscillating part of the rate in 1/s."""
-        return float(np.max(np.abs(np.asarray(self.protocol.amplitudes)), initial=0.0))
+        return float(np.max(np.abs(np.asarray(self._imposed.amplitudes)), initial=0.0))
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
@@ -100,16 +107,16 @@ class Flow:
     @property
     def title(self) -> str:
         """The flow in the field's notation."""
-        amplitudes = np.asarray(self.protocol.amplitudes)
-        frequencies = np.asarray(self.protocol.frequencies)
-        rates = np.asarray(self.protocol.table_rates)
+        amplitudes = np.asarray(self._imposed.amplitudes)
+        frequencies = np.asarray(self._imposed.frequencies)
+        rates = np.asarray(self._imposed.table_rates)
         if self.oscillatory and np.count_nonzero(amplitudes) == 1:
             i = int(np.flatnonzero(amplitudes)[0])
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
         if not np.any(amplitudes) and rates.size == 1:
-            if self.protocol.flow != "shear":
-                return f"{self.protocol.flow} extension at ε̇ = {rates[0]:g}"
+            if self._imposed.flow != "shear":
+                return f"{self._imposed.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
         return self.name
 

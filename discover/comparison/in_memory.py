@@ -16,7 +16,13 @@ from discover.learners.result import LearnerResult
 from discover.learners.run_prediction import RunPrediction
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import DeclaredModel, StudyData
-from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined
+from discover.study.in_memory import (
+    HeldOut,
+    data_in_memory,
+    declared_fluid,
+    joined,
+    with_known,
+)
 from discover.study.read import parse_study
 from discover.study.schema import Study
 
@@ -38,6 +44,8 @@ def compare(
     second: Fluid | None = None,
     *,
     held_out: HeldOut = (),
+    known_effects: Mapping[str, Any] | None = None,
+    free: Sequence[str] = (),
     seed: int = 0,
     progress: Progress | None = None,
     **options: Any,
@@ -50,6 +58,8 @@ def compare(
     *,
     train: Any = None,
     held_out: Any = (),
+    known_effects: Any = None,
+    free: Any = (),
     seed: int = 0,
     progress: Any = None,
     **options: Any,
@@ -67,6 +77,12 @@ def compare(
         What the estimators were fitted to; needed only for those from a file, which holds no data.
     held_out
         Runs of the data set that only judge, by name, or a data set of them.
+    known_effects
+        For a data set: effects that are known beside the fluid, as ``[model] effects`` in a study,
+        such as ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
+    free
+        For a data set: what of the base is fitted along: ``"modulus_Pa"``,
+        ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
     seed
         Of the learners, and of draws within intervals.
     progress
@@ -86,11 +102,12 @@ def compare(
         if train is not None:
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
-        model = declared_fluid(second, first)
+        model = with_known(declared_fluid(second, first), known_effects, free)
         study = _study(data, model, options)
         return compare_study(study, seed, say, data=data, declared=model)
-    if options or len(held_out):
-        unknown = next(iter(options), "held_out")
+    if options or len(held_out) or known_effects or len(free):
+        given = {"held_out": len(held_out), "known_effects": known_effects, "free": len(free)}
+        unknown = next(iter(options), next((k for k, value in given.items() if value), ""))
         raise InputError(
             f"{unknown} is for a data set; the estimators are fitted already. Leave it out."
         )

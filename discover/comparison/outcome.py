@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Real
 
+from discover.comparison.constant import Constant
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
@@ -43,6 +44,8 @@ class LearnerOutcome(TermTables):
         fit as well. None for a flow in which one of them runs away; empty where there is one law.
     resolution
         Relative misfit of the training runs that arithmetic may leave.
+    constants
+        Constants that were fitted along, by name.
     """
 
     learner: str
@@ -55,6 +58,7 @@ class LearnerOutcome(TermTables):
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, Limits | None] = field(default_factory=dict)
     resolution: float = 0.0
+    constants: Mapping[str, Constant] = field(default_factory=dict)
 
     def half_widths(self, flow: Flow) -> dict[str, float]:
         """Return the root-mean-square half-width of each band over that of the prediction.
@@ -106,6 +110,7 @@ class LearnerOutcome(TermTables):
                 for name, b in self.bands.items()
             },
             "resolution": self.resolution,
+            "constants": {name: asdict(constant) for name, constant in self.constants.items()},
         }
 
     @classmethod
@@ -143,6 +148,10 @@ class LearnerOutcome(TermTables):
                 for name, b in state.get("bands", {}).items()
             },
             float(state.get("resolution", 0.0)),
+            {
+                name: Constant(**{**row, "ci95": row["ci95"] and tuple(row["ci95"])})
+                for name, row in state.get("constants", {}).items()
+            },
         )
 
 

@@ -4,24 +4,27 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from discover.comparison.classical import fit_classical_laws
+from discover.comparison.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.constant import in_words as in_words_of
 from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
 from discover.comparison.explanation import Explanation, explain
-from discover.comparison.flows import Flow, comparison_flows, predict
+from discover.comparison.flows import comparison_flows
 from discover.comparison.identifiability import (
     find_rivals,
     physics_of,
     structure_of,
 )
+from discover.comparison.instrument import Frame, Learned, classical_along
+from discover.comparison.known import Known
+from discover.comparison.known import known_part as _known
 from discover.comparison.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.sampled_rates import left_by_sampled_rates
 from discover.comparison.statements import make_statements
 from discover.comparison.training import (
     Progress,
-    require_numbers,
     silent,
     study_library,
     train,
@@ -36,7 +39,13 @@ from discover.laws.registry import LAWS, make_law
 from discover.learners.result import LearnerResult
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
-from discover.study.build import DeclaredModel, StudyData, declared_model, load_study_data
+from discover.study.build import (
+    MODE_CONSTANTS,
+    DeclaredModel,
+    StudyData,
+    declared_model,
+    load_study_data,
+)
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
@@ -87,13 +96,18 @@ def compare(
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
-    model = declared if fit_constants is None else fit_constants(declared, data.fit)
-    require_numbers(model)
     following_options = options.next
-    grid = itertools.product(
-        following_options.weissenberg_numbers, following_options.deborah_numbers
+    grid = list(
+        itertools.product(following_options.weissenberg_numbers, following_options.deborah_numbers)
     )
-    flows = comparison_flows(data, options.high_deborah, list(grid))
+    library = study_library(study) if library is None else library
+    known = _known(declared, data, library, options.high_deborah, grid, fit_constants)
+    if sweep and (known.along is not None or declared.effects):
+        raise InputError(
+            "compare.sweep computes data that hold no instrument, so [model] can have neither "
+            'effects nor constants to be fitted along with it. Write numbers instead of "fit".'
+        )
+    model, flows = known.before.model, known.flows
     learner_seed = options.seed if seed is None else seed
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
     done = 0
@@ -101,12 +115,15 @@ def compare(
     def step(title: str) -> Progress:
         return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
 
-    outcomes = {}
+    own: dict[str, LearnerOutcome] = {}
+    frames: dict[str, Frame] = {}
     for learner in options.learners:
-        outcomes[learner] = _outcome(
-            learner, learner, study, model, data, flows, learner_seed, step(learner), store, made
+        own[learner] = _outcome(
+            learner, learner, study, known, learner_seed, step(learner), store, made
         )
+        frames[learner] = known.frame(own[learner])
         done += 1
+    outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
     points = []
     for law, value, other in sweep:
         other_data = load_study_data(other, seed)
@@ -114,9 +131,8 @@ def compare(
         found = {}
         for learner in options.learners:
             part = f"sweep_{law}_{value:g}_{learner}"
-            found[learner] = _outcome(
-                part, learner, other, model, other_data, [flow], learner_seed, step(part), store
-            )
+            alone = Known(Frame(model, other_data, [flow]), None, [flow])
+            found[learner] = _outcome(part, learner, other, alone, learner_seed, step(part), store)
             done += 1
         assert options.sweep is not None
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
@@ -124,42 +140,54 @@ def compare(
     expectation = expectation_of(study, model)
     explanation = explain(outcomes, flows, expectation, normal)
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
-    chosen = outcomes.get("tensor_sindy")
+    chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     rivals, structure, following = [], None, NextMeasurement()
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
     fitted = [flow for flow in flows if flow.kind == "training"]
     judged = judged or fitted
     if chosen is not None and explanation.verdict != "no_signal":
-        library = study_library(study) if library is None else library
         met = chosen.details.get("rivals", ())
-        rivals = find_rivals(chosen.terms, met, model, flows, library, chosen.predictions)
-        structure = structure_of(chosen.terms, data.fit.runs, library, model, normal)
+        given = frame.model
+        rivals = find_rivals(chosen.terms, met, given, frame.flows, library, chosen.predictions)
+        structure = structure_of(chosen.terms, frame.data.fit.runs, library, given, normal)
     if chosen is not None and explanation.in_library:
         # where a quantity is said to be determined, its band says how well
-        banded = judged if judged is fitted else [*judged, *fitted]
+        keys = {flow.key for flow in (judged if judged is fitted else [*judged, *fitted])}
+        banded = [flow for flow in frame.flows if flow.key in keys]
         # bands and experiments take it that the law, or a rival, is the fluid's
         following = next_measurement(
-            chosen, rivals, model.fluid, banded, following_options, learner_seed
+            chosen, rivals, frame.model.fluid, banded, following_options, learner_seed
         )
+    own_bands = following.bands
+    following = replace(following, bands=frame.bands(own_bands))
     explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
     if not explanation.in_library:
-        following = NextMeasurement()
+        following, own_bands = NextMeasurement(), {}
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     classical = []
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
-    statements = make_statements(explanation, flows, rivals, structure, bands, normal)
+    seen_in = frame.flows
+    statements = make_statements(explanation, seen_in, rivals, structure, own_bands, normal)
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         progress("the classical laws on the same runs", done / n_parts)
-        classical = fit_classical_laws(model, flows, study.model.known_relaxation)
+        if known.along is None:
+            classical = fit_classical_laws(model, flows, study.model.known_relaxation)
+        else:
+            each = [
+                known.frame_of(known.along.raw(known.along.classical[law].theta))
+                for law in CLASSICAL
+            ]
+            classical = classical_along(known.along, each, flows)
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
         name=study.name,
-        data_summary=_summary(data, study),
-        known_part=_known_part(model, study, declared.free),
+        data_summary=_summary(data, study)
+        + (_TAKEN_OUT if known.along is None and known.effects else ""),
+        known_part=_known_part(declared, known, study),
         flows=flows,
-        before={flow.key: predict(model.fluid, flow) for flow in flows},
+        before=known.alone(),
         outcomes=outcomes,
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
@@ -171,6 +199,9 @@ def compare(
         next_measurement=following,
         seed=learner_seed,
         known=known_equation(model),
+        known_of={name: known_equation(frame.model) for name, frame in frames.items()},
+        known_effects=known.effects,
+        stood_for=() if known.along is None else known.along.twins,
         explanation=explanation,
         classical=classical,
         warnings=() if silent_records else tuple(disagreements(outcomes, judged, bands)),
@@ -226,23 +257,32 @@ def _outcome(
     part: str,
     learner: str,
     study: Study,
-    model: DeclaredModel,
-    data: StudyData,
-    flows: list[Flow],
+    known: Known,
     seed: int,
     progress: Callable[[str, float], None],
     store: RunFolder | None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
 ) -> LearnerOutcome:
+    """Return what a learner finds, in the frame in which it works."""
     kept = None if store is None else store.load(part)
-    if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
+    if kept is not None and all(flow.key in kept["predictions"] for flow in known.flows):
         return LearnerOutcome.from_state(kept)
     progress("starting", 0.0)
+    frame, constants = known.before, {}
     if made is not None:
         result, fluid = made[learner]
+    elif known.along is not None:
+        found = known.along.learn(
+            lambda model, data, library: train(
+                learner, study, model, data.fit.runs, seed, progress, library
+            )
+        )
+        result, fluid, constants = _told_of_constants(found), found.fluid, found.constants
+        frame = known.frame_of({one.name: one.raw for one in constants.values()})
     else:
-        result, fluid = train(learner, study, model, data.fit.runs, seed, progress)
-    outcome = LearnerOutcome.of(result, fluid, flows)
+        result, fluid = train(learner, study, frame.model, frame.data.fit.runs, seed, progress)
+    flows = frame.flows
+    outcome = replace(LearnerOutcome.of(result, fluid, flows), constants=constants)
     if part == learner:
         # a sweep's outcomes are looked at in one flow only
         outcome = replace(
@@ -255,6 +295,18 @@ def _outcome(
         # the same route as after an interruption, so that both give the same files
         return LearnerOutcome.from_state(outcome.to_state())
     return outcome
+
+
+def _told_of_constants(found: Learned) -> LearnerResult:
+    """Return a result that says how constants were fitted along with it."""
+    times = "once" if found.rounds == 1 else f"{found.rounds} times"
+    ended = "had settled" if found.settled else "had not settled, so they may still be off"
+    message = found.result.message.rstrip(".")
+    return replace(
+        found.result,
+        message=f"{message}; it learned {times} with constants fitted along, which {ended}.",
+        details={**found.result.details, "rounds": found.rounds, "settled": found.settled},
+    )
 
 
 def _sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
@@ -326,6 +378,9 @@ def _require_one_split(data: StudyData) -> None:
         )
 
 
+_TAKEN_OUT = ". What the known instrument did is taken out of the records"
+
+
 def _summary(data: StudyData, study: Study) -> str:
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
@@ -340,12 +395,19 @@ def _summary(data: StudyData, study: Study) -> str:
     return f"{runs} computed from the {law} law, {noise}"
 
 
-def _known_part(model: DeclaredModel, study: Study, fitted: tuple[str, ...]) -> str:
+def _known_part(declared: DeclaredModel, known: Known, study: Study) -> str:
+    model = known.before.model
     text = _law_and_modes(model, study)
-    if not fitted:
-        return text
-    constants = f"G = {model.modulus.sum():.4g} Pa, λ = {model.relaxation_time.max():.4g} s"
-    return f"{text}, {constants} ({', '.join(fitted)} fitted with this law alone, then held)"
+    of_law = [name for name in declared.free if name not in MODE_CONSTANTS]
+    if of_law:
+        text += f" ({', '.join(of_law)} fitted with this law alone, then held)"
+    fixed = [effect.text for effect in known.effects if not effect.free]
+    if fixed:
+        text += f", {', '.join(fixed)}"
+    if known.along is not None:
+        names = ", ".join(map(in_words_of, known.along.positions))
+        text += f"; fitted along with each learner: {names}"
+    return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 
 def _law_and_modes(model: DeclaredModel, study: Study) -> str:
@@ -354,4 +416,5 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     named = LAWS.get(model.law_name)
     title = model.law_name if named is None else named.described(model.parameters)
     modes = len(model.modulus)
-    return title if modes == 1 else f"{title}, {modes} relaxation modes from the linear sweep"
+    source = " from the linear sweep" if study.model.from_ is None else ""
+    return title if modes == 1 else f"{title}, {modes} relaxation modes{source}"

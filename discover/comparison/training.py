@@ -49,6 +49,7 @@ def train(
     runs: Sequence[Run],
     seed: int = 0,
     progress: Progress = silent,
+    searched_library: TermLibrary | None = None,
 ) -> tuple[LearnerResult, Fluid]:
     """Return what one learner finds in these runs, and the fluid that it makes.
 
@@ -66,6 +67,9 @@ def train(
         Seed of the learner.
     progress
         Called as it goes.
+    searched_library
+        The candidate terms of sparse regression and of registered learners, in place of the
+        study's.
     """
     options = study.compare
     plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
@@ -75,18 +79,18 @@ def train(
         "known_relaxation": study.model.known_relaxation,
         "base_law": None if plain_maxwell else model.law,
         "random_state": seed,
+        "solvent_viscosity": model.solvent_viscosity,
     }
     library = study_library(study)
     if learner == "tensor_sindy":
         from discover.learners.tensor_sindy import TensorSINDy
 
         sparse = TensorSINDy(
-            library=library,
+            library=searched_library or library,
             optimizer=options.optimizer,
             selection=options.selection,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
-            solvent_viscosity=model.solvent_viscosity,
             progress=lambda text: progress(text, 0.5),
             **shared,
         ).fit(list(runs))
@@ -95,11 +99,6 @@ def train(
     if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 
-        if model.solvent_viscosity:
-            raise InputError(
-                "The network takes no solvent viscosity yet; leave solvent_viscosity_Pa_s out, or "
-                'write learners = ["tensor_sindy"].'
-            )
         estimator = TBNNUDE(
             recipe=options.recipe,
             n_members=options.members,
@@ -112,7 +111,7 @@ def train(
         )
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
-    asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
+    asked = LearningTask(tuple(runs), model.fluid, searched_library or library, seed, progress)
     return learn_with(learner, asked)
 
 

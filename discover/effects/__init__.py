@@ -13,6 +13,7 @@ from discover.effects.base import (
     SignalEffect,
     StateEffect,
 )
+from discover.effects.known import KnownEffect, known_effects
 from discover.effects.library_term import LibraryTerm, library_effects, library_term
 from discover.effects.mode_dependence import BY_MODE, ModeDependence
 from discover.effects.registry import (
@@ -28,6 +29,7 @@ __all__ = [
     "ConstitutiveEffect",
     "EffectParameter",
     "KinematicEffect",
+    "KnownEffect",
     "LibraryTerm",
     "ModeDependence",
     "ModeEffect",
@@ -36,6 +38,7 @@ __all__ = [
     "SignalEffect",
     "StateEffect",
     "effects_table",
+    "known_effects",
     "library_effects",
     "library_term",
     "make_effect",

@@ -30,10 +30,10 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     """
     path = Path(folder)
     if path.suffix == ".json":
-        return _laws(_read_json(path), path.name)
+        return _laws(read_json(path), path.name)
     for name in (COMPARISON, LOOP):
         if os.path.isfile(path / name):  # Path.is_file raises where a name is too long
-            return _laws(_read_json(path / name), name)
+            return _laws(read_json(path / name), name)
     if os.path.isfile(path / BATCH):
         raise InputError(
             f"{path} holds a batch. Give the folder of one study in it, such as {path / 'STUDY'}."
@@ -80,7 +80,14 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
     return laws
 
 
-def _read_json(path: Path) -> Any:
+def read_json(path: Path) -> Any:
+    """Return what a JSON file of results holds.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
     try:
         return json.loads(read_bytes(path, path.name))
     except RecursionError:

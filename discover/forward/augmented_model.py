@@ -298,6 +298,7 @@ class AugmentedModel:
         The declared model.
     effects
         Candidates; their parameters follow one another in the vector, after the declared ones.
+        Those that the declared model knows follow, if they are not among them.
     scales
         Size of each property of the data in which parameters are scaled; see `data_scales`.
     """
@@ -309,7 +310,9 @@ class AugmentedModel:
         scales: Mapping[str, float] | None = None,
     ):
         self.declared = declared
-        self.effects = tuple(effects)
+        names = {effect.name for effect in effects}
+        known = (known.effect for known in declared.effects if known.name not in names)
+        self.effects = (*effects, *known)
         free = declared.free_parameters
         self._program = _program(
             _Structure(
@@ -349,7 +352,10 @@ class AugmentedModel:
         )
 
     def zero(self) -> Float[np.ndarray, " p"]:
-        """Return the vector of the declared model: amplitudes zero, inner parameters at start."""
+        """Return the vector of the declared model: amplitudes zero, inner parameters at start.
+
+        Known effects have their values, and where these are to be fitted, a first trial.
+        """
         theta = np.zeros(self.size)
         for i, parameter in enumerate(self.declared.free_parameters):
             theta[2 + i] = parameter.start
@@ -357,7 +363,19 @@ class AugmentedModel:
             for i in range(1, len(effect.parameters)):
                 position = self.slices[effect.name].start + i
                 theta[position] = self.first_trial[position]
+        for known in self.declared.effects:
+            for position, value in zip(self.positions(known.name), known.values, strict=True):
+                theta[position] = self.first_trial[position] if value is None else value
         return theta
+
+    @property
+    def free_positions(self) -> list[int]:
+        """Positions of what is fitted of the declared model, its known effects included."""
+        free = self.declared.free_positions
+        for known in self.declared.effects:
+            pairs = zip(self.positions(known.name), known.values, strict=True)
+            free += [position for position, value in pairs if value is None]
+        return free
 
     def positions(self, name: str) -> list[int]:
         """Return the positions of an effect's parameters in the vector."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from discover.effects import KnownEffect
 from discover.errors import InputError
 from discover.laws import LAWS, AbstractConstitutiveLaw, UpperConvectedMaxwell, make_law
 
@@ -46,6 +47,8 @@ class DeclaredModel:
     linear_error
         Relative error with which the modes describe the linear data they come from; no prediction
         can be expected to do better.
+    effects
+        What is known beside the law: effects of fluid and instrument, with values or to be fitted.
     """
 
     law: AbstractConstitutiveLaw
@@ -58,6 +61,7 @@ class DeclaredModel:
     parameters: tuple[tuple[str, float], ...] = ()
     free_parameters: tuple[FreeParameter, ...] = ()
     linear_error: float = 0.0
+    effects: tuple[KnownEffect, ...] = ()
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):
@@ -129,6 +133,11 @@ class DeclaredModel:
             ),
             **options,
         )
+
+    @property
+    def free_constants(self) -> int:
+        """How many constants are fitted, those of known effects included."""
+        return len(self.free_positions) + sum(len(known.free) for known in self.effects)
 
     def law_with(self, values) -> AbstractConstitutiveLaw:
         """Return the law with these values of its free parameters, which may be traced."""

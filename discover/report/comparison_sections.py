@@ -12,6 +12,7 @@ from discover.protocols.kinematics import in_words
 from discover.report import comparison_tables as tables
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
+from discover.report.wording import readable
 
 Content = Mapping[str, Any]
 
@@ -138,6 +139,12 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             else None
         )
 
+    def constants() -> Content | None:
+        rows = tables.constant_rows(comparison)
+        twins = ", ".join(readable(name) for name in comparison.stood_for)
+        searched = f"Not searched, since the constants stand for it: {twins}." if twins else ""
+        return {"constant_rows": rows, "searched": searched} if rows else None
+
     def held_out_by_run() -> Content | None:
         found = tables.selection(comparison)
         return {"selection": found} if found and found["runs"] else None
@@ -166,6 +173,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             [
                 Part("The laws found", "laws", laws),
                 Part("The table of terms", "terms", terms),
+                Part("The constants fitted along", "constants", constants),
                 Part(
                     "The table of the network's coefficients",
                     "coefficients",

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.constant import in_words as constant_in_words
 from discover.comparison.identifiability import EXACT, Rival
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
@@ -105,13 +106,17 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for fit in comparison.classical:
         constants = ", ".join(
-            f"{readable(name)} = {significant(value, 3)}" for name, value in fit.parameters.items()
+            f"{name} = {significant(value, 3)}"
+            for name, value in (
+                *((readable(name), value) for name, value in fit.parameters.items()),
+                *((constant_in_words(name), value) for name, value in fit.along.items()),
+            )
         )
         rows.append(
             {
                 "law": fit.title,
                 "constants": constants + (", the end of its range" if fit.at_bound else ""),
-                "number": len(fit.parameters),
+                "number": len(fit.parameters) + len(fit.along),
                 "misfit": fit.misfit,
                 "criterion": fit.criterion,
                 **_mean_errors(fit.errors, placed),
@@ -125,8 +130,13 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
         rows.append(
             {
                 "law": learner_title(name),
-                "constants": "",
-                "number": sum(1 + len(t.inner) for t in outcome.terms) if sparse else None,
+                "constants": ", ".join(
+                    f"{constant_in_words(c.name)} = {significant(c.value, 3)}"
+                    for c in outcome.constants.values()
+                ),
+                "number": sum(1 + len(t.inner) for t in outcome.terms) + len(outcome.constants)
+                if sparse
+                else None,
                 "misfit": None if left is None else left.misfit,
                 "criterion": path[chosen]["bic"] if path and chosen is not None else None,
                 **_mean_errors(errors, placed),
@@ -162,6 +172,22 @@ def network_interval(comparison: Comparison) -> bool:
     """Return whether the terms of the network have intervals; True without a network."""
     network = comparison.outcomes.get("tbnn_ude")
     return network is None or any(term.ci95 for term in network.terms)
+
+
+def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the constants that were fitted along, one line for each learner."""
+    rows = [
+        {
+            "constant": constant_in_words(constant.name),
+            "learner": learner_title(name),
+            "value": constant.value,
+            "ci95": constant.ci95,
+            "unit": constant.unit,
+        }
+        for name, outcome in comparison.outcomes.items()
+        for constant in outcome.constants.values()
+    ]
+    return sorted(rows, key=lambda row: row["constant"])
 
 
 def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:

@@ -3,10 +3,13 @@
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.constant import in_words
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
 from discover.report.wording import (
     SYMBOLS,
+    estimate,
+    interval,
     learner_as_subject,
     percent,
     readable,
@@ -51,6 +54,7 @@ def _found(comparison: Comparison) -> str:
             parts.append(f"{_law_of(name)} leaves {_left(one)}")
     if sparse is not None and explanation.in_library:
         parts.append(_terms_found(comparison, sparse))
+        parts += _constants_found(sparse)
     elif sparse is not None and not sparse.terms:
         parts.append("sparse regression found no term that helps")
     elif sparse is not None:
@@ -128,6 +132,15 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
     extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
     return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+
+
+def _constants_found(sparse: LearnerOutcome) -> list[str]:
+    said = []
+    for constant in sparse.constants.values():
+        text = f"{in_words(constant.name)} is {estimate(constant.value, constant.ci95)}"
+        text += f" {constant.unit}" if constant.unit else ""
+        said.append(f"{text} (95 % interval {interval(constant.ci95)})")
+    return [f"fitted along with it, {' and '.join(said)}"] if said else []
 
 
 def _how_sure(comparison: Comparison) -> str:

@@ -1,6 +1,7 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError
+from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import made_by, render
@@ -82,9 +84,11 @@ def write_loop(
         questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=_error_rows(result),
+        recorded=in_words(record.quantity for record in result.records),
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
+        declared_effects=_declared_effects(result),
         rankings=[_ranking(ranking) for ranking in result.rankings],
         folds=[_fold(fold) for fold in result.folds],
         law=_law(result),
@@ -216,6 +220,14 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "check": stage.check,
         "error": stage.error,
     }
+
+
+def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:
+    return [
+        {"effect": effect_title(one.effect), "name": name, **asdict(parameter)}
+        for one in result.declared_effects
+        for name, parameter in one.parameters.items()
+    ]
 
 
 def _law(result: LoopResult) -> str:

@@ -10,11 +10,15 @@ from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxati
 from discover.dataset.load import load_dataset
 from discover.dataset.material_functions import TABLES
 from discover.dataset.run import SLOWEST_RATE, require_signal
+from discover.effects import KnownEffect, known_effects
 from discover.errors import InputError
+from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
+from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Study
 
 MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
@@ -64,6 +68,10 @@ class DeclaredModel:
         Where the modes come from, if from a linear sweep.
     solvent_viscosity
         In Pa s.
+    effects
+        Effects known beside the law, with values or to be fitted.
+    source
+        What was taken from an earlier result, in words; empty where nothing was.
     """
 
     law: AbstractConstitutiveLaw
@@ -74,6 +82,14 @@ class DeclaredModel:
     free: tuple[str, ...]
     spectrum: RelaxationSpectrum | None
     solvent_viscosity: float = 0.0
+    effects: tuple[KnownEffect, ...] = ()
+    source: str = ""
+
+    @property
+    def free_constants(self) -> tuple[str, ...]:
+        """Names of all that is to be fitted, those of known effects included."""
+        of_effects = (f"{known.name}.{name}" for known in self.effects for name in known.free)
+        return (*self.free, *of_effects)
 
     @property
     def fluid(self) -> Fluid:
@@ -213,6 +229,9 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         If a parameter is wrong, or modes are asked of data without a linear sweep.
     """
     model = study.model
+    effects = known_effects(model.effects, "[model] effects")
+    if model.from_ is not None:
+        return _from_earlier(read_earlier(model.from_, study.path), effects)
     name = "ucm" if model.law == "learned" else model.law
     free = [key for key, value in model.parameters.items() if value == "fit"]
     parameters = {
@@ -226,8 +245,6 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         )
     law = make_law(name, parameters)
     if not model.known_relaxation:
-        from discover.laws.maxwell import UpperConvectedMaxwell
-
         law = UpperConvectedMaxwell(linear_relaxation=False)
     spectrum = None
     if model.modes == "lve":
@@ -258,6 +275,52 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         tuple(free),
         spectrum,
         model.solvent_viscosity_Pa_s,
+        effects,
+    )
+
+
+def forward_model(declared: DeclaredModel) -> ForwardDeclared:
+    """Return a study's declared model as forward models take it, with all that is to be fitted."""
+    spectrum = declared.spectrum
+    modes = declared.modulus, declared.relaxation_time
+    options = {
+        "solvent_viscosity": declared.solvent_viscosity,
+        "linear_error": 0.0 if spectrum is None else spectrum.relative_error,
+        "effects": declared.effects,
+    }
+    if declared.law.linear_relaxation and declared.law_name in LAWS:
+        named = declared.law_name, declared.parameters
+        return ForwardDeclared.named(*named, *modes, free=declared.free, **options)
+    return ForwardDeclared(
+        declared.law,
+        *modes,
+        fit_modulus="modulus_Pa" in declared.free,
+        fit_relaxation_time="relaxation_time_s" in declared.free,
+        **options,
+    )
+
+
+FOUND_LAW = "a law found before"
+"""Name of a law that was taken from a result."""
+
+
+def _from_earlier(found: EarlierResult, own: Sequence[KnownEffect]) -> DeclaredModel:
+    """Return what a result found as declared; effects of the study stand in place of its own."""
+    equation = found.equation
+    names = {known.name for known in own}
+    kept = (known for known in found.effects if known.name not in names)
+    plain = not equation.terms
+    return DeclaredModel(
+        UpperConvectedMaxwell(equation.linear_relaxation) if plain else equation.law(),
+        "ucm" if plain else FOUND_LAW,
+        {},
+        np.array(equation.modulus),
+        np.array(equation.relaxation_time),
+        (),
+        None,
+        equation.solvent_viscosity,
+        (*kept, *own),
+        found.text,
     )
 
 

@@ -1,6 +1,6 @@
 """Data sets and fluids that a program holds, as the tasks take them from a study."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -9,11 +9,12 @@ import numpy as np
 from discover.dataset import Dataset, Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import require_signal
+from discover.effects import known_effects
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.build import DeclaredModel, StudyData
+from discover.study.build import MODE_CONSTANTS, DeclaredModel, StudyData
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only judges: a data set of its own, or names of runs of the data set."""
@@ -116,6 +117,38 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
         _spectrum(data, modulus, relaxation_time),
         float(base.solvent_viscosity),
     )
+
+
+def with_known(
+    declared: DeclaredModel, effects: Mapping[str, Any] | None, free: Sequence[str] = ()
+) -> DeclaredModel:
+    """Return a declared model with effects known beside it, and with what is to be fitted of it.
+
+    Parameters
+    ----------
+    declared
+        From `declared_fluid`.
+    effects
+        As ``[model] effects`` in a study; None for none.
+    free
+        Names of its constants.
+
+    Raises
+    ------
+    InputError
+        If an effect, a value or a constant is not as it should be.
+    """
+    if isinstance(free, str):
+        raise InputError(f"free must be a list of names; got {free!r}. Write [{free!r}].")
+    possible = (*declared.parameters, *MODE_CONSTANTS)
+    unknown = [name for name in free if name not in possible]
+    if unknown:
+        raise InputError(
+            f"{unknown[0]!r} cannot be fitted: the base has {', '.join(possible)}. A law without a "
+            "name has no constant that could; register it with register_law."
+        )
+    known = known_effects(effects or {}, "known_effects")
+    return replace(declared, effects=known, free=tuple(dict.fromkeys(free)))
 
 
 def _spectrum(data: Dataset, modulus, relaxation_time) -> RelaxationSpectrum | None:

@@ -7,6 +7,7 @@ from discover._version import __version__
 from discover.dataset.load import folder_roots, resolve_folder
 from discover.dataset.table import read_bytes
 from discover.dataset.toml_file import read_toml
+from discover.study.from_result import result_file
 from discover.study.schema import Study
 from discover.validation import validated
 
@@ -80,4 +81,7 @@ def fingerprint(study: Study, *extra: object) -> str:
         for path in sorted(resolve_folder(study.data.folder, base).glob("*.csv")):
             digest.update(path.name.encode("utf-8", "surrogateescape"))
             digest.update(read_bytes(path, path.name))
+    if study.model.from_ is not None:
+        earlier = result_file(study.model.from_, study.path)
+        digest.update(read_bytes(earlier, earlier.name))
     return digest.hexdigest()[:16]

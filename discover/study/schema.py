@@ -111,9 +111,22 @@ class Model(Section):
     solvent_viscosity_Pa_s: Annotated[float, Field(ge=0, le=_MOST)] = 0.0
     parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
     known_relaxation: bool = True
+    effects: dict[str, dict[str, float | Literal["fit"]] | Literal["fit"]] = Field(
+        default_factory=dict
+    )
+    from_: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
+        default=None, alias="from"
+    )
 
     @model_validator(mode="after")
     def _window(self):
+        given = [key for key in type(self).model_fields if key in self.model_fields_set]
+        beside = [key for key in given if key not in ("from_", "effects")]
+        if self.from_ is not None and beside:
+            raise ValueError(
+                f"from takes law, modes and constants from a result, and {beside[0]} is given too; "
+                "leave one of them out"
+            )
         if self.sweep_rad_s is not None and self.modes is None:
             raise ValueError('sweep_rad_s limits the sweep of modes = "lve"; write that too')
         if self.sweep_rad_s is not None and not self.sweep_rad_s[0] < self.sweep_rad_s[1]:

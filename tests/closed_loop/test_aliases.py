@@ -6,8 +6,8 @@ import pytest
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.attribution import CandidateScore
 from discover.closed_loop.augment import Choice, aliases_of
-from discover.closed_loop.least_squares import Fit
 from discover.dataset import Dataset, Run
+from discover.forward.least_squares import Fit
 from discover.protocols import start_up
 
 NO_FIT = Fit(np.zeros(1), (), np.zeros((1, 1)), np.zeros((0, 1, 1)))

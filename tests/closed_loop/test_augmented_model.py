@@ -3,10 +3,11 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.least_squares import fit_batch, left_out_errors
+from discover.closed_loop.left_out import left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
+from discover.forward.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, start_up
 from discover.simulate import simulate

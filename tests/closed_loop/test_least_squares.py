@@ -7,10 +7,11 @@ import pytest
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.attribution import attribute
 from discover.closed_loop.finer_steps import on_finer_steps
-from discover.closed_loop.least_squares import FEWEST_FOLDS, fit_batch, left_out_errors
+from discover.closed_loop.left_out import FEWEST_FOLDS, left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus
 from discover.protocols import oscillatory_shear, start_up
 from discover.simulate import simulate

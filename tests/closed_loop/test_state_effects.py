@@ -6,10 +6,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.least_squares import fit_batch
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward.least_squares import fit_batch
 from discover.protocols import oscillatory_shear, start_up
 
 MODULUS, TIME = 100.0, 1.0

@@ -5,7 +5,6 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, RunRecord
 from discover.closed_loop.judgement import judge
-from discover.closed_loop.least_squares import Fit
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.silence import records_are_silent
 from discover.closed_loop.tolerated_misfit import ToleratedMisfit
@@ -15,6 +14,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
+from discover.forward.least_squares import Fit
 from discover.protocols import start_up
 from discover.statistics.residual import Expectation
 

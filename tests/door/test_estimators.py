@@ -90,12 +90,6 @@ def test_a_base_and_its_parts_are_not_both_given(data, base, learner):
         learner().set_params(base=dc.make_law("ucm")).fit(data)
 
 
-def test_the_network_refuses_a_solvent_with_a_way_on(data, base):
-    wet = dc.Fluid(base.law, base.modulus, base.relaxation_time, 0.5)
-    with pytest.raises(dc.InputError, match="no solvent viscosity yet"):
-        dc.TBNNUDE(base=wet).fit(data)
-
-
 @pytest.mark.parametrize("learner", [dc.TensorSINDy, dc.TBNNUDE])
 def test_a_bare_run_is_refused_with_what_to_write(data, learner):
     with pytest.raises(dc.InputError, match=r"fit\(\[run\]\)"):

@@ -57,8 +57,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     base_law
         A known dimensionless law to which the network is added; by default UCM.
     base
-        The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law` and
-        `known_relaxation`.
+        The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law`,
+        `known_relaxation` and `solvent_viscosity`.
     n_members
         Networks that reach the data by different ways (see `ensemble`). One of the simplest that
         fit is taken; what those that fit disagree on, the data leave open.
@@ -71,6 +71,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         Seed of the initial weights.
     progress
         Called with step, total number of steps (at most) and loss, or None.
+    solvent_viscosity
+        η_s in Pa s.
 
     Attributes
     ----------
@@ -126,6 +128,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         random_state: int = 0,
         progress: Any = None,
         base: Fluid | None = None,
+        solvent_viscosity: float = 0.0,
     ):
         self.recipe = recipe
         self.modulus = modulus
@@ -138,6 +141,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.progress = progress
         self.base = base
+        self.solvent_viscosity = solvent_viscosity
 
     def fit(self, X: Any, y=None) -> "TBNNUDE":
         """Train on σ12 of these runs.
@@ -177,8 +181,9 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
         modulus = jnp.atleast_1d(jnp.asarray(known.modulus, dtype=float))
-        self.fluid_ = Fluid(best.law, modulus, problem.relaxation_time)
-        self.ensemble_fluids_ = [Fluid(law, modulus, problem.relaxation_time) for law in members]
+        modes = modulus, problem.relaxation_time, float(known.solvent_viscosity)
+        self.fluid_ = Fluid(best.law, *modes)
+        self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
         cloud = sample_states(best.law, problem)
         library = self.projection_library or build_library(degree=1)
         projection = project(best.law, cloud, library)
@@ -286,12 +291,9 @@ def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
             "modulus and relaxation_time must be positive, with one value for each mode; got "
             f"{known.modulus!r} and {known.relaxation_time!r}."
         )
-    if known.solvent_viscosity:
-        raise InputError(
-            f"The network takes no solvent viscosity yet; base has {known.solvent_viscosity:g} "
-            "Pa s. Use a base without one, or TensorSINDy."
-        )
-    return make_problem(runs, modulus, relaxation_time)
+    return make_problem(
+        runs, modulus, relaxation_time, solvent_viscosity=float(known.solvent_viscosity)
+    )
 
 
 def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:

@@ -86,6 +86,7 @@ def make_problem(
     relaxation_time: Float[np.ndarray, " k"],
     strain_step: float = 0.2,
     phase_step: float = 0.15,
+    solvent_viscosity: float = 0.0,
 ) -> TrainingProblem:
     """Return the training problem of some runs.
 
@@ -100,6 +101,8 @@ def make_problem(
         Modes, in Pa and s.
     strain_step, phase_step
         Step limits of `discover.simulate.make_grid`.
+    solvent_viscosity
+        In Pa s. The solvent's stress follows from the rate alone, so it is taken off the record.
     """
     total = float(np.sum(modulus))
     protocols = [run.protocol for run in runs]
@@ -107,7 +110,8 @@ def make_problem(
         protocols, [run.time for run in runs], strain_step=strain_step, phase_step=phase_step
     )
     n = grids.sample_index.shape[1]
-    target = np.stack([np.pad(run.recorded, (0, n - len(run)), mode="edge") for run in runs])
+    records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
+    target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])
     return TrainingProblem(
         stack_protocols(protocols),
         grids,
@@ -115,3 +119,9 @@ def make_problem(
         jnp.asarray(modulus / total),
         jnp.asarray(relaxation_time),
     )
+
+
+def _viscous(run: Run) -> Float[np.ndarray, " n"]:
+    """Return what a Newtonian fluid of unit viscosity adds to a record."""
+    flow = run.protocol.kinematics
+    return run.rate if flow is None else float(flow.viscous) * run.rate

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
+from scipy.stats import t as student
 
-from discover.forward import AugmentedModel, Batch
+from discover.forward.augmented_model import AugmentedModel
+from discover.forward.run_batch import Batch
+from discover.statistics import least_squares_covariance
 
 _LARGEST_DAMPING = 1e7
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
-_MISSED = 10.0
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,7 @@ def fit_batch(
         for row, i in enumerate(going):
             at = list(free[i])
             known = prior.rows(theta[i], free[i])
-            moved = theta[i, at] + _step(jacobian[i], residual[i], damping[i], known)
+            moved = theta[i, at] + gauss_newton_step(jacobian[i], residual[i], damping[i], known)
             trial[row, at] = np.clip(moved, model.low[at], model.high[at])
         trial_residual = model.residuals(trial, batch)
         trial_cost = priced(_costs(trial_residual), trial, going)
@@ -219,7 +221,8 @@ def _costs(residual):
     return np.where(np.isfinite(cost), cost, np.inf)
 
 
-def _step(jacobian, residual, damping, known=None):
+def gauss_newton_step(jacobian, residual, damping, known=None):
+    """Return the damped step of the free parameters, with rows of what is known of them."""
     if len(jacobian) == 0:
         return np.zeros(0)
     design = jacobian.reshape(len(jacobian), -1).T
@@ -237,98 +240,28 @@ def _step(jacobian, residual, damping, known=None):
     return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
 
 
-def left_out_errors(
-    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
-) -> Float[np.ndarray, " runs"]:
-    """Return the relative error of each run left out of the fit; see `left_out_parts`."""
-    return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
+def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[float, float]]:
+    """Return the 95 % interval of each fitted parameter, by position.
 
-
-def run_errors(
-    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
-    weight: Float[np.ndarray, "runs n"],
-) -> Float[np.ndarray, " runs"]:
-    """Return the relative error of each run, from parts as in `part_errors`."""
-    squares = np.zeros(len(weight))
-    for held, missed in parts:
-        squares += np.sum(np.where(held, missed, 0.0), axis=1)
-    return np.minimum(np.sqrt(squares), _MISSED)
-
-
-def left_out_parts(
-    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
-) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
-    """Return which samples are left out together, and the squared residuals without them.
-
-    Runs are left out one after another. Of fewer than `FEWEST_FOLDS` runs each is left out in parts
-    instead, stretches of equal length: to leave out one run of three would ask for an extrapolation
-    from the other two, which says little of a law, and one run alone would be all that there is.
-
-    A fit without some samples is one Gauss–Newton step from the fit with them, and they are then
-    predicted with the whole nonlinear model. What cannot be predicted counts as missed by far.
-
-    Parameters
-    ----------
-    model, batch
-        The model and the runs.
-    fit
-        The fit to all of them.
-    prior
-        What is known of some parameters.
+    From the curvature at the fit and the noise that its residual shows; see
+    `discover.statistics.least_squares_covariance`.
     """
-    weighted = np.asarray(batch.weight) > 0
-    folds = _folds(weighted)
-    at = list(fit.free)
-    trials = []
-    for left_out in folds:
-        # rows of zeros count for nothing
-        kept = weighted & ~left_out
-        step = _step(fit.jacobian * kept, fit.residual * kept, 1e-8, prior.rows(fit.theta, at))
-        theta = fit.theta.copy()
-        theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
-        trials.append(theta)
-    with np.errstate(over="ignore", invalid="ignore"):
-        squares = [residual**2 for residual in model.residuals(trials, batch)]
-    squares = [np.where(np.isfinite(missed), missed, np.inf) for missed in squares]
-    return list(zip(folds, squares, strict=True))
-
-
-def part_errors(
-    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
-    weight: Float[np.ndarray, "runs n"],
-) -> Float[np.ndarray, " parts"]:
-    """Return the relative error of each part, from squared weighted residuals.
-
-    Parameters
-    ----------
-    parts
-        Which samples it holds, and squared residuals.
-    weight
-        Weights of the runs, zero at padding.
-    """
-    samples = np.count_nonzero(np.asarray(weight) > 0, axis=1)
-    shares = [
-        float(np.sum(np.sum(np.where(held, squares, 0.0), axis=1) * samples)) / held.sum()
-        for held, squares in parts
-    ]
-    return np.minimum(np.sqrt(shares), _MISSED)
-
-
-FEWEST_FOLDS = 4
-"""Runs from which on each is left out as a whole."""
-
-_PARTS = 8
-
-
-def _folds(weighted: Bool[np.ndarray, "runs n"]) -> list[Bool[np.ndarray, "runs n"]]:
-    """Return which samples are left out together."""
-    n_runs = len(weighted)
-    parts = 1 if n_runs >= FEWEST_FOLDS else -(-_PARTS // n_runs)
-    folds = []
-    for run, seen in enumerate(weighted):
-        for part in np.array_split(np.flatnonzero(seen), parts):
-            if part.size:
-                left_out = np.zeros_like(weighted)
-                left_out[run, part] = True
-                folds.append(left_out)
-    return folds
+    if not fit.free:
+        return {}
+    n_runs, n = fit.residual.shape
+    design = fit.jacobian.reshape(len(fit.free), -1).T
+    rows = np.arange(n_runs * n).reshape(n_runs, n)
+    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
+    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
+    independent = max(noise.effective_samples - len(fit.free), 1.0)
+    half = student.ppf(0.975, independent) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    bounds = {}
+    for position, h in zip(fit.free, half, strict=True):
+        value, low, high = fit.theta[position], model.low[position], model.high[position]
+        # a time must be positive, and what may be as short as that may be nothing
+        floor = 0.0 if 0.0 < low < 1e-6 * value else low
+        bounds[position] = (
+            float(floor if value - h < low else value - h),
+            float(min(value + h, high)),
+        )
+    return bounds

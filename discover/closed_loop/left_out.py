@@ -1,0 +1,110 @@
+"""Errors of runs, or of parts of them, that a fit did not see."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, gauss_newton_step
+
+_MISSED = 10.0
+
+
+def left_out_errors(
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
+) -> Float[np.ndarray, " runs"]:
+    """Return the relative error of each run left out of the fit; see `left_out_parts`."""
+    return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
+
+
+def run_errors(
+    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
+    weight: Float[np.ndarray, "runs n"],
+) -> Float[np.ndarray, " runs"]:
+    """Return the relative error of each run, from parts as in `part_errors`."""
+    squares = np.zeros(len(weight))
+    for held, missed in parts:
+        squares += np.sum(np.where(held, missed, 0.0), axis=1)
+    return np.minimum(np.sqrt(squares), _MISSED)
+
+
+def left_out_parts(
+    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
+) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
+    """Return which samples are left out together, and the squared residuals without them.
+
+    Runs are left out one after another. Of fewer than `FEWEST_FOLDS` runs each is left out in parts
+    instead, stretches of equal length: to leave out one run of three would ask for an extrapolation
+    from the other two, which says little of a law, and one run alone would be all that there is.
+
+    A fit without some samples is one Gauss–Newton step from the fit with them, and they are then
+    predicted with the whole nonlinear model. What cannot be predicted counts as missed by far.
+
+    Parameters
+    ----------
+    model, batch
+        The model and the runs.
+    fit
+        The fit to all of them.
+    prior
+        What is known of some parameters.
+    """
+    weighted = np.asarray(batch.weight) > 0
+    folds = _folds(weighted)
+    at = list(fit.free)
+    trials = []
+    for left_out in folds:
+        # rows of zeros count for nothing
+        kept = weighted & ~left_out
+        step = gauss_newton_step(
+            fit.jacobian * kept, fit.residual * kept, 1e-8, prior.rows(fit.theta, at)
+        )
+        theta = fit.theta.copy()
+        theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
+        trials.append(theta)
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = [residual**2 for residual in model.residuals(trials, batch)]
+    squares = [np.where(np.isfinite(missed), missed, np.inf) for missed in squares]
+    return list(zip(folds, squares, strict=True))
+
+
+def part_errors(
+    parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
+    weight: Float[np.ndarray, "runs n"],
+) -> Float[np.ndarray, " parts"]:
+    """Return the relative error of each part, from squared weighted residuals.
+
+    Parameters
+    ----------
+    parts
+        Which samples it holds, and squared residuals.
+    weight
+        Weights of the runs, zero at padding.
+    """
+    samples = np.count_nonzero(np.asarray(weight) > 0, axis=1)
+    shares = [
+        float(np.sum(np.sum(np.where(held, squares, 0.0), axis=1) * samples)) / held.sum()
+        for held, squares in parts
+    ]
+    return np.minimum(np.sqrt(shares), _MISSED)
+
+
+FEWEST_FOLDS = 4
+"""Runs from which on each is left out as a whole."""
+
+_PARTS = 8
+
+
+def _folds(weighted: Bool[np.ndarray, "runs n"]) -> list[Bool[np.ndarray, "runs n"]]:
+    """Return which samples are left out together."""
+    n_runs = len(weighted)
+    parts = 1 if n_runs >= FEWEST_FOLDS else -(-_PARTS // n_runs)
+    folds = []
+    for run, seen in enumerate(weighted):
+        for part in np.array_split(np.flatnonzero(seen), parts):
+            if part.size:
+                left_out = np.zeros_like(weighted)
+                left_out[run, part] = True
+                folds.append(left_out)
+    return folds

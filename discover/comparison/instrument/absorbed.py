@@ -1,0 +1,87 @@
+"""Known effects of the fluid as part of its law, its modes or its solvent."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from discover.effects import ConstitutiveEffect, KnownEffect, ModeEffect, SeriesElement, StateEffect
+from discover.errors import InputError
+from discover.laws.expansion import law_of_terms
+from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.study.build import DeclaredModel
+
+_ONLY_LOOP = "Leave it out of [model] effects, or use discover close-loop, which knows it."
+_RATES = (1.0, 2.0)
+
+
+def absorbed(declared: DeclaredModel) -> DeclaredModel:
+    """Return the declared model with the known effects of the fluid in its law, modes and solvent.
+
+    What is left among its effects is of the instrument.
+
+    Parameters
+    ----------
+    declared
+        The declared model; its effects of the fluid have values.
+
+    Raises
+    ------
+    InputError
+        If a learner cannot be given an effect as something known.
+    """
+    for known in declared.effects:
+        if isinstance(known.effect, StateEffect):
+            raise InputError(
+                f"compare cannot take {known.name} as known: it gives the fluid a state that no "
+                f"law of stress and rate carries. {_ONLY_LOOP}"
+            )
+        if isinstance(known.effect, SeriesElement):
+            raise InputError(
+                f"compare cannot take {known.name} as known: the rate that the fluid feels would "
+                f"depend on the law that is looked for. {_ONLY_LOOP}"
+            )
+        if isinstance(known.effect, ConstitutiveEffect):
+            declared = _with_effect(declared, known, known.effect)
+    instrument = (k for k in declared.effects if not isinstance(k.effect, ConstitutiveEffect))
+    return replace(declared, effects=tuple(instrument))
+
+
+def _with_effect(
+    declared: DeclaredModel, known: KnownEffect, effect: ConstitutiveEffect
+) -> DeclaredModel:
+    values = jnp.asarray([value for value in known.values if value is not None])
+    assert len(values) == len(known.values)  # what was to be fitted has a value by now
+    shares = effect.as_terms([float(value) for value in values])
+    if shares is None:
+        raise InputError(
+            f"compare cannot take {known.name} as known: what it adds to the law is no sum of "
+            f"library terms. {_ONLY_LOOP}"
+        )
+    law = declared.law
+    for share in shares:
+        base = None if isinstance(law, UpperConvectedMaxwell) else law
+        law = law_of_terms(
+            [share.term], [share.coefficient], share.inner, law.linear_relaxation, base
+        )
+    beside = np.asarray(effect.instantaneous_stress(values, jnp.asarray(_RATES)))
+    if not np.isclose(beside[1], _RATES[1] * beside[0], rtol=1e-9):
+        raise InputError(
+            f"compare cannot take {known.name} as known: a learner is told of no stress beside the "
+            f"modes but a solvent's. {_ONLY_LOOP}"
+        )
+    modulus, relaxation_time = declared.modulus, declared.relaxation_time
+    if isinstance(effect, ModeEffect):
+        extra = [float(value) for value in effect.mode(values)]
+        modulus, relaxation_time = (
+            np.append(column, value)
+            for column, value in zip((modulus, relaxation_time), extra, strict=True)
+        )
+    return replace(
+        declared,
+        law=law,
+        law_name=f"{declared.law_name} with {known.text}" if shares else declared.law_name,
+        modulus=modulus,
+        relaxation_time=relaxation_time,
+        solvent_viscosity=declared.solvent_viscosity + float(beside[0]),
+    )

@@ -1,0 +1,227 @@
+"""Runs without what a known instrument did: the rate that was felt, the stress that was there.
+
+Both learners, and the classical laws, are then given the same corrected runs, so that none of them
+need know of an instrument.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Record, SignalEffect
+from discover.errors import InputError
+from discover.forward import RunBatch, make_batch
+from discover.protocols.protocol import FlowProtocol
+from discover.study.build import StudyData
+
+_FOLLOWED = 1e-4
+"""Error of a felt rate, over its largest, up to which its table leaves points out."""
+
+_POINTWISE = 1e-9
+_FEWEST_ENTRIES = 64
+
+
+@dataclass(frozen=True)
+class InRecord:
+    """What an instrument makes of the stress of one run: recorded = gain · stress + offset.
+
+    Attributes
+    ----------
+    gain, offset
+        At the samples; a pure number, and in Pa.
+    """
+
+    gain: Float[np.ndarray, " n"]
+    offset: Float[np.ndarray, " n"]
+
+    def recorded(self, stress: Float[np.ndarray, "*m n"]) -> Float[np.ndarray, "*m n"]:
+        """Return what is recorded of a stress in Pa."""
+        return self.gain * stress + self.offset
+
+    def undone(self, recorded: Float[np.ndarray, "*m n"]) -> Float[np.ndarray, "*m n"]:
+        """Return the stress in Pa behind a record."""
+        return (recorded - self.offset) / self.gain
+
+
+def corrected(
+    data: StudyData, effects: Sequence[KnownEffect]
+) -> tuple[StudyData, Mapping[str, InRecord]]:
+    """Return data with the rate that the fluid felt and the stress without the instrument's part.
+
+    Runs in extension, which another instrument makes, stay as they are.
+
+    Parameters
+    ----------
+    data
+        As recorded.
+    effects
+        Of the instrument, with their values.
+
+    Returns
+    -------
+    The corrected data, and by name of the run what the instrument makes of its stress.
+
+    Raises
+    ------
+    InputError
+        If an effect acts on a measured rate that contains it, or has a memory of the stress.
+    """
+    runs = list(data.dataset.runs)
+    for known in effects:
+        measured = next((run.name for run in runs if run.rate_is_measured), "")
+        if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
+            raise InputError(
+                f"The known effect {known.name} lies between the command and the tool, and the "
+                f"rate of {measured} was measured at the tool, so it contains it already. Leave "
+                "the effect out."
+            )
+    if not effects or not runs:
+        return data, {}
+    batch = make_batch(runs)
+    assert isinstance(batch, RunBatch)  # in a comparison every run follows a rate
+    values = [jnp.asarray(known.values, dtype=float) for known in effects]
+    felt, gain, offset, missed = (
+        np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, batch)
+    )
+    for known, row in zip(effects, missed, strict=True):
+        if np.max(row) > _POINTWISE:
+            raise InputError(
+                f"compare cannot take {known.name} as known: it mixes the stress of earlier times "
+                "into the record, which cannot be undone in noise. Leave it out of [model] "
+                "effects, or use discover close-loop, which knows it."
+            )
+    found, made = {}, {}
+    moves = any(isinstance(known.effect, KinematicEffect) for known in effects)
+    for i, run in enumerate(runs):
+        if run.flow != "shear":
+            found[run.name] = run
+            continue
+        n = len(run)
+        at = np.asarray(batch.sample_index)[i, :n]
+        one = InRecord(gain[i, at], offset[i, at])
+        if np.any(one.gain <= 0.0):
+            raise InputError(
+                f"With the known effects nothing would be recorded of the stress of {run.name}. "
+                "Check their values in [model] effects."
+            )
+        changed = replace(run, stress=one.undone(run.stress))
+        if run.quantity == "sigma12":  # what distorts the torque leaves the normal force alone
+            made[run.name] = one
+        if moves:
+            times = np.asarray(batch.times)[i]
+            last = 2 * int(at[-1]) + 1
+            protocol = _felt_protocol(
+                run.protocol,
+                times[:last],
+                np.asarray(batch.commanded_rate)[i][:last],
+                felt[i][:last],
+            )
+            rate = felt[i][::2][at]
+            changed = replace(changed, protocol=protocol, rate=rate, strain=None, rate_before=0.0)
+        found[run.name] = changed
+    dataset = replace(data.dataset, runs=tuple(found[run.name] for run in runs))
+    fit, held_out = dataset.select(data.fit.names), dataset.select(data.held_out.names)
+    return StudyData(dataset, fit, held_out, data.each), made
+
+
+@lru_cache(maxsize=16)
+def _instrument(effects: tuple[AbstractEffect, ...]) -> Any:
+    """Return the compiled function of the values of effects and of a batch of runs.
+
+    It returns the felt rate on the half-step grid, gain and offset at step ends, and how far each
+    effect is from acting on each stress by itself.
+    """
+
+    def of_run(values, run: RunBatch):
+        clock = run.times / run.clock_factor
+        rate = run.commanded_rate
+        pairs = list(zip(effects, values, strict=True))
+        kinematic = [(e, v) for e, v in pairs if isinstance(e, KinematicEffect)]
+        for effect, own in kinematic:
+            if effect.shapes_command:
+                rate = effect.felt_rate(own, clock, rate)
+        tool = rate[::2]
+        for effect, own in kinematic:
+            if not effect.shapes_command:
+                rate = effect.felt_rate(own, clock, rate)
+        times, felt = run.times[::2], rate[::2]
+        gain, offset = jnp.ones_like(times), jnp.zeros_like(times)
+        missed = []
+        # a stress that changes its sign from step to step shows any memory
+        probe = jnp.where(jnp.arange(times.size) % 2 == 0, 1.0, -0.5)
+        for effect, own in pairs:
+            if not isinstance(effect, SignalEffect):
+                missed.append(jnp.zeros(()))
+                continue
+
+            def recorded(stress, effect=effect, own=own):
+                record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool)
+                return effect.recorded_stress(own, record)
+
+            added = recorded(jnp.zeros_like(times))
+            factor = recorded(jnp.ones_like(times)) - added
+            size = jnp.max(jnp.abs(added)) + 1.0
+            missed.append(jnp.max(jnp.abs(recorded(probe) - factor * probe - added)) / size)
+            gain, offset = factor * gain, factor * offset + added
+        return rate, gain, offset, jnp.stack(missed)
+
+    mapped = jax.jit(jax.vmap(of_run, in_axes=(None, 0), out_axes=(0, 0, 0, 1)))
+    return mapped
+
+
+def _felt_protocol(
+    protocol: FlowProtocol,
+    times: Float[np.ndarray, " m"],
+    commanded: Float[np.ndarray, " m"],
+    felt: Float[np.ndarray, " m"],
+) -> FlowProtocol:
+    """Return the protocol of a felt rate: the command by a factor, or a table through the rate."""
+    size = float(np.max(np.abs(felt)))
+    largest = int(np.argmax(np.abs(commanded)))
+    factor = felt[largest] / commanded[largest] if commanded[largest] else 1.0
+    if np.allclose(felt, factor * commanded, rtol=0.0, atol=1e-12 * max(size, 1e-300)):
+        return replace(
+            protocol,
+            table_rates=factor * protocol.table_rates,
+            amplitudes=factor * protocol.amplitudes,
+        )
+    kept = _followed(times, felt, _FOLLOWED * size)
+    knots, rates = times[kept], felt[kept]
+    # tables of a few lengths, so that runs share compiled programs
+    entries = max(_FEWEST_ENTRIES, 1 << int(np.ceil(np.log2(len(knots)))))
+    more = entries - len(knots)
+    knots = np.concatenate([knots, knots[-1] * (1.0 + 1e-3 * np.arange(1, more + 1))])
+    return replace(
+        protocol,
+        table_times=jnp.asarray(knots),
+        table_rates=jnp.asarray(np.pad(rates, (0, more), mode="edge")),
+        amplitudes=jnp.zeros(1),
+        frequencies=jnp.zeros(1),
+        phases=jnp.zeros(1),
+    )
+
+
+def _followed(
+    times: Float[np.ndarray, " m"], values: Float[np.ndarray, " m"], tolerance: float
+) -> np.ndarray:
+    """Return positions through which straight lines follow a curve   [Douglas & Peucker 1973]."""
+    kept, stack = {0, len(times) - 1}, [(0, len(times) - 1)]
+    while stack:
+        low, high = stack.pop()
+        if high - low < 2:
+            continue
+        inside = slice(low + 1, high)
+        ends = times[[low, high]], values[[low, high]]
+        off = np.abs(values[inside] - np.interp(times[inside], *ends))
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            middle = low + 1 + worst
+            kept.add(middle)
+            stack += [(low, middle), (middle, high)]
+    return np.array(sorted(kept))

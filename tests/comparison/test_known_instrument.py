@@ -1,0 +1,170 @@
+"""A known instrument is taken out of the records; what cannot be is refused in words."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_instrument import MOBILITY, oscillations, slow_start_ups
+
+from discover.comparison import compare
+from discover.comparison.instrument import absorbed, corrected
+from discover.effects import known_effects
+from discover.errors import InputError
+from discover.laws import Fluid, make_law
+from discover.learners import LearnerResult, RecoveredTerm
+from discover.simulate import simulate
+from discover.study import RunFolder, parse_study
+from discover.study.build import StudyData
+from discover.study.in_memory import declared_fluid, with_known
+
+GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": MOBILITY}))
+
+
+def divided(data):
+    return StudyData(data, data, data.select([]))
+
+
+def test_a_rate_that_rises_slowly_is_the_rate_that_the_fluid_felt():
+    data = divided(slow_start_ups(rise_time=0.2))
+    known = known_effects({"rate_rise_time": {"tau": 0.2}})
+    for effects, limit in ((known, 2e-4), ((), 0.1)):
+        found, _ = corrected(data, effects)
+        worst = 0.0
+        for run in found.fit:
+            stress = simulate(GIESEKUS, run.protocol, run.time).shear_stress
+            worst = max(worst, np.max(np.abs(stress - run.stress)) / np.max(np.abs(run.stress)))
+        # straight lines follow the felt rate to 1e-4; without the effect the start is missed by far
+        assert bool(worst < limit) is bool(effects)
+
+
+def test_gain_and_offset_are_undone_in_the_order_in_which_they_were_made():
+    data = divided(oscillations(gain=1.0))
+    known = known_effects({"stress_gain": {"gain_error": 0.25}, "stress_offset": {"offset": 0.1}})
+    found, made = corrected(data, known)
+    for before, after in zip(data.fit, found.fit, strict=True):
+        np.testing.assert_allclose(1.25 * after.stress + 0.1, before.stress, rtol=1e-12)
+        np.testing.assert_allclose(made[after.name].recorded(after.stress), before.stress)
+        assert after.protocol is before.protocol
+
+
+def test_a_known_effect_of_the_fluid_becomes_its_law_its_modes_and_its_solvent():
+    data = oscillations(gain=1.0)
+    effects = {
+        "giesekus_mobility": {"alpha": 0.2},
+        "relaxation_mode": {"G": 2.0, "lambda": 5.0},
+        "solvent_viscosity": {"eta_s": 0.3},
+        "stress_gain": {"gain_error": 0.1},
+    }
+    found = absorbed(with_known(declared_fluid(None, data), effects))
+    assert [(t.term, t.coefficient) for t in found.law.as_terms()] == [("sigma.sigma", 0.2)]
+    assert found.modulus.tolist() == [1.0, 2.0]
+    assert found.relaxation_time.tolist() == [1.0, 5.0]
+    assert found.solvent_viscosity == pytest.approx(0.3)
+    assert [known.name for known in found.effects] == ["stress_gain"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "words"),
+    [
+        ({"tool_compliance": {"compliance": 0.1}}, "depend on the law that is looked for"),
+        ({"transducer_lag": {"tau": 0.1}}, "mixes the stress of earlier times"),
+        ({"time_delay": {"delay": 0.1}}, "mixes the stress of earlier times"),
+        ({"viscous_heating": {"heating": 1e-7, "heat_loss_time": 1.0}}, "a state that no law"),
+        ({"yield_stress": {"yield_strain": 0.1}}, "no sum of library terms"),
+    ],
+)
+def test_what_a_learner_cannot_be_told_is_refused(effects, words):
+    data = oscillations(gain=1.0)
+    declared = with_known(declared_fluid(None, data), effects)
+    with pytest.raises(InputError, match="compare cannot take") as caught:
+        corrected(divided(data), absorbed(declared).effects)
+    assert words in str(caught.value)
+
+
+def trained(learner, study, model, runs, seed=0, progress=None, library=None):
+    law = make_law("giesekus", {"alpha": MOBILITY})
+    term = RecoveredTerm("sigma.sigma", MOBILITY, MOBILITY, (0.29, 0.31))
+    history = (np.arange(1, 3), np.array([1.0, 0.1]))
+    result = LearnerResult(learner, law, (term,), 1.5, history, {"rivals": []}, "fake")
+    return result, Fluid(law, model.modulus, model.relaxation_time)
+
+
+def compared(data, store=None, **model):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("discover.comparison.run_comparison.train", trained)
+        study = parse_study(
+            {"data": {"folder": "f"}, "compare": {"library": {"degree": 0}}, "model": model}
+        )
+        declared = with_known(
+            declared_fluid(None, data), model.get("effects"), model.get("free", ())
+        )
+        whole = StudyData(data, data.select(data.names[1:]), data.select(data.names[:1]))
+        return compare(study, data=whole, declared=declared, store=store)
+
+
+@pytest.fixture(scope="module")
+def weak():
+    return oscillations(gain=0.9)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.fixture(scope="module")
+def with_gain(weak, folder):
+    """Both learners with the gain fitted along, kept in a folder."""
+    return compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
+
+
+def test_both_learners_see_the_records_without_the_gain(weak, with_gain):
+    known = compared(weak, effects={"stress_gain": {"gain_error": -0.1}})
+    for found in (with_gain, known):
+        for name in ("tensor_sindy", "tbnn_ude"):
+            for flow in [*found.flows_of("training"), *found.judged]:
+                # the noise, and a gain that is known to a fraction of it
+                assert found.errors(name, flow)["sigma12"] == pytest.approx(0.01, rel=0.35)
+
+
+def test_without_the_gain_the_same_law_misses_by_it(weak):
+    found = compared(weak)
+    (flow,) = found.judged
+    assert found.errors("tensor_sindy", flow)["sigma12"] > 0.09  # the gain is 10 %
+    assert found.to_json()["learners"]["tensor_sindy"]["constants"] == {}
+
+
+def test_the_constants_stand_in_the_results_with_what_is_known_of_them(with_gain):
+    learners = with_gain.to_json()["learners"]
+    sparse, network = (learners[n]["constants"] for n in ("tensor_sindy", "tbnn_ude"))
+    low, high = sparse["stress_gain.gain_error"]["ci95"]
+    assert low <= -0.1 <= high
+    # a law that cannot give way says nothing of an interval
+    assert network["stress_gain.gain_error"]["ci95"] is None
+    assert network["stress_gain.gain_error"]["value"] == pytest.approx(-0.1, abs=0.01)
+    (effect,) = learners["tensor_sindy"]["effects"]
+    assert effect["parameters"]["gain_error"]["value"] == sparse["stress_gain.gain_error"]["value"]
+    assert "fitted along with each learner" in with_gain.known_part
+
+
+def test_what_was_kept_gives_the_same_results(weak, with_gain, folder):
+    again = compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
+    assert again.to_json()["learners"] == with_gain.to_json()["learners"]
+
+
+def test_the_classical_laws_have_the_gain_too(with_gain):
+    giesekus = next(fit for fit in with_gain.classical if fit.law == "giesekus")
+    assert giesekus.parameters["alpha"] == pytest.approx(MOBILITY, abs=0.01)
+    assert giesekus.along["stress_gain.gain_error"] == pytest.approx(-0.1, abs=0.01)
+    assert giesekus.misfit == pytest.approx(0.01, rel=0.2)
+    others = [fit for fit in with_gain.classical if fit.law != "giesekus"]
+    assert all(fit.criterion > giesekus.criterion for fit in others)
+
+
+def test_a_law_without_a_linear_part_has_no_constant_to_fit_along(weak):
+    declared = with_known(declared_fluid(None, weak), {"stress_gain": "fit"})
+    law = make_law("ucm", {})
+    elastic = replace(declared, law=type(law)(linear_relaxation=False))
+    study = parse_study({"data": {"folder": "f"}, "model": {"known_relaxation": False}})
+    with pytest.raises(InputError, match="known_relaxation = false leaves the linear law"):
+        compare(study, data=divided(weak), declared=elastic)

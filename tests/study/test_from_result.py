@@ -1,0 +1,154 @@
+"""[model] from: what an earlier result found becomes what is declared, or one clear error."""
+
+import json
+
+import numpy as np
+import pytest
+
+from discover.dataset import Dataset, Run
+from discover.errors import InputError
+from discover.protocols import start_up
+from discover.study import fingerprint, read_study
+from discover.study.build import declared_model, forward_model
+
+LAW = {
+    "format": "discover law 1",
+    "terms": [{"term": "sigma.sigma", "coefficient": 0.3}],
+    "modes": [
+        {"modulus_Pa": 90.0, "relaxation_time_s": 1.0},
+        {"modulus_Pa": 40.0, "relaxation_time_s": 0.1},
+    ],
+}
+GAIN = {
+    "effect": "stress_gain",
+    "kind": "signal",
+    "parameters": {"gain_error": {"value": -0.1, "ci95": [-0.12, -0.08], "unit": ""}},
+}
+MOBILITY = {
+    "effect": "ptt_linear",
+    "kind": "constitutive",
+    "parameters": {"epsilon": {"value": 0.2, "ci95": [0.1, 0.3], "unit": ""}},
+}
+LOOP = {
+    "verdict": "effects_added",
+    "declared": {"law": LAW, "effects": [GAIN]},
+    "stages": [MOBILITY],
+}
+COMPARISON = {
+    "verdict": "explained",
+    "lack_of_fit": {"tensor_sindy": {"verdict": "explained"}},
+    "learners": {"tensor_sindy": {"law": LAW, "terms": [{}], "effects": [GAIN]}},
+}
+
+
+def write(tmp_path, name, content, model='from = "earlier"'):
+    folder = tmp_path / "earlier"
+    folder.mkdir(exist_ok=True)
+    if content is not None:
+        (folder / name).write_text(json.dumps(content))
+    file = tmp_path / "s.toml"
+    file.write_text(f'[data]\nsynthetic = {{ law = "ucm" }}\n[model]\n{model}\n')
+    return file
+
+
+DATA = Dataset("one run", (Run("r", np.array([0.0, 1.0]), start_up(1.0), np.ones(2), np.ones(2)),))
+
+
+def declared(file):
+    return declared_model(read_study(file), DATA)
+
+
+def test_a_loop_gives_its_law_its_modes_and_every_effect_with_its_value(tmp_path):
+    found = declared(write(tmp_path, "loop.json", LOOP))
+    assert [(t.term, t.coefficient) for t in found.law.as_terms()] == [("sigma.sigma", 0.3)]
+    assert found.modulus.tolist() == [90.0, 40.0]
+    assert {known.name: known.values for known in found.effects} == {
+        "stress_gain": (-0.1,),
+        "ptt_linear": (0.2,),
+    }
+    assert not found.free_constants
+    assert "the loop's declared law" in found.source
+    assert "stress gain (gain_error = -0.1)" in found.source
+
+
+def test_a_comparison_gives_the_sparse_law_and_the_instrument(tmp_path):
+    found = declared(write(tmp_path, "comparison.json", COMPARISON))
+    assert [known.name for known in found.effects] == ["stress_gain"]
+    assert "sparse regression" in found.source
+    # the loop takes a law of terms as it takes one with a name
+    model = forward_model(found)
+    assert model.free_positions == []
+    assert [known.name for known in model.effects] == ["stress_gain"]
+
+
+def test_a_law_without_terms_is_the_maxwell_law(tmp_path):
+    plain = {**LOOP, "declared": {"law": {**LAW, "terms": []}, "effects": []}}
+    assert declared(write(tmp_path, "loop.json", plain)).law_name == "ucm"
+
+
+def test_an_effect_of_the_study_stands_in_place_of_the_one_that_was_found(tmp_path):
+    model = 'from = "earlier"\neffects = { stress_gain = "fit" }'
+    found = declared(write(tmp_path, "loop.json", LOOP, model))
+    assert found.free_constants == ("stress_gain.gain_error",)
+
+
+def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
+    doubtful = {**LOOP, "verdict": "unexplained"}
+    assert "did not explain" in declared(write(tmp_path, "loop.json", doubtful)).source
+
+
+def test_the_fingerprint_changes_with_what_is_taken(tmp_path):
+    file = write(tmp_path, "loop.json", LOOP)
+    before = fingerprint(read_study(file))
+    assert fingerprint(read_study(file)) == before
+    write(tmp_path, "loop.json", {**LOOP, "stages": []})
+    assert fingerprint(read_study(file)) != before
+
+
+_NOTHING = {**LOOP, "verdict": "unexplained", "stages": []}
+_NO_TERM = {
+    **COMPARISON,
+    "lack_of_fit": {"tensor_sindy": {"verdict": "unexplained"}},
+    "learners": {"tensor_sindy": {"law": LAW, "terms": []}},
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("loop.json", None, "holds neither loop.json nor comparison.json"),
+        ("loop.json", {"verdict": "no_signal"}, "hold no signal"),
+        ("loop.json", {"verdict": "effects_added"}, "written by an earlier version"),
+        ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
+        ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),
+        ("loop.json", _NOTHING, "there is nothing to take"),
+        ("loop.json", [1, 2], "is no result of discover"),
+        ("comparison.json", _NO_TERM, "there is nothing to take"),
+        ("comparison.json", {"learners": {}}, "holds no law of sparse regression"),
+    ],
+)
+def test_where_nothing_can_be_taken_one_error_says_why(tmp_path, name, content, words):
+    file = write(tmp_path, name, content)
+    with pytest.raises(InputError, match=r"\[model\] from") as caught:
+        declared(file)
+    assert words in str(caught.value)
+
+
+def test_a_result_that_is_not_finished_is_refused(tmp_path):
+    file = write(tmp_path, "loop.json", LOOP)
+    state = tmp_path / "earlier" / "state"
+    state.mkdir()
+    (state / "study.json").write_text('{"fingerprint": "f", "complete": false}')
+    with pytest.raises(InputError, match="is not finished"):
+        declared(file)
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match="there is no folder"):
+        declared(write(tmp_path, "loop.json", LOOP, 'from = "elsewhere"'))
+
+
+def test_a_law_beside_from_is_refused(tmp_path):
+    file = write(tmp_path, "loop.json", LOOP, 'from = "earlier"\nlaw = "giesekus"')
+    with pytest.raises(InputError, match="law is given too"):
+        read_study(file)
