@@ -193,8 +193,9 @@ def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
         "time": [r.time for r in records],
         "strain": [np.abs(r.strain) for r in records],
         "shear rate": [r.rate for r in records],
-        "stress": [r.measured for r in records],
     }
+    if all(r.quantity != "strain" for r in records):
+        found["stress"] = [r.measured for r in records]
     if any(np.ptp(r.time - r.instrument_time) > 0 for r in records):
         found["time on the instrument's clock"] = [r.instrument_time for r in records]
     frequencies = [oscillation(r) for r in records]

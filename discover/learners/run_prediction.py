@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
 
+from discover.dataset.material_functions import at_measured_rate
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.first_use import require_double
@@ -23,12 +24,15 @@ if TYPE_CHECKING:
 
 
 def as_runs(runs: Any) -> list[Run]:
-    """Return the runs as a list, having checked that they are runs.
+    """Return the runs as a list, each as one that follows a rate in time.
+
+    One at a given stress follows its measured rate.
 
     Raises
     ------
     InputError
-        If there is none, one is something else, or JAX computes in single precision.
+        If there is none, one is something else or follows no rate (a flow curve, a creep test), or
+        JAX computes in single precision.
     """
     require_double()
     if isinstance(runs, Run):
@@ -50,7 +54,7 @@ def as_runs(runs: Any) -> list[Run]:
                 f"A learner takes a sequence of Run; got a {type(run).__name__}. Load a "
                 "folder or make a synthetic data set."
             )
-    return listed
+    return [at_measured_rate(run) for run in listed]
 
 
 class RunPrediction:

@@ -11,6 +11,7 @@ from discover.closed_loop.result import Fold, LoopResult, Stage
 from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError
+from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import made_by, render
@@ -86,6 +87,7 @@ def write_loop(
         questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=_error_rows(result),
+        recorded=in_words(record.quantity for record in result.records),
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],

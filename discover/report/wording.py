@@ -173,7 +173,7 @@ def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> fl
 def terms_text(outcome: LearnerOutcome) -> str:
     """Return the law's terms as plain text, with the intervals of the coefficients."""
     if not outcome.terms:
-        return "no term at all"
+        return "nothing beside the known part"
     parts = []
     for term in outcome.terms:
         text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"

@@ -114,3 +114,20 @@ def test_the_comparison_refuses_what_its_learners_cannot_follow(tmp_path):
     folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
     with pytest.raises(InputError, match=r"is a flow curve, .* discover close-loop fits it"):
         compare(study(folder))
+
+
+def test_an_estimator_refuses_a_flow_curve_and_follows_the_rate_of_a_given_stress(tmp_path):
+    from discover.learners.run_prediction import as_runs
+
+    curve = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
+    with pytest.raises(InputError, match="is a flow curve"):
+        as_runs([curve])
+    times = np.linspace(0.1, 6.0, 60)
+    rows = [f"{t},{np.sin(t)},{1.0 - np.cos(t)}" for t in times]
+    files = {"runs.csv": "file,control\nwave.csv,stress\n"}
+    files["wave.csv"] = "\n".join(["time_s,stress_Pa,strain", *rows])
+    wave = load_dataset(write(tmp_path, files))["wave.csv"]
+    (followed,) = as_runs([wave])
+    assert (wave.quantity, followed.quantity) == ("strain", "sigma12")
+    # the slope of 1 − cos is sin; a moving cubic over 15 samples is good to a per cent
+    np.testing.assert_allclose(followed.rate[10:-10], np.sin(times)[10:-10], atol=0.01)
