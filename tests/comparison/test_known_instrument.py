@@ -7,6 +7,7 @@ import pytest
 from planted_instrument import MOBILITY, oscillations, slow_start_ups
 
 from discover.comparison import compare
+from discover.comparison.in_memory import compare as compare_in_memory
 from discover.comparison.instrument import absorbed, corrected
 from discover.effects import known_effects
 from discover.errors import InputError
@@ -165,6 +166,35 @@ def test_the_classical_laws_have_the_gain_too(with_gain):
     assert giesekus.misfit == pytest.approx(0.01, rel=0.2)
     others = [fit for fit in with_gain.classical if fit.law != "giesekus"]
     assert all(fit.criterion > giesekus.criterion for fit in others)
+
+
+def test_python_takes_what_a_study_does(weak):
+    options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, "held_out": weak.names[:1]}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("discover.comparison.run_comparison.train", trained)
+        found = compare_in_memory(weak, known_effects={"stress_gain": "fit"}, **options)
+        factor = compare_in_memory(weak, free=["modulus_Pa"], **options)
+    gain = found.outcomes["tensor_sindy"].constants["stress_gain.gain_error"]
+    assert gain.ci95[0] <= -0.1 <= gain.ci95[1]
+    modulus = factor.outcomes["tensor_sindy"].constants["modulus_Pa"]
+    assert modulus.ci95[0] <= 0.9 <= modulus.ci95[1]
+    # a band of N1 does not know how badly the modulus is known
+    assert all("A factor on the modes" in s.text for s in factor.statements)
+    assert not any("A factor on the modes" in s.text for s in found.statements)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"free": ["alpha"]}, "'alpha' cannot be fitted: the base has modulus_Pa"),
+        ({"free": "modulus_Pa"}, "free must be a list"),
+        ({"known_effects": {"stress_gain": {"gain": 1.0}}}, "no parameter 'gain'"),
+    ],
+)
+def test_python_says_what_is_wrong_before_anything_is_fitted(weak, options, words):
+    with pytest.raises(InputError) as caught:
+        compare_in_memory(weak, **options)
+    assert words in str(caught.value)
 
 
 def test_a_law_without_a_linear_part_has_no_constant_to_fit_along(weak):
