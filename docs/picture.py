@@ -11,8 +11,9 @@ from discover.comparison.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
-from discover.report.plots.flows import SYMBOLS, curves, last_cycle
+from discover.report.plots.flows import curves, last_cycle
 from discover.report.plots.style import Picture, figure, legend_above, picture
+from discover.report.wording import FIGURE_SYMBOLS
 from discover.study.read import read_study
 
 FLOW = "laos_3_1.5"
@@ -33,7 +34,7 @@ def draw(comparison: Comparison) -> Picture:
                 panel.plot(flow.rate[last], stresses[quantity][last], label=label, **style)
             panel.set_title(TITLES[quantity])
             panel.set_xlabel("λγ̇")
-            panel.set_ylabel(f"{SYMBOLS[quantity]} / G")
+            panel.set_ylabel(f"{FIGURE_SYMBOLS[quantity]} / G")
         legend_above(drawing, axes)
         return picture(
             drawing,

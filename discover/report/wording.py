@@ -192,6 +192,7 @@ def _factor(text: str) -> str:
 RULES = {
     "bic": "BIC",
     "held_out": "held-out runs",
+    "one_standard_error": "one standard error",
     "stability": "stability",
     "pysindy": "pysindy at its default",
 }

@@ -197,7 +197,7 @@ class Compare(Section):
     library: Library = Library()
     test: Literal["paper"] = "paper"
     optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"
-    selection: Literal["bic", "held_out"] = "bic"
+    selection: Literal["bic", "held_out", "one_standard_error"] = "bic"
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
     recipe: Literal["default", "paper"] = "default"
     quick: bool = False

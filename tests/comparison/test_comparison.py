@@ -208,10 +208,18 @@ def test_true_terms_make_the_true_law():
             assert np.allclose(law.stress_rate(stress, rate), wanted, rtol=1e-12), name
 
 
-def test_free_parameters_are_refused_with_a_remedy():
-    content = fake_study().model_dump(exclude_none=True)
-    content["model"] = {"modulus_Pa": "fit"}
+def test_constants_of_the_law_need_somebody_who_fits_them():
+    content = fake_study().model_dump(exclude_none=True, by_alias=True)
+    content["model"] = {"law": "giesekus", "parameters": {"alpha": "fit"}}
     with pytest.raises(InputError, match="close-loop"):
+        compare(parse_study(content))
+
+
+def test_a_sweep_has_no_instrument():
+    sweep = {"laws": ["ptt_linear"], "parameter": "epsilon", "values": [0.1]}
+    content = fake_study(sweep=sweep).model_dump(exclude_none=True, by_alias=True)
+    content["model"] = {"effects": {"stress_gain": {"gain_error": 0.1}}}
+    with pytest.raises(InputError, match="sweep computes data that hold no instrument"):
         compare(parse_study(content))
 
 

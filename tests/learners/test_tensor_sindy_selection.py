@@ -4,6 +4,7 @@ from discover.learners.tensor_sindy.linear_model import additions, all_of_size, 
 from discover.learners.tensor_sindy.selection import (
     choose_by_bic,
     choose_by_held_out,
+    choose_by_one_standard_error,
     extended_bic,
 )
 from discover.learners.tensor_sindy.validation import run_folds
@@ -49,6 +50,20 @@ def test_misfits_below_the_floor_do_not_buy_a_term():
 def test_a_member_that_runs_away_is_not_chosen():
     errors = np.array([[0.4] * 4, [0.02] * 4, [0.01, np.inf, 0.01, np.nan]])
     assert choose_by_held_out(errors, 1e-5) == 1
+
+
+def test_one_standard_error_takes_the_simplest_law_that_the_spread_over_runs_allows():
+    # means 0.160, 0.0424, 0.0404 of the squares; the last one's standard error is 0.0029
+    errors = np.array([[0.4] * 4, [0.2, 0.22, 0.19, 0.213], [0.2, 0.22, 0.18, 0.203]])
+    assert choose_by_one_standard_error(errors, 1e-5) == 1
+    # the same difference where the runs agree is more than an error
+    exact = np.array([[0.4] * 4, [0.206] * 4, [0.201] * 4])
+    assert choose_by_one_standard_error(exact, 1e-5) == 2
+
+
+def test_one_standard_error_does_not_take_what_runs_away():
+    errors = np.array([[0.4] * 4, [0.02, 0.021, 0.02, 0.02], [0.01, np.inf, 0.01, np.nan]])
+    assert choose_by_one_standard_error(errors, 1e-5) == 1
 
 
 def test_folds_are_even_seeded_and_use_every_run():

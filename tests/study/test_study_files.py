@@ -228,5 +228,5 @@ def test_a_stress_that_is_not_observed_judges(tmp_path):
 
 def test_a_run_cannot_be_fitted_whose_stress_is_not_observed(tmp_path):
     data = {"folder": str(with_an_extension(tmp_path / "melt")), "observe": ["sigma12"]}
-    with pytest.raises(InputError, match=r"pull\.csv.*not in observe"):
+    with pytest.raises(InputError, match=r"pull\.csv.*recorded nothing that is in observe"):
         load_study_data(parse_study({"data": data | {"fit": ["pull.csv"]}}))

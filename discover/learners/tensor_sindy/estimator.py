@@ -1,11 +1,12 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
@@ -28,7 +29,11 @@ from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.report import path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
+from discover.learners.tensor_sindy.selection import (
+    choose_by_bic,
+    choose_by_held_out,
+    choose_by_one_standard_error,
+)
 from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
@@ -38,7 +43,7 @@ from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
 
-SELECTIONS = ("bic", "held_out")
+SELECTIONS = ("bic", "held_out", "one_standard_error")
 
 
 class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
@@ -70,7 +75,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
     use_normal_stresses
         Whether N1 and N2, where measured, join as observed rows.
     selection
-        ``"bic"`` or ``"held_out"``.
+        ``"bic"``; ``"held_out"``, a test on runs left out; or ``"one_standard_error"``, the
+        simplest law within one standard error of the best on runs left out.
     max_terms
         Largest support.
     n_folds
@@ -216,12 +222,13 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             self.use_normal_stresses,
             self.strain_step,
         )
-        n_runs = problem.target.shape[0]
-        validates = min(n_runs, self.n_folds) > 1
-        if self.selection == "held_out" and not validates:
+        groups = _groups(runs)
+        n_groups = int(np.max(groups)) + 1
+        validates = min(n_groups, self.n_folds) > 1
+        if self.selection != "bic" and not validates:
             raise InputError(
-                f"selection='held_out' needs at least two runs and two folds; got {n_runs} and "
-                f"{self.n_folds}. Use selection='bic'."
+                f"selection={self.selection!r} needs at least two runs and two folds; got "
+                f"{n_groups} and {self.n_folds}. Use selection='bic'."
             )
         search = SupportSearch(
             problem, self.optimizer, self.max_terms, self.misfit_floor, self.progress
@@ -229,13 +236,15 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         path = search.run()
         held_out, by_run = None, None
         if validates:
-            folds = run_folds(n_runs, self.n_folds, self.random_state)
+            folds = run_folds(n_groups, self.n_folds, self.random_state)[groups]
             held_out, errors = held_out_misfits(problem, path, folds, search.scale, search.slots)
             names = [run.name for run in runs]
             by_run = [dict(zip(names, map(float, row), strict=True)) for row in errors]
         criterion = np.array([search.criterion(fit) for fit in path])
         if self.selection == "held_out" and held_out is not None:
             chosen = choose_by_held_out(held_out, self.misfit_floor)
+        elif self.selection == "one_standard_error" and held_out is not None:
+            chosen = choose_by_one_standard_error(held_out, self.misfit_floor)
         else:
             chosen = choose_by_bic(criterion)
         fit = path[chosen]
@@ -430,6 +439,14 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             raise InputError(f"max_terms must be at least 1; got {self.max_terms}.")
         if not self.misfit_floor > 0:
             raise InputError(f"misfit_floor must be positive; got {self.misfit_floor}.")
+
+
+def _groups(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:
+    """Return the number of the experiment of each run: what was recorded of one goes together."""
+    named = len({run.name for run in runs}) == len(runs)
+    sources = [run.source if named else i for i, run in enumerate(runs)]
+    order = {source: i for i, source in enumerate(dict.fromkeys(sources))}
+    return np.array([order[source] for source in sources])
 
 
 def _law(library: TermLibrary, fit: Fit, known: KnownPart) -> LibraryExpansion:

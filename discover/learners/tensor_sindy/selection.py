@@ -67,3 +67,25 @@ def choose_by_held_out(errors: Float[np.ndarray, "path folds"], floor: float) ->
         if np.mean(excess) <= student.ppf(1.0 - _LEVEL, n_folds - 1) * spread:
             return member
     return best
+
+
+def choose_by_one_standard_error(errors: Float[np.ndarray, "path folds"], floor: float) -> int:
+    """Return the simplest member within one standard error of the best on runs left out.
+
+    The rule of one standard error   [Breiman et al. 1984, Classification and Regression Trees,
+    ch. 3.4.3]: the mean over folds of the squared misfit is no larger than the best one's plus the
+    standard error of that mean over the folds. Folds are whole runs, so that the correlation of
+    neighbouring samples does not pass for independent evidence.
+
+    Parameters
+    ----------
+    errors
+        Relative misfit of each member on each group of runs that its refit did not see.
+    floor
+        Misfits below it count as equal.
+    """
+    squares = np.maximum(np.where(np.isfinite(errors), errors, 1e3), floor) ** 2
+    means = np.mean(squares, axis=1)
+    best = int(np.argmin(means))
+    error = float(np.std(squares[best], ddof=1)) / np.sqrt(errors.shape[1])
+    return int(np.flatnonzero(means <= means[best] + error)[0])

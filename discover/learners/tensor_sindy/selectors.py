@@ -7,7 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.selection import choose_by_bic, choose_by_held_out
+from discover.learners.tensor_sindy.selection import (
+    choose_by_bic,
+    choose_by_held_out,
+    choose_by_one_standard_error,
+)
 from discover.learners.tensor_sindy.stability import STABLE, Stability
 
 
@@ -47,6 +51,8 @@ def compare_selectors(
     chosen: dict[str, tuple[int, ...]] = {"bic": path[choose_by_bic(criterion)].support}
     if held_out is not None:
         chosen["held_out"] = path[choose_by_held_out(held_out, floor)].support
+        simplest = path[choose_by_one_standard_error(held_out, floor)]
+        chosen["one_standard_error"] = simplest.support
     if stability is not None:
         chosen["stability"] = path[choose_by_stability(path, stability)].support
     chosen["pysindy"] = of_pysindy
