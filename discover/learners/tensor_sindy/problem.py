@@ -16,7 +16,7 @@ from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from tensor_library.library import TermLibrary
 
-OBSERVED = ("shear_stress", "first_normal_stress_difference", "second_normal_stress_difference")
+OBSERVED = ("stress", "first_normal_stress_difference", "second_normal_stress_difference")
 """What may be observed, in the order of the observation axis: σ12, N1, N2."""
 
 _PADDED_SAMPLES = 16
