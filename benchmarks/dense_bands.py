@@ -249,7 +249,7 @@ def print_table(rows: list[dict]) -> None:
 
 def main() -> None:
     """Judge the cases that the file does not hold yet, and print the table of all."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="0: development")
     parser.add_argument("--cases", type=int, default=11)
     parser.add_argument("--noise", type=float, default=0.01)

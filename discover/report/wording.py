@@ -21,7 +21,11 @@ def recorded_symbol(flows: Iterable[str]) -> str:
     return TENSILE if kinds == {False} else "σ₁₂"
 
 
-_LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+_LEARNERS = {
+    "tensor_sindy": "Sparse regression",
+    "tbnn_ude": "The neural network",
+    "tensor_dense": "The dense library",
+}
 
 
 def learner_as_subject(name: str) -> str:

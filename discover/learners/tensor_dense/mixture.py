@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from discover.learners.tensor_dense.posterior import (
-    covariance,
     log_evidence,
     mode,
     most_evident,
+    spread,
 )
 from discover.learners.tensor_dense.reference_laws import (
     REFERENCES,
@@ -233,21 +233,23 @@ def _draws(problem, optimum: Optimum, scale, noise, records, rng) -> Float[np.nd
     until its prediction is what the linearisation said it would be.
     """
     # a misfit beyond the noise counts as more noise
-    spread = covariance(optimum.columns, optimum.width, max(noise, optimum.misfit), records)
-    root = np.linalg.cholesky(spread)
+    size = max(noise, optimum.misfit)
+    root, inverse = spread(optimum.columns, optimum.width, size, records)
     unit = rng.normal(size=(_PAIRS, len(scale)))
     moved = np.concatenate([unit, -unit]) @ root.T
     wanted = optimum.residual + moved @ optimum.columns.T
-    back = spread @ optimum.columns.T * (records / max(noise, optimum.misfit) ** 2)
+    back = root @ (optimum.columns @ root).T * (records / size**2)
     laws = optimum.coefficients + moved
-    for _ in range(_CORRECTIONS):
-        off = _residuals(problem, optimum, laws * scale) - wanted
-        step = np.nan_to_num(off, nan=0.0, posinf=0.0, neginf=0.0) @ back.T
-        length = np.linalg.norm(np.linalg.solve(root, step.T), axis=0)
-        laws = laws - step * np.minimum(1.0, _FARTHEST / np.maximum(length, 1e-12))[:, None]
+    # a law that runs away has no prediction to be corrected, and is not kept
     with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_CORRECTIONS):
+            off = _residuals(problem, optimum, laws * scale) - wanted
+            step = np.where(np.all(np.isfinite(off), axis=1)[:, None], off, 0.0) @ back.T
+            length = np.linalg.norm(step @ inverse.T, axis=1)
+            laws = laws - step * np.minimum(1.0, _FARTHEST / np.maximum(length, 1e-12))[:, None]
         misfit = np.linalg.norm(_residuals(problem, optimum, laws * scale), axis=1)
-    return np.vstack([optimum.coefficients, laws[misfit <= _STRAY * optimum.misfit]])
+        kept = misfit <= _STRAY * optimum.misfit
+    return np.vstack([optimum.coefficients, laws[kept]])
 
 
 def _residuals(problem, optimum: Optimum, coefficients) -> Float[np.ndarray, "m rows"]:

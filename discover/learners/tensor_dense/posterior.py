@@ -175,12 +175,18 @@ def most_evident(
     )
 
 
-def covariance(
+def spread(
     columns: Float[np.ndarray, "rows n"], width: float, noise: float, records: float
-) -> Float[np.ndarray, "n n"]:
-    """Return the covariance of z at a mode, (SᵀS n/σ² + 1/κ²)⁻¹."""
-    precision = columns.T @ columns * (records / noise**2) + np.eye(columns.shape[1]) / width**2
-    return np.linalg.inv(precision)
+) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, "n n"]]:
+    """Return a root R of the covariance of z at a mode, R Rᵀ = (SᵀS n/σ² + 1/κ²)⁻¹, and R⁻¹.
+
+    Parameters as in `log_evidence`.
+    """
+    # in widths of the prior no eigenvalue is below one, however alike two terms are
+    precision = columns.T @ columns * (records * width**2 / noise**2) + np.eye(columns.shape[1])
+    values, vectors = np.linalg.eigh(precision)
+    roots = np.sqrt(np.maximum(values, 1.0))
+    return width * vectors / roots, (vectors * roots).T / width
 
 
 def _curvatures(columns, noise: float, records: float) -> Float[np.ndarray, " n"]:

@@ -99,7 +99,7 @@ REFERENCES: Mapping[str, Reference] = {
 """Centres of the prior by name."""
 
 _RUNAWAY = 10.0
-"""Relative misfit of a trial that runs away: worse than no stress at all."""
+"""Relative misfit that stands for running away: worse than no stress at all."""
 
 _EVALUATIONS = 20
 _STEP = 1e-4
@@ -136,10 +136,9 @@ def fit_reference(problem: TrajectoryProblem, name: str) -> tuple[Float[np.ndarr
         at = with_reference(problem, constants(values))
         nothing = jnp.zeros((1, len(problem.library)))
         predicted = predict_many(at, jnp.arange(nothing.shape[1]), nothing, jnp.zeros((1, 0)))
-        left = np.asarray(predicted)[0] - target
-        if not np.all(np.isfinite(left)) or np.linalg.norm(left) > _RUNAWAY:
-            return np.full(left.shape, _RUNAWAY / np.sqrt(left.size))
-        return left
+        largest = _RUNAWAY / np.sqrt(target.size)
+        left = np.nan_to_num(np.asarray(predicted)[0] - target, nan=largest)
+        return np.clip(left, -largest, largest)
 
     values = np.zeros(0)
     if free:
