@@ -44,8 +44,8 @@ def cases(seeds: int, ptt_seeds: int):
 def fit(study, law, parameters, known, size, noise, seed) -> dict:
     """Return what one fit found."""
     from discover.learners.tensor_sindy import TensorSINDy
-    from discover.learners.tensor_sindy.problem import make_problem
     from discover.learners.tensor_sindy.refit import refit
+    from discover.learners.trajectories.problem import make_problem
     from discover.simulate import synthetic_dataset
     from tensor_library import TermLibrary, build_library, parse_term
 

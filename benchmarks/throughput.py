@@ -62,8 +62,8 @@ def by_vmap(seeds: int, repeats: int) -> None:
     import jax
     import jax.numpy as jnp
 
-    from discover.learners.tensor_sindy import problem as problems
     from discover.learners.tensor_sindy.refit import _descend, _lay_out
+    from discover.learners.trajectories import problem as problems
     from discover.precision import enable_x64
     from discover.simulate import synthetic_dataset
     from tensor_library import build_library

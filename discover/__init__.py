@@ -33,6 +33,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.learners import register_learner as register_learner
     from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
+    from discover.learners.tensor_dense import TensorDense as TensorDense
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
     from discover.protocols import after_alternation as after_alternation
     from discover.protocols import after_steady_flow as after_steady_flow
@@ -56,6 +57,7 @@ __all__ = [
     "InputError",
     "LinearSweep",
     "Run",
+    "TensorDense",
     "TensorSINDy",
     "after_alternation",
     "after_steady_flow",
@@ -100,6 +102,7 @@ _PLACES = {
     "discover.learners": ("register_learner",),
     "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
+    "discover.learners.tensor_dense": ("TensorDense",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),
     "discover.protocols": (
         "after_alternation",

@@ -1,6 +1,7 @@
 """A comparison of estimators, or on data, that a program holds."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, overload
 
 from discover.comparison.comparison import Comparison
@@ -214,4 +215,6 @@ def _same_fluid(one: Fluid, other: Fluid) -> bool:
 
 
 def _result(estimator: Any) -> LearnerResult:
+    if hasattr(estimator, "laws_that_fit"):
+        return replace(estimator.result_, weighted=estimator.laws_that_fit())
     return searched(estimator) if hasattr(estimator, "search_") else estimator.result_

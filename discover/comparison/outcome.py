@@ -12,6 +12,9 @@ from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
+from discover.learners.weighted_laws import WeightedLaws
+from discover.protocols.protocol import stack_protocols
+from discover.simulate.grid import make_grids
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
@@ -36,12 +39,14 @@ class LearnerOutcome(TermTables):
     message
         One sentence on how the fit ended.
     predictions
-        By the key of the flow; None where the law runs away.
+        By the key of the flow; None where the law runs away. Where weighted laws make a band, its
+        middle.
     physics
         Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
     bands
         By the key of the flow: lowest and highest prediction of each quantity over the laws that
-        fit as well. None for a flow in which one of them runs away; empty where there is one law.
+        fit as well; of weighted laws their 95 % band. None for a flow in which one of them, or half
+        of the weight, runs away; empty where there is one law.
     resolution
         Relative misfit of the training runs that arithmetic may leave.
     constants
@@ -78,6 +83,12 @@ class LearnerOutcome(TermTables):
     @classmethod
     def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
         """Return the outcome of a fit, with the fluid it found simulated in every flow."""
+        predictions = {flow.key: predict(fluid, flow) for flow in flows}
+        if result.weighted is None:
+            bands = _bands(result, fluid, flows)
+        else:
+            middle, bands = _weighted_bands(result.weighted, fluid, flows)
+            predictions |= middle
         return cls(
             result.learner,
             result.terms,
@@ -85,8 +96,8 @@ class LearnerOutcome(TermTables):
             result.loss_history,
             result.details,
             result.message,
-            {flow.key: predict(fluid, flow) for flow in flows},
-            bands=_bands(result, fluid, flows),
+            predictions,
+            bands=bands,
         )
 
     def to_state(self) -> dict[str, Any]:
@@ -156,6 +167,7 @@ class LearnerOutcome(TermTables):
 
 
 _BANDS = ("training", "held_out", "test")
+_STRAIN_STEP = 0.2
 
 
 def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
@@ -176,6 +188,29 @@ def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, 
             rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
             bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
     return bands
+
+
+def _weighted_bands(
+    weighted: WeightedLaws, fluid: Fluid, flows: list[Flow]
+) -> tuple[dict[str, Stresses], dict[str, Limits | None]]:
+    """Return the middle of the band of every flow, and its limits."""
+    shown = [flow for flow in flows if flow.kind in _BANDS]
+    if not shown:
+        return {}, {}
+    protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
+    found = weighted.bands(
+        (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
+        stack_protocols(protocols),
+        make_grids(protocols, times, strain_step=_STRAIN_STEP),
+        [len(t) for t in times],
+    )
+    middle, bands = {}, {}
+    for flow, band in zip(shown, found, strict=True):
+        bands[flow.key] = None
+        if band is not None:
+            middle[flow.key] = {q: band[q][1] for q in QUANTITIES}
+            bands[flow.key] = {q: (band[q][0], band[q][2]) for q in QUANTITIES}
+    return middle, bands
 
 
 def plain(value: Any) -> Any:

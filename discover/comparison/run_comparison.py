@@ -7,6 +7,7 @@ from dataclasses import replace
 from discover.comparison.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.constant import in_words as in_words_of
+from discover.comparison.dense_library import open_where_dense_is_wide
 from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
 from discover.comparison.explanation import Explanation, explain
@@ -37,6 +38,7 @@ from discover.dataset.material_functions import at_measured_rate
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
+from discover.learners.registry import BANDS_ONLY
 from discover.learners.result import LearnerResult
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
@@ -139,7 +141,9 @@ def compare(
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
     normal = options.use_normal_stresses
     expectation = expectation_of(study, model)
-    explanation = explain(outcomes, flows, expectation, normal)
+    # what fits nearly any σ12 explains nothing, unless nothing else was asked for
+    explaining = {name: o for name, o in outcomes.items() if name not in BANDS_ONLY} or outcomes
+    explanation = explain(explaining, flows, expectation, normal)
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     rivals, structure, following = [], None, NextMeasurement()
@@ -161,7 +165,7 @@ def compare(
         )
     own_bands = following.bands
     following = replace(following, bands=frame.bands(own_bands))
-    explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
+    explanation = hold_against_unseen(explanation, explaining, flows, following.bands, expectation)
     if not explanation.in_library:
         following, own_bands = NextMeasurement(), {}
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
@@ -171,6 +175,7 @@ def compare(
     statements = make_statements(explanation, seen_in, rivals, structure, own_bands, normal)
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
+        statements = open_where_dense_is_wide(statements, outcomes, judged)
         progress("the classical laws on the same runs", done / n_parts)
         if known.along is None:
             classical = fit_classical_laws(model, flows, study.model.known_relaxation)

@@ -22,6 +22,9 @@ Determined = Literal["no", "if_the_law_is_in_the_library"]
 IN_LIBRARY: Determined = "if_the_law_is_in_the_library"
 
 _NORMAL_STRESSES = ("N1", "N2")
+WIDEST = 1.0
+"""Half of a band over the quantity, from which on it says nothing of it."""
+
 _IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -81,7 +84,7 @@ class BandCheck:
     @property
     def holds(self) -> bool:
         """Whether there is a band that is narrower than the quantity and that nothing refutes."""
-        return self.half_width is not None and self.half_width < 1.0 and not self.missed
+        return self.half_width is not None and self.half_width < WIDEST and not self.missed
 
 
 def check_band(

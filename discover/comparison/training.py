@@ -56,7 +56,7 @@ def train(
     Parameters
     ----------
     learner
-        ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name.
+        ``"tensor_sindy"``, ``"tbnn_ude"``, ``"tensor_dense"``, or a registered one's name.
     study
         The study, for the learner's settings.
     model
@@ -96,6 +96,17 @@ def train(
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files
         return searched(sparse, seed), sparse.fluid_
+    if learner == "tensor_dense":
+        from discover.learners.tensor_dense import TensorDense
+
+        # the whole library of degree one, whatever the study's: fewer terms are surer, not truer
+        dense = TensorDense(
+            use_normal_stresses=options.use_normal_stresses,
+            solvent_viscosity=model.solvent_viscosity,
+            progress=lambda text: progress(text, 0.5),
+            **shared,
+        ).fit(list(runs))
+        return replace(dense.result_, weighted=dense.laws_that_fit()), dense.fluid_
     if learner == "tbnn_ude":
         from discover.learners.tbnn_ude import TBNNUDE
 

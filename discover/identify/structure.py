@@ -27,8 +27,8 @@ from discover.identify.relations import TermRelation, spell_briefly, term_relati
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.learners.tensor_sindy.problem import TrajectoryProblem, make_problem
-from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
+from discover.learners.trajectories.sensitivities import linearise
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term

@@ -1,4 +1,4 @@
-"""Learners by name: the two that are built in, and a user's own."""
+"""Learners by name: those that are built in, and a user's own."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -12,8 +12,15 @@ from discover.new_names import require_new_name
 from tensor_library.library import TermLibrary
 from tensor_library.registry import Registry
 
-BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
+BUILT_IN: Mapping[str, str] = {
+    "tensor_sindy": "sparse regression",
+    "tbnn_ude": "neural network",
+    "tensor_dense": "dense library",
+}
 """Titles of the learners of this package."""
+
+BANDS_ONLY = ("tensor_dense",)
+"""Learners that fit nearly any σ12: what they say is a band, and never that a law was found."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from discover.equations import Equation, EquationTerm, HasEquation, combined, la
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.term_tables import TermTables
+from discover.learners.weighted_laws import WeightedLaws
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ class LearnerResult(HasEquation, TermTables):
         One sentence on how the fit ended.
     members
         Laws that fit the data about as well, this one among them; empty where there is one only.
+    weighted
+        Laws that fit, of one structure, with weights, whose 95 % band is this learner's answer;
+        None where it has no such band.
     """
 
     learner: str
@@ -47,6 +51,7 @@ class LearnerResult(HasEquation, TermTables):
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()
+    weighted: WeightedLaws | None = None
 
     def __repr__(self) -> str:
         terms = " ".join(f"{t.coefficient:+.4g} {t.term}" for t in self.terms) or "no term"

@@ -12,7 +12,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
-from discover.learners.registry import learner_title
+from discover.learners.registry import BANDS_ONLY, learner_title
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
     FIGURE_SYMBOLS,
@@ -192,11 +192,15 @@ def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
     """Return a law found, as mathematics, with how its fit ended."""
+    message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
+    shown = _shown_terms(outcome)
+    if len(shown) < len(outcome.terms):
+        message += f". Shown are the {len(shown)} terms largest along the runs"
     return {
         "title": learner_title(outcome.learner),
         "colour": learner_colour(outcome.learner),
-        "math": law_element(outcome.terms, linear_relaxation),
-        "message": (outcome.message[:1].upper() + outcome.message[1:]).rstrip("."),
+        "math": law_element(shown, linear_relaxation),
+        "message": message,
         "seconds": outcome.train_seconds,
     }
 
@@ -214,7 +218,7 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
     truth = {t.term: t for t in comparison.truth or ()}
     found: dict[str, dict[str, RecoveredTerm]] = {}
     for name, outcome in comparison.outcomes.items():
-        for term in outcome.terms:
+        for term in _shown_terms(outcome):
             found.setdefault(term.term, {})[name] = term
     rows = []
     for name in dict.fromkeys([*truth, *found]):
@@ -255,6 +259,15 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+_MOST_TERMS = 8
+"""Of a law that holds its whole library, shown; the rest is in comparison.json."""
+
+
+def _shown_terms(outcome: LearnerOutcome) -> tuple[RecoveredTerm, ...]:
+    """Return the terms that a page shows; of a whole library the largest along the trajectories."""
+    return outcome.terms[:_MOST_TERMS] if outcome.learner in BANDS_ONLY else outcome.terms
 
 
 def coefficients(comparison: Comparison) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ import pandas as pd
 from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
+from discover.learners.registry import BANDS_ONLY
 from discover.study.run_folder import RunFolder
 
 COLUMNS = (
@@ -111,6 +112,8 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
 
 def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[Any, Any]]:
     """Return the band of a learner's predictions in a flow, by quantity; empty for no claim."""
+    if who in BANDS_ONLY:
+        return comparison.outcomes[who].bands.get(flow.key) or {}
     band = comparison.next_measurement.bands.get(flow.key)
     if who != "tensor_sindy" or band is None:
         return {}

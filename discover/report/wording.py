@@ -25,7 +25,11 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
     return FIGURE_SYMBOLS[found.pop()] if len(found) == 1 else "stress"
 
 
-_LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
+_LEARNERS = {
+    "tensor_sindy": "Sparse regression",
+    "tbnn_ude": "The neural network",
+    "tensor_dense": "The dense library",
+}
 
 
 def learner_as_subject(name: str) -> str:

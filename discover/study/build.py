@@ -141,6 +141,12 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     else:
         fit_names = tuple(fit or (name for name in dataset.names if name not in named))
     held_out = dataset.select(named)
+    if not len(dataset):
+        raise InputError(
+            f"The data set {dataset.name!r} has no run, and no table that could be fitted in place "
+            "of one. Add runs.csv with one line a run, or flow_curve.csv, relaxation.csv or "
+            "creep.csv."
+        )
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
     if each and len(fit_names) < 2:

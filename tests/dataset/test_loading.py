@@ -117,7 +117,7 @@ def test_smoothing_reduces_noise_and_keeps_a_cubic_on_uneven_samples():
 
 
 BAD = [
-    ({"runs__csv": None}, "has no runs.csv"),
+    ({"runs__csv": None, "lve__csv": None}, "has no runs.csv"),
     ({"runs__csv": "name\na.csv\n"}, "no column 'file'"),
     ({"runs__csv": "file\n"}, "no rows"),
     ({"runs__csv": ""}, "is empty"),

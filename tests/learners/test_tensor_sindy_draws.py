@@ -10,9 +10,9 @@ from discover.dataset.run import Run
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
-from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.tensor_sindy.search import SupportSearch
+from discover.learners.trajectories.problem import make_problem
 from discover.protocols import oscillatory_shear
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary

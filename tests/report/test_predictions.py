@@ -123,7 +123,7 @@ def test_a_law_that_runs_away_has_no_line_and_spoils_no_other(missing):
 
 
 def test_what_is_recorded_in_extension_is_called_a_tensile_stress():
-    pull = replace(record("pull.csv", False, 1), flow="uniaxial")
+    pull = replace(record("pull.csv", False, 1), flow="uniaxial", quantity="tensile_stress")
     nothing = ErrorPair(0.0, 0.0)
     result = LoopResult("no_effect_needed", nothing, nothing, 0.0, (), {}, (), (pull,))
     assert set(loop_predictions(result)["quantity"]) == {"tensile_stress"}

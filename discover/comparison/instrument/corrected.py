@@ -85,7 +85,7 @@ def corrected(
     if not effects or not runs:
         return data, {}
     batch = make_batch(runs)
-    assert isinstance(batch, RunBatch)  # in a comparison every run follows a rate
+    assert isinstance(batch, RunBatch)  # a comparison has runs at a rate alone
     values = [jnp.asarray(known.values, dtype=float) for known in effects]
     felt, gain, offset, missed = (
         np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, batch)

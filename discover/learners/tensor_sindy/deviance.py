@@ -5,15 +5,15 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, sensitivities_at
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.sensitivities import predict_many
 from discover.learners.tensor_sindy.weighed_draws import (
     Deviance,
     WeighedDraws,
     exchangeable,
     weighed_draws,
 )
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import predict_many
 
 
 def draws_of_fit(

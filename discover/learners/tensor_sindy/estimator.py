@@ -25,7 +25,6 @@ from discover.learners.tensor_sindy.optimisers import (
     default_support,
     solve_sparse,
 )
-from discover.learners.tensor_sindy.problem import make_problem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.report import path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
@@ -38,6 +37,7 @@ from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
+from discover.learners.trajectories.problem import make_problem
 from discover.protocols.protocol import recorded_at
 from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import linearise
 from discover.statistics import NoiseModel, least_squares_covariance
 
 _FACTOR = 1.96  # an error of this many standard deviations is as rare as 5 %

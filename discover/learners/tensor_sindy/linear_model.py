@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import linearise
 
 _RIDGE = 1e-9
 EXHAUSTIVE_LIMIT = 50_000

@@ -13,8 +13,8 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
-from discover.learners.tensor_sindy.sensitivities import observe
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled
 
 # One support to a program, and programs side by side in threads: a batch of supports by `vmap`

@@ -14,9 +14,9 @@ from discover.learners.tensor_sindy.linear_model import (
     swaps,
 )
 from discover.learners.tensor_sindy.optimisers import solve_sparse
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
 from discover.learners.tensor_sindy.selection import choose_by_bic, extended_bic
+from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.statistics import noise_model
 
 _HORIZONS = (0.2, 0.5)

@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from discover.learners.tensor_sindy.optimisers import solve_sparse
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.selection import extended_bic
-from discover.learners.tensor_sindy.sensitivities import linearise
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import linearise
 
 _BLOCKS_PER_RUN = 8
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
 from discover.learners.tensor_sindy.refit import SCREENING, Fit, refit
+from discover.learners.trajectories.problem import TrajectoryProblem
 
 
 def run_folds(n_runs: int, n_folds: int, random_state: int | None) -> Int[np.ndarray, " runs"]:

@@ -9,12 +9,12 @@ from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.style import (
     BEFORE_STYLE,
     MEASURED,
-    NETWORK,
     SHADE,
     SPARSE,
     TRUTH_STYLE,
     Picture,
     figure,
+    learner_colour,
     learner_style,
     legend_above,
     literal,
@@ -158,21 +158,28 @@ def _new_kind(comparison: Comparison) -> str:
     return "no learner saw this flow."
 
 
+_FITTING_AS_WELL = {
+    "tensor_dense": "95 % of the dense library's laws",
+    "tbnn_ude": "networks that fit as well",
+}
+
+
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
     """Shade what the data leave open: the intervals of the parameters, rivals, and members."""
-    network = comparison.outcomes.get("tbnn_ude")
-    limits = None if network is None else network.bands.get(flow.key)
-    if limits is not None:
-        low, high = limits[quantity]
-        panel.fill_between(
-            flow.times[shown],
-            low[shown],
-            high[shown],
-            color=NETWORK,
-            alpha=0.18,
-            linewidth=0,
-            label="networks that fit as well",
-        )
+    for name, label in _FITTING_AS_WELL.items():
+        outcome = comparison.outcomes.get(name)
+        limits = None if outcome is None else outcome.bands.get(flow.key)
+        if limits is not None:
+            low, high = limits[quantity]
+            panel.fill_between(
+                flow.times[shown],
+                low[shown],
+                high[shown],
+                color=learner_colour(name),
+                alpha=0.18,
+                linewidth=0,
+                label=label,
+            )
     band = comparison.next_measurement.bands.get(flow.key)
     if band is None:
         return

@@ -50,8 +50,9 @@ _DECADES = 30.0
 _LEARNER_STYLES: dict[str, dict[str, Any]] = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
     "tbnn_ude": {"color": NETWORK, "linestyle": ":", "linewidth": 2.2},
+    "tensor_dense": {"color": GREEN, "linestyle": "-", "linewidth": 1.2},
 }
-_OTHERS = (GREEN, PURPLE, YELLOW)
+_OTHERS = (PURPLE, YELLOW, GREEN)
 """Colours of learners of users' own, in their order."""
 
 TRUTH_STYLE = {"color": TRUTH, "linewidth": 1.3}

@@ -18,8 +18,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from discover.learners.tensor_sindy.active_terms import evaluate_active
-from discover.learners.tensor_sindy.problem import TrajectoryProblem
+from discover.learners.trajectories.active_terms import evaluate_active
+from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from tensor_library.kinematics import rate_of_deformation

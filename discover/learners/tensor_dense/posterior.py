@@ -1,0 +1,194 @@
+"""Coefficients of a whole library given data: the mode of the posterior, and what it leaves open.
+
+With c = s z, s a typical size of each coefficient, the prior is z ~ N(0, κ²) about a reference
+law and the noise of n independent records has the relative size σ, so that the mode minimises
+n |r(z)|²/σ² + |z|²/κ². Width and noise follow from the evidence   [MacKay 1992, Neural Comput. 4,
+415].
+"""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from discover.learners.trajectories.problem import TrajectoryProblem
+from discover.learners.trajectories.sensitivities import observe
+from discover.programs import compiled
+
+_MOST_STEPS = 12
+_TOLERANCE = 1e-2
+"""Of a mode, in widths of the prior: draws scatter by far more."""
+
+# The damping falls whenever a step does most of what it promised; by default it waits for 99 %.
+_BOLD = optx.ClassicalTrustRegion(
+    high_cutoff=0.6, low_cutoff=0.1, high_constant=10.0, low_constant=0.1
+)
+
+# As in the sparse learner's refits: the solver's first damping, one, is small beside the curvature.
+_AMPLIFICATION = 10.0
+_RUNAWAY = 1e3
+
+
+class _Layout(eqx.Module):
+    """What one descent is about; traced, so that all share a program."""
+
+    problem: TrajectoryProblem
+    scale: Array  # (n,) times the width of the prior
+    precision: Array  # √n/σ
+
+
+def _rows(unit, layout: _Layout):
+    problem = layout.problem
+    everything = jnp.arange(unit.shape[0])
+    predicted, sensitivity = observe(problem, everything, layout.scale * unit, jnp.zeros(0))
+    seen = problem.weight > 0
+    residual = jnp.where(seen, problem.weight * (predicted - problem.target), 0.0)
+    columns = jnp.where(seen[..., None], problem.weight[..., None] * sensitivity, 0.0)
+    columns = columns * layout.scale
+    sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
+    # a constant residual of runaway size is an increase, which the solver rejects
+    residual = jnp.where(sane, residual, _RUNAWAY / jnp.sqrt(1.0 * residual.size)).reshape(-1)
+    columns = jnp.where(sane, columns, 0.0).reshape(residual.size, -1)
+    return residual, columns
+
+
+def _objective(residual, unit, layout):
+    return _AMPLIFICATION * jnp.concatenate([layout.precision * residual, unit])
+
+
+@eqx.filter_custom_jvp
+def _residual(unit, layout):
+    residual, columns = _rows(unit, layout)
+    return _objective(residual, unit, layout), (residual, columns)
+
+
+@_residual.def_jvp
+def _residual_jvp(primals, tangents):
+    unit, layout = primals
+    residual, columns = _rows(unit, layout)
+    change = _objective(columns @ tangents[0], tangents[0], layout)
+    # what is handed on beside the residual is never differentiated
+    still = (jnp.zeros_like(residual), jnp.zeros_like(columns))
+    return (_objective(residual, unit, layout), (residual, columns)), (change, still)
+
+
+@compiled
+def _descend(layout: _Layout, start: Float[Array, " n"]):
+    solver = optx.LevenbergMarquardt(rtol=_TOLERANCE, atol=_TOLERANCE)
+    solver = eqx.tree_at(lambda s: s.search, solver, _BOLD)
+    solution = optx.least_squares(
+        _residual,
+        solver,
+        start,
+        args=layout,
+        has_aux=True,
+        max_steps=_MOST_STEPS,
+        throw=False,
+    )
+    return solution.value, solution.aux
+
+
+def mode(
+    problem: TrajectoryProblem,
+    scale: Float[np.ndarray, " n"],
+    width: float,
+    noise: float,
+    records: float,
+    start: Float[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " rows"], Float[np.ndarray, "rows n"]]:
+    """Return the mode of the posterior, the residual there, and its derivatives.
+
+    Parameters
+    ----------
+    problem
+        Data, and the reference law as known law.
+    scale
+        Typical size of each coefficient.
+    width
+        κ of the prior.
+    noise
+        Relative noise σ.
+    records
+        Number of independent records n.
+    start
+        Scaled coefficients z from which to descend.
+
+    Returns
+    -------
+    z, prediction minus data in units of the relative misfit, and its derivatives with respect to z.
+    """
+    layout = _Layout(problem, jnp.asarray(scale * width), jnp.asarray(np.sqrt(records) / noise))
+    found: Any = _descend(layout, jnp.asarray(start / width))
+    unit, (residual, columns) = found
+    return np.asarray(unit) * width, np.asarray(residual), np.asarray(columns) / width
+
+
+def log_evidence(
+    misfit: float,
+    coefficients: Float[np.ndarray, " n"],
+    columns: Float[np.ndarray, "rows n"],
+    width: float,
+    noise: float,
+    records: float,
+) -> float:
+    """Return the logarithm of the evidence of a width, by Laplace, up to a constant of the noise.
+
+    Parameters
+    ----------
+    misfit
+        Norm of the residual at the mode.
+    coefficients, columns
+        z and the derivatives at the mode.
+    width, noise, records
+        As in `mode`.
+    """
+    curvature = _curvatures(columns, noise, records)
+    fit = records * misfit**2 / noise**2 + np.sum(coefficients**2) / width**2
+    return float(-0.5 * (fit + np.sum(np.log1p(curvature * width**2))))
+
+
+def most_evident(
+    residual: Float[np.ndarray, " rows"],
+    coefficients: Float[np.ndarray, " n"],
+    columns: Float[np.ndarray, "rows n"],
+    width: float,
+    noise: float,
+    records: float,
+) -> tuple[float, float]:
+    """Return width and noise after one of MacKay's updates, at which both repeat themselves.
+
+    κ² = |z|²/γ and σ² = n |r|²/(n − γ), with γ the number of coefficients that the data determine
+    [MacKay 1992, Neural Comput. 4, 415, eqs. 4.8 and 4.9].
+
+    Parameters as in `log_evidence`, with the residual itself.
+    """
+    curvature = _curvatures(columns, noise, records)
+    determined = float(np.sum(curvature / (curvature + width**-2.0)))
+    left = max(records - determined, 1.0)
+    smallest = np.finfo(float).tiny
+    return (
+        float(np.sqrt(np.sum(coefficients**2) / max(determined, smallest))),
+        float(np.sqrt(records * np.sum(residual**2) / left)),
+    )
+
+
+def spread(
+    columns: Float[np.ndarray, "rows n"], width: float, noise: float, records: float
+) -> tuple[Float[np.ndarray, "n n"], Float[np.ndarray, "n n"]]:
+    """Return a root R of the covariance of z at a mode, R Rᵀ = (SᵀS n/σ² + 1/κ²)⁻¹, and R⁻¹.
+
+    Parameters as in `log_evidence`.
+    """
+    # in widths of the prior no eigenvalue is below one, however alike two terms are
+    precision = columns.T @ columns * (records * width**2 / noise**2) + np.eye(columns.shape[1])
+    values, vectors = np.linalg.eigh(precision)
+    roots = np.sqrt(np.maximum(values, 1.0))
+    return width * vectors / roots, (vectors * roots).T / width
+
+
+def _curvatures(columns, noise: float, records: float) -> Float[np.ndarray, " n"]:
+    values = np.linalg.eigvalsh(columns.T @ columns)
+    return np.clip(values, 0.0, None) * (records / noise**2)

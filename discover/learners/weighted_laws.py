@@ -1,0 +1,96 @@
+"""Many laws that fit the data, with weights, and the band that they make together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.multimode import Fluid
+from discover.programs import compiled
+from discover.protocols.protocol import FlowProtocol
+from discover.simulate.grid import IntegrationGrid
+from discover.simulate.solve import solve_on_grid
+from discover.statistics.weighted_quantiles import weighted_quantiles
+
+QUANTITIES = ("sigma12", "N1", "N2")
+
+Limits = Mapping[str, Float[np.ndarray, "3 n"]]
+"""Lowest, middle and highest value of each of `QUANTITIES` in Pa."""
+
+_LEVELS = (0.025, 0.5, 0.975)
+_MOST_LOST = 0.5
+"""Weight of the laws that may run away in a flow in which the others still make a band."""
+
+_LAWS_AT_ONCE = 32
+
+
+@dataclass(frozen=True)
+class WeightedLaws:
+    """Laws with one structure.
+
+    Attributes
+    ----------
+    laws
+        One law whose arrays have a leading axis of laws.
+    weights
+        Adding up to one, shape (laws,).
+    """
+
+    laws: AbstractConstitutiveLaw
+    weights: Float[np.ndarray, " laws"]
+
+    def bands(
+        self,
+        modes: tuple[Float[Array, " k"], Float[Array, " k"], Float[Array, ""]],
+        protocols: FlowProtocol,
+        grids: IntegrationGrid,
+        samples: Sequence[int],
+    ) -> list[Limits | None]:
+        """Return the 95 % band of each flow.
+
+        Parameters
+        ----------
+        modes
+            Moduli in Pa, relaxation times in s, and the solvent's viscosity in Pa s.
+        protocols, grids
+            The flows, from `stack_protocols` and `make_grids`.
+        samples
+            Number of samples of each flow.
+
+        Returns
+        -------
+        None for a flow in which laws of more than half of the weight run away.
+        """
+        predicted = np.asarray(_predict(self.laws, *modes, protocols, grids))
+        bands: list[Limits | None] = []
+        for flow, n in enumerate(samples):
+            values = predicted[:, flow, :n]
+            kept = np.all(np.isfinite(values), axis=(1, 2))
+            if np.sum(self.weights[kept]) < 1.0 - _MOST_LOST:
+                bands.append(None)
+                continue
+            limits = weighted_quantiles(values[kept], self.weights[kept], _LEVELS)
+            bands.append({q: limits[:, :, i] for i, q in enumerate(QUANTITIES)})
+        return bands
+
+
+@compiled
+def _predict(
+    laws, modulus, relaxation_time, solvent_viscosity, protocols, grids
+) -> Float[Array, "laws flows n 3"]:
+    arrays, rest = eqx.partition(laws, eqx.is_array)
+
+    def of_law(law):
+        fluid = Fluid(eqx.combine(law, rest), modulus, relaxation_time, solvent_viscosity)
+        stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
+        recorded = jax.vmap(lambda flow, s: flow.recorded_stress(s.T))(protocols, stress)
+        s11, s22, s33, _ = jnp.moveaxis(stress, -1, 0)
+        return jnp.stack([recorded, s11 - s22, s22 - s33], axis=-1)
+
+    return jax.lax.map(of_law, arrays, batch_size=_LAWS_AT_ONCE)

@@ -1,0 +1,55 @@
+"""The dense library opens what only sparsity decides; the curves are written by hand."""
+
+import numpy as np
+import pytest
+
+from discover.comparison.dense_library import open_where_dense_is_wide
+from discover.comparison.flows import Flow
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.protocols import start_up
+
+TIMES = np.linspace(0.0, 4.0, 9)
+FLOW = Flow("startup", "test", start_up(2.0), TIMES, np.full(9, 2.0), {})
+RISE = 1.0 - np.exp(-TIMES)
+CURVES = {"sigma12": RISE, "N1": RISE, "N2": -0.1 * RISE}
+SAID = [Statement("N1", IN_LIBRARY, "Then its band is narrow."), Statement("N2", "no", "Open.")]
+
+
+def outcome(learner, half_width=None):
+    """A learner with these curves, and bands of this half-width relative to N1."""
+    band = None
+    if half_width is not None:
+        band = {q: (c - half_width * RISE, c + half_width * RISE) for q, c in CURVES.items()}
+    empty = (np.zeros(0), np.zeros(0))
+    predictions = {FLOW.key: CURVES}
+    return LearnerOutcome(learner, (), 1.0, empty, predictions=predictions, bands={FLOW.key: band})
+
+
+def test_a_narrow_dense_band_leaves_a_statement_and_says_its_width():
+    outcomes = {"tensor_dense": outcome("tensor_dense", 0.2)}
+    first, second = open_where_dense_is_wide(SAID, outcomes, [FLOW])
+    assert first.determined == IN_LIBRARY
+    assert "± 20 % of its size" in first.text
+    assert second == SAID[1]
+
+
+@pytest.mark.parametrize("half_width", [1.2, None])
+def test_a_dense_band_as_wide_as_the_quantity_or_none_opens_it(half_width):
+    outcomes = {"tensor_dense": outcome("tensor_dense", half_width)}
+    first, _ = open_where_dense_is_wide(SAID, outcomes, [FLOW])
+    assert first.undetermined
+    assert FLOW.title in first.text
+
+
+def test_a_sparse_law_outside_the_dense_band_determines_nothing():
+    sparse = outcome("tensor_sindy")
+    sparse.predictions[FLOW.key] = {**CURVES, "N1": 1.5 * RISE}
+    outcomes = {"tensor_sindy": sparse, "tensor_dense": outcome("tensor_dense", 0.2)}
+    first, _ = open_where_dense_is_wide(SAID, outcomes, [FLOW])
+    assert first.undetermined
+    assert "20 % of its size" in first.text  # (1.5 − 1.2)/1.5
+
+
+def test_without_a_dense_library_every_statement_stays():
+    assert open_where_dense_is_wide(SAID, {"tensor_sindy": outcome("tensor_sindy")}, [FLOW]) == SAID
