@@ -8,6 +8,7 @@ import numpy as np
 
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.comparison.outcome import LearnerOutcome
+from discover.learners.registry import BANDS_ONLY
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
 
@@ -75,7 +76,8 @@ def explain(
     Parameters
     ----------
     outcomes
-        By learner.
+        By learner. One that fits nearly any σ12 explains nothing, and is left out unless it is
+        alone.
     flows
         The flows; only those of training are looked at.
     expectation
@@ -88,6 +90,7 @@ def explain(
         {
             name: _left(outcome, training, expectation, normal_stresses_used)
             for name, outcome in outcomes.items()
+            if name not in BANDS_ONLY or len(outcomes) == 1
         }
     )
 

@@ -38,7 +38,6 @@ from discover.dataset.material_functions import at_measured_rate
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
-from discover.learners.registry import BANDS_ONLY
 from discover.learners.result import LearnerResult
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
@@ -141,9 +140,7 @@ def compare(
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
     normal = options.use_normal_stresses
     expectation = expectation_of(study, model)
-    # what fits nearly any σ12 explains nothing, unless nothing else was asked for
-    explaining = {name: o for name, o in outcomes.items() if name not in BANDS_ONLY} or outcomes
-    explanation = explain(explaining, flows, expectation, normal)
+    explanation = explain(outcomes, flows, expectation, normal)
     progress("rivals: simulating laws that the data do not rule out", done / n_parts)
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     rivals, structure, following = [], None, NextMeasurement()
@@ -165,7 +162,7 @@ def compare(
         )
     own_bands = following.bands
     following = replace(following, bands=frame.bands(own_bands))
-    explanation = hold_against_unseen(explanation, explaining, flows, following.bands, expectation)
+    explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
     if not explanation.in_library:
         following, own_bands = NextMeasurement(), {}
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}

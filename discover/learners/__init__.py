@@ -1,4 +1,4 @@
-"""The two learners and the kind of result they share."""
+"""The learners and the kind of result they share."""
 
 from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.registry import LearningTask, register_learner

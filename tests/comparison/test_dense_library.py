@@ -1,5 +1,7 @@
 """The dense library opens what only sparsity decides; the curves are written by hand."""
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -7,6 +9,10 @@ from discover.comparison.dense_library import open_where_dense_is_wide
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.laws import Fluid
+from discover.laws.giesekus import Giesekus
+from discover.learners import LearnerResult
+from discover.learners.weighted_laws import WeightedLaws
 from discover.protocols import start_up
 
 TIMES = np.linspace(0.0, 4.0, 9)
@@ -53,3 +59,38 @@ def test_a_sparse_law_outside_the_dense_band_determines_nothing():
 
 def test_without_a_dense_library_every_statement_stays():
     assert open_where_dense_is_wide(SAID, {"tensor_sindy": outcome("tensor_sindy")}, [FLOW]) == SAID
+
+
+@pytest.fixture(scope="module")
+def eleven_laws():
+    """Giesekus laws of several mobilities; the first runs away and has a tenth of the weight."""
+    mobilities = jnp.asarray([-30.0, *np.linspace(0.1, 0.9, 10)])
+    laws = eqx.filter_vmap(Giesekus)(mobilities)
+    return LearnerResult(
+        "tensor_dense",
+        Giesekus(0.3),
+        (),
+        weighted=WeightedLaws(laws, np.array([0.1, *[0.09] * 10])),
+    )
+
+
+def test_predictions_are_the_middle_of_the_laws_that_fit_and_the_band_their_range(eleven_laws):
+    found = LearnerOutcome.of(eleven_laws, Fluid.dimensionless(Giesekus(0.3)), [FLOW])
+    low, high = found.bands[FLOW.key]["N1"]
+    ends = [LearnerOutcome.of(
+        LearnerResult("", Giesekus(m), ()), Fluid.dimensionless(Giesekus(m)), [FLOW]
+    ).predictions[FLOW.key]["N1"] for m in (0.1, 0.5, 0.9)]  # fmt: skip
+    # the integrator's steps are good to 1e-4 here; a mobility takes N1 down
+    assert low[-1] == pytest.approx(ends[2][-1], rel=1e-3)
+    assert high[-1] == pytest.approx(ends[0][-1], rel=1e-3)
+    middle = found.predictions[FLOW.key]["N1"]
+    assert low[-1] < middle[-1] < high[-1]
+    assert middle[-1] == pytest.approx(ends[1][-1], rel=0.1)
+
+
+def test_a_flow_in_which_most_laws_run_away_has_no_band(eleven_laws):
+    weights = np.array([0.6, *[0.04] * 10])
+    weighted = WeightedLaws(eleven_laws.weighted.laws, weights)
+    result = LearnerResult("tensor_dense", Giesekus(0.3), (), weighted=weighted)
+    found = LearnerOutcome.of(result, Fluid.dimensionless(Giesekus(0.3)), [FLOW])
+    assert found.bands[FLOW.key] is None

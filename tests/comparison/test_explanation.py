@@ -224,3 +224,15 @@ def test_the_network_alone_determines_nothing(good):
     alone = Explanation({"tbnn_ude": explanation.lack_of_fit["tensor_sindy"]})
     statements = make_statements(alone, flows, [])
     assert {s.quantity: s.determined for s in statements} == {"N1": "no", "N2": "no"}
+
+
+def test_a_learner_that_fits_nearly_any_data_explains_them_to_nobody(responses):
+    clean = responses["pom_pom"]
+    rng = np.random.default_rng(0)
+    flows = flows_of([white(record, 0.01, rng) for record in clean])
+    sparse = outcome("tensor_sindy", flows, [1.1 * record for record in clean])
+    dense = outcome("tensor_dense", flows, clean)
+    found = explain({"tensor_sindy": sparse, "tensor_dense": dense}, flows, Expectation())
+    assert found.verdict == "unexplained"
+    assert set(found.lack_of_fit) == {"tensor_sindy"}
+    assert explain({"tensor_dense": dense}, flows, Expectation()).verdict == "explained"

@@ -5,12 +5,14 @@ every optimum that fits takes part, and all count alike: evidence compares laws 
 right, and none may be. Only where a named law itself fits does evidence decide half of the weight.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from discover.errors import InputError
 from discover.learners.tensor_dense.posterior import (
     log_evidence,
     mode,
@@ -63,8 +65,10 @@ class Optimum:
         Relative misfit of that law alone.
     width
         κ of the prior.
-    coefficients, columns
-        Scaled coefficients, and derivatives of the residual.
+    coefficients
+        z, the scaled coefficients.
+    columns, residual
+        Prediction minus data in units of the relative misfit, and its derivatives with z.
     misfit
         Relative misfit.
     log_evidence
@@ -117,7 +121,11 @@ class Mixture:
 
 
 def explore(
-    problem: TrajectoryProblem, sizes, noise_floor: float, seed: int, progress=None
+    problem: TrajectoryProblem,
+    sizes: Callable[[Float[np.ndarray, " 5"]], Float[np.ndarray, " n"]],
+    noise_floor: float,
+    seed: int,
+    progress: Callable[[str], None] | None = None,
 ) -> Mixture:
     """Return the laws of a library that fit the data.
 
@@ -134,12 +142,22 @@ def explore(
         Of the draws.
     progress
         Called with a line of text, or None.
+
+    Raises
+    ------
+    InputError
+        If no reference law can be integrated through the runs.
     """
     say = progress or (lambda text: None)
     references = {name: fit_reference(problem, name) for name in REFERENCES}
     best = min(references, key=lambda name: references[name][1])
     size = sizes(references[best][0])
     usable = np.isfinite(size) & (size > 0.0)
+    if not np.any(usable):
+        raise InputError(
+            "No named law can be integrated through these runs with the modes given. Check the "
+            "units of modulus, relaxation_time and shear rate."
+        )
     # a term that vanishes along all trajectories is left out by a scale of zero
     scale = np.where(usable, 1.0 / np.where(usable, size, 1.0), 0.0)
     noise = _noise(problem, references[best], scale, noise_floor)
