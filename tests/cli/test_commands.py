@@ -34,7 +34,7 @@ def trained(monkeypatch):
 
     calls = []
 
-    def train(learner, study, model, runs, seed=0, progress=None):
+    def train(learner, study, model, runs, seed=0, progress=None, library=None):
         calls.append(learner)
         law = make_law("giesekus", {"alpha": 0.2})
         history = (np.arange(1, 3), np.array([1.0, 0.1]))
