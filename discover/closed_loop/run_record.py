@@ -34,6 +34,8 @@ class RunRecord:
         Which flow it is.
     quantity
         What is recorded: ``sigma12``, ``tensile_stress``, ``N1`` or ``N2`` in Pa, or ``strain``.
+    band
+        Where 95 % of the measurements should lie by all explanations together, shape (2, n).
     control
         What was imposed. Where it is ``steady``, time only counts the samples.
     """
@@ -50,6 +52,7 @@ class RunRecord:
     conditions: dict[str, float] = field(default_factory=dict)
     flow: FlowKind = "shear"
     quantity: str = "sigma12"
+    band: Float[np.ndarray, "2 n"] | None = None
     control: Control = "rate"
 
     def line(self) -> dict[str, Any]:
