@@ -213,9 +213,10 @@ def run_loop(
     side_by_side = Explanations()
     if carried:
         runs = (fitted_runs, held_runs)
+        tried = [effect.name for effect in candidates if search.admitted(effect)]
         side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
-        records = with_band(model, batch, carried, side_by_side, parts, judgement)
+        records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),

@@ -8,6 +8,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
 from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.discrepancy import discrepancy
 from discover.closed_loop.held_out import uncertainty
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import jacobians
@@ -24,6 +25,7 @@ def mixed_band(
     batch: Batch,
     noise: float,
     structured: bool,
+    candidates: Sequence[str],
 ) -> Float[np.ndarray, "2 runs n"]:
     """Return where 95 % of the measurements should lie, were it one of the explanations.
 
@@ -43,6 +45,8 @@ def mixed_band(
     structured
         Whether what they leave of the fitted runs is more than noise. A run shares it, so that as
         many runs say how large it is in another one, and the tails are Student's.
+    candidates
+        Effects that an explanation may still lack; see `discrepancy`.
 
     Returns
     -------
@@ -66,6 +70,8 @@ def mixed_band(
             root, _ = uncertainty(fitted, one.fit)
             columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
             variance = np.sum(columns**2, axis=0)
+        others = [name for name in candidates if name not in one.effects]
+        variance += discrepancy(model, fitted, one.fit, others, batch) / scale**2
         left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
         means.append(np.where(seen, residual[0] / scale + recorded, 0.0))
         deviations.append(np.sqrt(variance + (left * size) ** 2))

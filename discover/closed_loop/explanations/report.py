@@ -60,6 +60,7 @@ def with_band(
     explanations: Explanations,
     parts: Sequence[tuple[Batch | None, Sequence[RunRecord]]],
     judgement: Judgement,
+    candidates: Sequence[str],
 ) -> list[RunRecord]:
     """Return the records of runs with the band that the explanations predict together.
 
@@ -71,6 +72,8 @@ def with_band(
         The runs as the model has them, and their records in the same order: fitted and held out.
     judgement
         Of what the search chose.
+    candidates
+        Effects that were tried.
     """
     of = {one.effects: one.probability for one in explanations.likeliest_first}
     mixed = [one for one in carried if one.effects in of]
@@ -80,9 +83,8 @@ def with_band(
             out += records
             continue
         shares = [of[one.effects] for one in mixed]
-        band = mixed_band(
-            model, batch, mixed, shares, held, judgement.left.noise, judgement.structured
-        )
+        noise, structured = judgement.left.noise, judgement.structured
+        band = mixed_band(model, batch, mixed, shares, held, noise, structured, candidates)
         out += [
             replace(record, band=band[:, i, : len(record.time)]) for i, record in enumerate(records)
         ]
