@@ -228,6 +228,16 @@ class LoopResult(PageView, HasEquation, NotebookView):
         """On what the residuals of the declared and of the augmented model depend."""
         return read_residual(self.records, 0), read_residual(self.records, -1)
 
+    @property
+    def held_in_band(self) -> float | None:
+        """Share of the samples held out that lie in the band of all explanations, if any judge."""
+        inside = [
+            (record.band[0] <= record.measured) & (record.measured <= record.band[1])
+            for record in self.records
+            if record.held_out and record.band is not None
+        ]
+        return float(np.mean(np.concatenate(inside))) if inside else None
+
     def table(self) -> pd.DataFrame:
         """Return the effects that were added, one line for each of their parameters."""
         lines = []
@@ -323,6 +333,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 for record in self.records
             },
             **self.explanations.to_json(),
+            "held_out_in_band": self.held_in_band,
             "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,
             **self._law(),

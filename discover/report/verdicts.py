@@ -88,6 +88,9 @@ def _loop_sure(result: LoopResult) -> str:
             unseen = "on each run, by a search that did not see it,"
         said, sizes = _change(result, before.held_out, after.held_out)
         parts.append(f"{unseen} the error {said} {sizes}")
+        if result.held_in_band is not None:
+            share = percent(result.held_in_band)
+            parts.append(f"the 95 % band of all explanations holds {share} of their samples")
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"

@@ -1,5 +1,6 @@
 """What is said of several explanations, on records by scipy and closed forms."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -12,14 +13,19 @@ from independent.johnson_segalman import JohnsonSegalman
 from independent.maxwell import UpperConvectedMaxwell
 from scipy.optimize import brentq
 from scipy.stats import norm
+from sklearn.linear_model import BayesianRidge
 
 import discover as dc
+from discover.closed_loop.explanations.discrepancy import posterior
 from discover.closed_loop.explanations.mixture import quantile
 from discover.closed_loop.explanations.weighing import unexplained_probability
 from discover.closed_loop.judgement import Judgement
 from discover.closed_loop.run_record import RunRecord
+from discover.errors import InputError
+from discover.report.predictions import loop_predictions
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.whiteness import SIGNIFICANCE
+from discover.study import parse_study
 
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
@@ -144,3 +150,54 @@ def test_a_quantile_of_mixed_distributions_is_that_of_scipy():
 
     found = quantile(mean, deviation, share, 0.975)[0, 0]
     assert found == pytest.approx(brentq(missing, 0.0, 10.0), abs=1e-9)
+
+
+def test_the_width_of_the_prior_is_that_of_scikit_learn():
+    generator = np.random.default_rng(0)
+    design = generator.standard_normal((400, 6))
+    target = design @ generator.standard_normal(6) + 0.3 * generator.standard_normal(400)
+    mean, root = posterior(design, target, 400.0)
+    known = BayesianRidge(fit_intercept=False).fit(design, target)
+    # both choose noise and width by evidence; theirs counts the constants off the samples
+    assert mean == pytest.approx(known.coef_, rel=0.02)
+    assert root.T @ root == pytest.approx(known.sigma_, rel=0.05, abs=1e-5)
+
+
+def test_noise_asks_for_no_other_candidate():
+    generator = np.random.default_rng(1)
+    design = generator.standard_normal((400, 30))
+    design /= np.linalg.norm(design, axis=0)
+    noise = 0.1 * generator.standard_normal(400)
+    mean, root = posterior(design, noise, 400.0)
+    added = np.mean((design @ mean) ** 2) + np.mean(np.sum((root @ design.T) ** 2, axis=0))
+    assert added < 0.2 * np.mean(noise**2)
+
+
+def test_the_contract_holds_in_the_json(giesekus):
+    told = giesekus.to_json()
+    assert told["explanations"][0]["effects"] == ["giesekus_mobility"]
+    assert set(told["explanations"][0]) >= {"effects", "probability", "error"}
+    shares = [one["probability"] for one in told["explanations"]]
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) + told["unexplained_probability"] == pytest.approx(1.0)
+    assert set(told["inclusion"]) <= {e for one in told["explanations"] for e in one["effects"]}
+
+
+def test_the_band_stands_in_the_predictions_with_what_was_found(giesekus):
+    table = loop_predictions(giesekus)
+    assert table[table.source == "augmented"].low95.notna().all()
+    assert table[table.source == "declared"].low95.isna().all()
+
+
+@pytest.mark.parametrize("value", ["0", "65", '"many"'])
+def test_a_number_of_explanations_that_cannot_be_is_refused(value):
+    loop = tomllib.loads(f"explanations = {value}")
+    with pytest.raises(InputError, match="explanations"):
+        parse_study({"data": {"folder": "x"}, "loop": loop})
+
+
+def test_one_explanation_is_what_the_search_found(tmp_path):
+    data = records(tmp_path, Giesekus(0.3, MODULUS, TIME))
+    effects = ["giesekus_mobility", "ptt_linear"]
+    loop = dc.close_loop(data, BASE, effects=effects, max_effects=1, explanations=1)
+    assert [e.effects for e in loop.explanations.likeliest_first] == [("giesekus_mobility",)]

@@ -62,12 +62,12 @@ def discrepancy(
         design = design - basis @ (basis.T @ design)
     # neighbours say the same: all rows together count as many as there are independent samples
     effective = summarise(fit.residual, np.asarray(fitted.weight)).effective_samples
-    mean, root = _posterior(design, -residual, min(effective, float(len(residual))))
+    mean, root = posterior(design, -residual, min(effective, float(len(residual))))
     shift, spread = mean @ change, np.sum((root @ change) ** 2, axis=0)
     return (shift**2 + spread).reshape(weight.shape)
 
 
-def _posterior(
+def posterior(
     design: Float[np.ndarray, "n terms"], target: Float[np.ndarray, " n"], samples: float
 ) -> tuple[Float[np.ndarray, " terms"], Float[np.ndarray, "rank terms"]]:
     """Return mean and a root of the covariance of coefficients whose prior width the data choose.
