@@ -526,6 +526,7 @@ class Search(SearchState):
         driven there. All others are noted, for what they say beside the one that is chosen.
         """
         possible = []
+        self.seen.explored.add(tuple(sorted(others)))
         for choice in choices:
             theta, name = choice.fit.theta, choice.candidate.effect
             if not self._predictable(theta):

@@ -118,5 +118,5 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
     search.unasked = set(state.get("unasked", ()))
-    search.seen = SeenSets.from_json(state.get("seen", ()))
+    search.seen = SeenSets.from_json(state.get("seen", {}))
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

@@ -1,6 +1,6 @@
 """Every set of effects that a search has fitted, kept for what it says beside the one chosen."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,12 +36,18 @@ class SeenSets:
 
     Parameters
     ----------
-    sets
+    sets, explored
         To begin with.
+
+    Attributes
+    ----------
+    explored
+        Sets to each of which every candidate was added in turn.
     """
 
-    def __init__(self, sets: Iterable[SeenSet] = ()):
+    def __init__(self, sets: Iterable[SeenSet] = (), explored: Iterable[Sequence[str]] = ()):
         self._sets = {one.effects: one for one in sets}
+        self.explored = {tuple(sorted(effects)) for effects in explored}
 
     def __iter__(self) -> Iterator[SeenSet]:
         return iter(self._sets.values())
@@ -72,19 +78,15 @@ class SeenSets:
         free = tuple(int(at) for at in fit.free)
         self._sets[name] = SeenSet(name, free, values, cost)
 
-    def to_json(self) -> list[dict[str, Any]]:
+    def to_json(self) -> dict[str, Any]:
         """Return the sets as JSON."""
-        return [vars(one) for one in self]
+        return {"sets": [vars(one) for one in self], "explored": sorted(self.explored)}
 
     @classmethod
-    def from_json(cls, content: Iterable[dict[str, Any]]) -> "SeenSets":
+    def from_json(cls, content: Mapping[str, Any]) -> "SeenSets":
         """Return the sets that `to_json` wrote."""
-        return cls(
-            SeenSet(
-                tuple(one["effects"]),
-                tuple(one["free"]),
-                tuple(one["values"]),
-                one["cost"],
-            )
-            for one in content
+        sets = (
+            SeenSet(tuple(one["effects"]), tuple(one["free"]), tuple(one["values"]), one["cost"])
+            for one in content.get("sets", ())
         )
+        return cls(sets, content.get("explored", ()))

@@ -167,16 +167,23 @@ def _follow(search: Search, one: SeenSet, max_effects: int) -> int:
     fit = _fits(search, [one])[0]
     if not fit.usable:
         return 0
-    stages = 0
+    stages, explored = 0, search.seen.explored
     # what leaves noise asks for nothing more
-    if len(one.effects) < max_effects and not search.tolerated.random(fit, one.effects):
+    if (
+        len(one.effects) < max_effects
+        and one.effects not in explored
+        and not search.tolerated.random(fit, one.effects)
+    ):
         _refit_leading(search, fit, list(one.effects))
         stages += 1
     for name in one.effects:
+        others = tuple(other for other in one.effects if other != name)
+        if others in explored:
+            continue
         theta, free = taken_out(search.model, fit, name)
         without = fit_batch(search.model, search.batch, [theta], [free], prior=search.prior)[0]
         if without.usable:
-            _refit_leading(search, without, [other for other in one.effects if other != name])
+            _refit_leading(search, without, list(others))
             stages += 1
     return stages
 

@@ -13,8 +13,8 @@ from discover.statistics.residual import STRUCTURE
 from discover.statistics.unseen import CARRIED
 from discover.statistics.whiteness import SIGNIFICANCE
 
-_CERTAIN = 30.0
-"""Logarithm of odds beyond which nothing more is said."""
+_CERTAIN = float(np.log(1000.0))
+"""Logarithm of odds beyond which no test of noise is to be believed."""
 
 _SAME = 0.01
 """Two fits are twins if they differ by less than this fraction of what is left, in mean squares."""
