@@ -14,6 +14,7 @@ from discover.closed_loop.before_after import (
     record_runs,
     strain_of,
 )
+from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
@@ -182,6 +183,7 @@ def run_loop(
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False, order=order)
     if held_batch is not None:
         records += record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
+    differ = any(found.degree for found in search.degrees.values())
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
     stages = tuple(
@@ -228,10 +230,13 @@ def run_loop(
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
-        declared_parameters=_declared_parameters(declared, current, bounds),
+        declared_parameters={
+            **_declared_parameters(declared, current, bounds),
+            **constants_by_mode(model, batch, current, bounds, search.degrees, search.prior),
+        },
         declared_effects=_declared_effects(model, current, bounds),
-        declared_law=_declared_law(declared, current),
-        fluid=_fluid(model, current, [*active, *known]),
+        declared_law=None if differ else _declared_law(declared, current),
+        fluid=None if differ else _fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )
 
@@ -380,7 +385,7 @@ def _settle(search: Search, runs: Sequence[Run], max_effects: int, say) -> None:
         small, lambda effect: effect.kind != "constitutive", "at_small_strain"
     )
     if not linear.resume():
-        linear.start()
+        linear.start(by_mode=False)
     linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
     if linear.active and linear.explained:
         search.adopt(linear)
@@ -419,7 +424,7 @@ def _stage(search: Search, name: str, bounds, error) -> Stage:
     )
 
 
-def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
+def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds) -> dict[str, StageParameter]:
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
     # of several modes only a common factor is fitted, which has no unit
     single = len(declared.modulus) == 1
@@ -429,7 +434,7 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
         if single
         else ("relaxation_time_factor", 1.0, ""),
     }
-    out = {}
+    out: dict[str, StageParameter] = {}
     for at in declared.free_positions:
         values = np.array([fit.theta[at], *bounds[at]])
         name, scale, unit = constants.get(at) or (named[at], 1.0, "")

@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.degrees import Degree
 from discover.closed_loop.search_state import SearchState
 from discover.forward.least_squares import Fit
 
@@ -57,7 +58,9 @@ class SearchCheckpoint:
 
 def _model_of(search: SearchState) -> list[str]:
     """Return what the positions in a parameter vector mean."""
-    return [effect.name for effect in search.model.effects]
+    return [f"{name} by mode" for name in search.model.declared.by_mode] + [
+        effect.name for effect in search.model.effects
+    ]
 
 
 def _state(search: SearchState) -> dict[str, Any]:
@@ -84,6 +87,7 @@ def _state(search: SearchState) -> dict[str, Any]:
         "not_named": search.not_named,
         "refused": sorted(search.refused),
         "unasked": sorted(search.unasked),
+        "degrees": {name: asdict(found) for name, found in search.degrees.items()},
         "known": [[at, *pair] for at, pair in search.known.items()],
     }
 
@@ -116,4 +120,8 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
     search.unasked = set(state.get("unasked", ()))
+    search.degrees = {
+        name: Degree(found["degree"], tuple(found["evidence"]))
+        for name, found in state.get("degrees", {}).items()
+    }
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

@@ -3,6 +3,7 @@
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.degrees import Degree
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
 
@@ -42,6 +43,8 @@ class SearchState:
         Those of them that were in the model and are no candidates any more.
     unasked
         Effects whose aliases were found beside others than those that are in the model now.
+    degrees
+        Degree in log λ of each constant by mode, and the evidence for each degree.
     """
 
     fit: Fit  # the first stage makes it
@@ -60,3 +63,4 @@ class SearchState:
         self.not_named: dict[str, str] = {}
         self.refused: set[str] = set()
         self.unasked: set[str] = set()
+        self.degrees = {name: Degree() for name in model.declared.by_mode}

@@ -15,6 +15,7 @@ from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import made_by, render
+from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop import (
     ranking_picture,
     reading_picture,
@@ -71,6 +72,7 @@ def write_loop(
         reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),
+        by_mode_picture(result),
     ]
     drawn = [p for p in pictures if p is not None]
     for one in drawn:

@@ -1,0 +1,138 @@
+"""Constants of the declared law that differ from mode to mode; stresses by scipy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from independent import multimode_giesekus
+from independent import start_up as flow
+from independent.homogeneous import GiesekusFluid
+
+import discover as dc
+from discover.closed_loop import DeclaredModel
+from discover.dataset import Dataset, Run
+from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.by_mode import DEGREE
+from discover.protocols import in_flow, start_up
+from discover.report.plots.by_mode import by_mode_picture
+
+MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
+RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
+NOISE = 0.01
+
+
+@cache
+def data(mobilities, rates=RATES):
+    """Return start-ups of shear with white noise."""
+    generator, runs = np.random.default_rng(0), []
+    for rate in rates:
+        times = np.geomspace(0.02, 12.0, 50) / np.sqrt(rate)
+        stress = multimode_giesekus(mobilities, MODULI, TIMES).respond(flow(rate), times).sigma12
+        size = NOISE * np.sqrt(np.mean(stress**2))
+        stress = stress + size * generator.standard_normal(len(times))
+        runs.append(Run(f"{rate}", times, start_up(rate), np.full(len(times), rate), stress))
+    return Dataset("three modes", tuple(runs))
+
+
+@cache
+def loop(mobilities, rates=RATES, by_mode=("alpha",)):
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI, TIMES)
+    return dc.close_loop(
+        data(mobilities, rates), base, free=["alpha"], by_mode=by_mode, effects=["stress_gain"],
+        max_effects=1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("mobilities", [(0.1, 0.3, 0.6), (0.5, 0.1, 0.5)])
+def test_the_constant_of_each_mode_is_found(mobilities):
+    result = loop(mobilities)
+    found = result.declared_parameters["alpha"]
+    assert result.verdict == "no_effect_needed"
+    # the noise alone is left
+    assert result.error_after.fit == pytest.approx(NOISE, rel=0.1)
+    # the logits of the second lie on a parabola and on no line
+    assert found.degree == (1 if mobilities[0] < mobilities[1] else 2)
+    for mode, mobility in zip(found.modes, mobilities, strict=True):
+        low, high = mode.ci95
+        # twice the interval: of six of 95 % one may miss
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+        assert high - low < 0.1
+        assert mode.determined
+    # one constant leaves some 9 %
+    assert found.evidence[found.degree] > 100.0
+
+
+def test_equal_constants_are_one_and_the_same_as_without_the_question():
+    found = loop((0.3, 0.3, 0.3)).declared_parameters["alpha"]
+    plain = loop((0.3, 0.3, 0.3), by_mode=()).declared_parameters["alpha"]
+    assert found.degree == 0
+    assert max(found.evidence) == 0.0
+    # both stop where a step gains less than a ten-thousandth of the misfit
+    assert found.value == pytest.approx(plain.value, rel=1e-6)
+    assert found.ci95 == pytest.approx(plain.ci95, rel=1e-4)
+    # and the loop gives a law that can be written out
+    assert loop((0.3, 0.3, 0.3)).equation().terms[0].coefficient == pytest.approx(plain.value)
+
+
+def test_a_mode_that_no_flow_reaches_is_not_determined():
+    # at 1 1/s the fastest mode feels a Weissenberg number of 0.05
+    slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).declared_parameters["alpha"]
+    assert [mode.determined for mode in slow.modes] == [True, True, False]
+    low, high = slow.modes[2].ci95
+    assert low <= 0.6 <= high
+
+
+@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+def test_the_forward_model_gives_each_mode_its_constant(kind):
+    mobilities = np.array([0.1, 0.3, 0.6])
+    declared = DeclaredModel.named(
+        "giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"], by_mode=("alpha",)
+    )
+    model, theta = AugmentedModel(declared, []), None
+    theta = model.zero()
+    deviations = np.log(mobilities / (1.0 - mobilities)) - np.log(0.3 / 0.7)
+    at = declared.by_mode_slices["alpha"]
+    theta[at.start + DEGREE : at.stop] = deviations
+    times = np.linspace(0.05, 2.0, 30)
+    truth = sum(
+        GiesekusFluid((g,), (t,), a).recorded(kind, lambda _: 2.0, times)
+        for g, t, a in zip(MODULI, TIMES, mobilities, strict=True)
+    )
+    run = Run("x", times, in_flow(start_up(2.0), kind), np.full(30, 2.0), truth)
+    predicted = model.predict(theta, make_batch([run], strain_step=0.05))[0]
+    # the integrator's error on such steps
+    np.testing.assert_allclose(predicted, truth, atol=1e-3 * np.max(np.abs(truth)))
+
+
+def test_the_picture_says_what_is_determined_and_what_is_not():
+    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)))
+    assert drawn is not None
+    assert "Not determined by these data in the modes of 0.05 s" in drawn.caption
+    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=())) is None
+
+
+def test_a_law_by_mode_is_not_written_out_as_one():
+    with pytest.raises(InputError, match="alpha differs from one relaxation mode to the next"):
+        loop((0.1, 0.3, 0.6)).equation()
+    assert loop((0.1, 0.3, 0.6)).to_json()["declared"] == {
+        "law": None, "effects": [], "by_mode": ["alpha"],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"free": [], "by_mode": ("alpha",)}, "no parameter of the law that is fitted"),
+        ({"by_mode": ("xi",)}, "by_mode names 'xi'"),
+        ({"by_mode": ("modulus_Pa",), "free": ["modulus_Pa"]}, "by_mode names 'modulus_Pa'"),
+        ({"by_mode": ("alpha", "alpha")}, "twice"),
+        ({"by_mode": "alpha"}, r"Write \['alpha'\]"),
+        ({"by_mode": ("alpha",), "modes": 1}, "has one mode"),
+    ],
+)
+def test_what_cannot_differ_by_mode_is_refused(options, text):
+    modes = options.pop("modes", 3)
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI[:modes], TIMES[:modes])
+    with pytest.raises(InputError, match=text):
+        dc.close_loop(data((0.3, 0.3, 0.3)), base, **({"free": ["alpha"]} | options))
