@@ -86,7 +86,7 @@ def constants_by_mode(
             of.degree,
             of.evidence,
             tuple(
-                ModeConstant(float(t), float(v), (float(a), float(b)), bool(k))
+                ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
                 for t, v, a, b, k in each
             ),
         )

@@ -51,18 +51,18 @@ class ModeConstant:
     relaxation_time_s
         Of the mode.
     value, ci95
-        The constant with its 95 % interval, given that it is a smooth function of the time; see
-        `discover.closed_loop.by_mode`.
-    determined
-        Whether these data say anything of it. Otherwise the interval leaves hardly a value out, or
-        the runs are as well described whatever this mode's constant: what stands here then comes
-        from the other modes and the smooth function alone.
+        The constant with its 95 % interval, given that it is a smooth function of the time (see
+        `discover.closed_loop.by_mode`); without one where it is left open.
+    left_open
+        Whether these data leave it open: the interval leaves hardly a value out, or the runs are as
+        well described whatever this mode's constant. What stands here then comes from the other
+        modes and the smooth function alone.
     """
 
     relaxation_time_s: float
     value: float
-    ci95: tuple[float, float]
-    determined: bool
+    ci95: tuple[float, float] | None
+    left_open: bool
 
 
 @dataclass(frozen=True)
