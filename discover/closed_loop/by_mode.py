@@ -10,7 +10,7 @@ from jaxtyping import Float
 from discover.closed_loop.degrees import Degree
 from discover.closed_loop.result import ConstantByMode, ModeConstant
 from discover.forward import AugmentedModel, Batch, FreeParameter
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
 from discover.forward.least_squares import (
     NO_PRIOR,
     Fit,
@@ -55,17 +55,14 @@ def constants_by_mode(
         What is known of some parameters.
     """
     declared, found = model.declared, {}
-    names = [parameter.name for parameter in declared.free_parameters]
     modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
     places = np.asarray(decades(modulus, time))
     times = declared.relaxation_time * np.exp(fit.theta[1])
     for name, of in degrees.items():
-        constant = _Constant(
-            declared.free_parameters[names.index(name)],
-            2 + names.index(name),
-            declared.by_mode_slices[name].start,
-            places,
-        )
+        law, at = model.constant(name)
+        if at not in fit.free:
+            continue
+        constant = _Constant(law, at, declared.by_mode_slices[name].start, places)
         low, high, half = constant.band(batch, fit, of.degree)
         if of.degree + 1 < len(of.evidence):
             free = (*fit.free, constant.start + of.degree)
@@ -118,7 +115,7 @@ class _Constant:
         To first order there, so that it keeps the range.
         """
         covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
-        slope = _link_slope(self.law, float(fit.theta[self.at]))
+        slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
         half = np.full(len(self.places), np.inf)
         if np.isfinite(slope):
             gradient = np.zeros((len(self.places), len(fit.free)))
@@ -128,15 +125,6 @@ class _Constant:
             variance = np.einsum("ki,ij,kj->k", gradient, covariance, gradient)
             half = quantile * np.sqrt(np.clip(variance, 0.0, None))
         return self.of_modes(fit, -half), self.of_modes(fit, half), half
-
-
-def _link_slope(law: FreeParameter, value: float) -> float:
-    """Return the derivative of the link at a value; see `constants_of_modes`."""
-    sides = [value - law.low, law.high - value]
-    sides = [side for side in sides if np.isfinite(side)]
-    if not sides:
-        return 1.0
-    return float("inf") if min(sides) <= 0.0 else float(sum(1.0 / side for side in sides))
 
 
 def _own_half_widths(model, batch, fit, first: int) -> Float[np.ndarray, " k"]:

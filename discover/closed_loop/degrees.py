@@ -7,13 +7,13 @@ import numpy as np
 
 from discover.closed_loop.augment import BARE_MENTION, evidence
 from discover.forward import AugmentedModel, Batch
-from discover.forward.by_mode import DEGREE
+from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 from discover.statistics.residual import summarise
 
 _STEPS = (0.0, -1.0, 1.0)
-"""From where a new coefficient starts, on the link's scale per power of a decade: the misfit may
-have a minimum on either side."""
+"""From where a new coefficient starts, as a change of the constant by itself for each power of a
+decade, or by a factor of e where that is less: the misfit may have a minimum on either side."""
 
 _END = 1e-6
 """Share of its range within which a constant stands at an end, where no coefficient moves it."""
@@ -64,9 +64,14 @@ def choose_degrees(
         What is known of some parameters.
     """
     chosen = dict(degrees)
+    # an effect that is not in the model has no amplitude to vary
+    waiting = [name for name in chosen if model.constant(name)[1] not in fit.free]
     highest = min(DEGREE, len(model.declared.modulus) - 1)
     weight = np.asarray(batch.weight)
     for name in chosen:
+        if name in waiting:
+            chosen[name] = Degree()
+            continue
         at = [model.declared.by_mode_slices[name].start + i for i in range(highest)]
         rest = tuple(p for p in fit.free if p not in at)
         plain = fit.theta.copy()
@@ -93,13 +98,13 @@ def choose_degrees(
 
 def _starts(model: AugmentedModel, name: str, theta: np.ndarray, at: int) -> list[np.ndarray]:
     """Return starts with a further coefficient, away from the ends of the constant's range."""
-    names = [parameter.name for parameter in model.declared.free_parameters]
-    mean = 2 + names.index(name)
+    constant, mean = model.constant(name)
     start = theta.copy()
-    width = min(model.high[mean] - model.low[mean], 1.0)
-    if min(start[mean] - model.low[mean], model.high[mean] - start[mean]) < _END * width:
-        start[mean] = model.declared.free_parameters[names.index(name)].start
+    width = min(constant.high - constant.low, 1.0)
+    if min(start[mean] - constant.low, constant.high - start[mean]) < _END * width:
+        start[mean] = constant.start
+    own = abs(start[mean]) * link_slope(start[mean], constant.low, constant.high)
     starts = [start.copy() for _ in _STEPS]
     for trial, step in zip(starts, _STEPS, strict=True):
-        trial[at] = step
+        trial[at] = step * min(own, 1.0)
     return starts

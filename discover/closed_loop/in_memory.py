@@ -42,8 +42,9 @@ def close_loop(
         What of the base is fitted along: parameters of its law, which must be one with a name, and
         ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
     by_mode
-        Which parameters of the law, of those in `free`, may differ from mode to mode, as a smooth
-        function of the relaxation time; how smooth is for the data to say.
+        What may differ from mode to mode, as a smooth function of the relaxation time: parameters
+        of the law, of those in `free`, and effects by the size of their term. How smooth is for the
+        data to say.
     known_effects
         Effects that are known beside the base, as ``[model] effects`` in a study, such as
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared

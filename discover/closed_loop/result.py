@@ -67,7 +67,7 @@ class ModeConstant:
 
 @dataclass(frozen=True)
 class ConstantByMode(StageParameter):
-    """A constant of the declared law by mode; `value` and `ci95` are those at the mean time.
+    """A constant by mode; `value` and `ci95` are those at the mean time.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class DeclaredEffect:
 
     effect: str
     kind: str
-    parameters: dict[str, KnownParameter]
+    parameters: dict[str, KnownParameter | ConstantByMode]
 
 
 @dataclass(frozen=True)
@@ -233,9 +233,14 @@ class LoopResult(PageView, HasEquation, NotebookView):
 
     @property
     def by_mode(self) -> dict[str, ConstantByMode]:
-        """Constants of the declared law that might differ from mode to mode."""
-        every = self.declared_parameters.items()
-        return {name: one for name, one in every if isinstance(one, ConstantByMode)}
+        """Constants that might differ from mode to mode: by their name, or by their effect's."""
+        of_law = self.declared_parameters.items()
+        found = {name: one for name, one in of_law if isinstance(one, ConstantByMode)}
+        for effect in (*self.declared_effects, *self.stages):
+            for one in effect.parameters.values():
+                if isinstance(one, ConstantByMode):
+                    found[effect.effect] = one
+        return found
 
     @property
     def differing_by_mode(self) -> tuple[str, ...]:

@@ -141,11 +141,16 @@ class Search(SearchState):
         """Go on from the last stage that was kept, and return whether there was one."""
         return self.checkpoint.restore(self)
 
-    @property
-    def declared_positions(self) -> list[int]:
-        """Positions of what is fitted of the declared model, with its constants by mode."""
-        varying = positions_of(self.model, self.degrees)
-        return [*self.model.free_positions, *varying]
+    def _positions(self, active: Sequence[str]) -> list[int]:
+        """Return what is fitted with these effects, constants by mode as chosen."""
+        own = [position for name in active for position in self.model.positions(name)]
+        fitted = [*self.model.free_positions, *own]
+        present = {
+            name: found
+            for name, found in self.degrees.items()
+            if self.model.constant(name)[1] in fitted
+        }
+        return [*fitted, *positions_of(self.model, present)]
 
     def start(self, by_mode: bool = True) -> None:
         """Fit the declared model; an unknown relaxation time from several starts.
@@ -487,6 +492,8 @@ class Search(SearchState):
         self.unasked = set(self.active)
         kept = [*self.active, name]
         self.fit = self._sharpened(chosen.fit)
+        if name in self.degrees:
+            self._choose_degrees()
         self._polish()
         self.fit, self.active = prune(
             self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
@@ -524,10 +531,7 @@ class Search(SearchState):
         self._leave_out()
 
     def _fit(self, active: Sequence[str], values: np.ndarray) -> Fit:
-        positions = [
-            *self.declared_positions,
-            *(p for name in active for p in self.model.positions(name)),
-        ]
+        positions = self._positions(active)
         start = self.model.zero()
         start[positions] = values[positions]
         return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]

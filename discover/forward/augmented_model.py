@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from discover.effects import AbstractEffect
 from discover.forward.by_mode import LARGEST
-from discover.forward.declared import DeclaredModel
+from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
 from discover.forward.run_batch import Batch, MixedBatch, Part
 
@@ -125,6 +125,20 @@ class AugmentedModel:
         """Return the positions of an effect's parameters in the vector."""
         at = self.slices[name]
         return list(range(at.start, at.stop))
+
+    def varying(self, name: str) -> list[int]:
+        """Return the positions of what varies a constant by mode; none where it is no such one."""
+        at = self.declared.by_mode_slices.get(name, slice(0))
+        return list(range(at.start or 0, at.stop))
+
+    def constant(self, name: str) -> tuple[FreeParameter, int]:
+        """Return a constant by mode, of the law or the amplitude of an effect, and its position."""
+        for i, parameter in enumerate(self.declared.free_parameters):
+            if parameter.name == name:
+                return parameter, 2 + i
+        at = self.slices[name].start
+        start, low, high = (float(of[at]) for of in (self.first_trial, self.low, self.high))
+        return FreeParameter(name, start, low, high), at
 
     def predict(self, theta, batch: Batch) -> Float[np.ndarray, "runs n"]:
         """Return the predicted records: stresses in Pa, and strains of runs at a given stress."""

@@ -71,7 +71,15 @@ class Program:
             position += len(effect.parameters)
         self.size = position
         self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
-        self.added = AddedTerms(self._constitutive, self.slices)
+        # of the law's constants, and of effects' amplitudes
+        slots = {name: slice(start, end) for name, start, end in structure.by_mode}
+        free = structure.free_parameters
+        self._varying_law = {name: at for name, at in slots.items() if name in free}
+        self._varying_effects = {
+            e: slots[e.name] for e in self._constitutive if e.name in slots and e.name not in free
+        }
+        of_effects = {e.name: at for e, at in self._varying_effects.items()}
+        self.added = AddedTerms(self._constitutive, self.slices, of_effects)
         self._by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self._states = [e for e in effects if isinstance(e, StateEffect)]
@@ -187,7 +195,15 @@ class Program:
             total = total + viscous / intensity * shear
         return total
 
-    def _law(self, numbers, theta, extra: Modes | None):
+    def _varied(self, theta, mean, ends: tuple[float, float], at: slice, places):
+        """Return a constant of each mode; one that an effect adds deviates from no polynomial."""
+        coefficients, deviations = jnp.split(theta[at], [DEGREE])
+        deviations = jnp.append(deviations, jnp.zeros(len(places) - len(deviations)))
+        low, high = ends
+        mean = jnp.asarray(mean)
+        return constants_of_modes(mean, low, high, coefficients, deviations, places)
+
+    def _law(self, theta, numbers, places):
         """Return the law with the values of its free parameters, or one for each mode as one tree.
 
         Of constants by mode, a mode that an effect adds has the one of its own time.
@@ -199,25 +215,16 @@ class Program:
         known = dict(self.structure.parameters) | dict(
             zip(free, theta[2 : 2 + len(free)], strict=True)
         )
-        if not self.structure.by_mode:
+        if not self._varying_law:
             return named.build(*known.values())
-        declared = numbers.modulus, numbers.relaxation_time
-        places = decades(*declared)
-        beyond = 0 if extra is None else len(extra.relaxation_time)
-        if extra is not None:
-            places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
-        for name, start, end in self.structure.by_mode:
-            coefficients, deviations = jnp.split(theta[start:end], [DEGREE])
-            deviations = jnp.append(deviations, jnp.zeros(beyond))
-            ends = named.parameters[name]
-            mean = jnp.asarray(known[name])
-            known[name] = constants_of_modes(mean, *ends, coefficients, deviations, places)
+        for name, at in self._varying_law.items():
+            known[name] = self._varied(theta, known[name], named.parameters[name], at, places)
         columns = [jnp.broadcast_to(value, places.shape) for value in known.values()]
         return jax.vmap(named.build)(*columns)
 
     def _over_modes(self, of_mode):
         """Return a function of a law and of one mode as one of all modes."""
-        law = 0 if self.structure.by_mode else None
+        law = 0 if self._varying_law else None
         return jax.vmap(of_mode, in_axes=(law, -1, -1), out_axes=-1)
 
     def _terms_by_mode(self, law, added, theta, modes: Modes):
@@ -243,7 +250,13 @@ class Program:
         if self._modes:
             pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
             extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
-        law = self._law(numbers, theta, extra)
+        places = None
+        if self._varying_law or self._varying_effects:
+            places = decades(numbers.modulus, numbers.relaxation_time)
+            if extra is not None:
+                declared = numbers.modulus, numbers.relaxation_time
+                places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
+        law = self._law(theta, numbers, places)
         # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
         if self.structure.fit_modulus:
@@ -251,7 +264,17 @@ class Program:
         if self.structure.fit_relaxation_time:
             relaxation_time = relaxation_time * jnp.exp(theta[1])
         of_law = self._over_modes(lambda law, *flow: law.stress_rate(*flow))
-        added = self.added.rate(theta, used)
+        amplitudes = {
+            e.name: self._varied(
+                theta,
+                self._values(theta, e)[0],
+                (float(e.parameters[0].low), float(e.parameters[0].high)),
+                at,
+                places,
+            )
+            for e, at in self._varying_effects.items()
+        }
+        added = self.added.rate(theta, used, amplitudes)
 
         def modes_rate(stress, gradient):
             same = of_law(law, stress, gradient) - added(stress, gradient)

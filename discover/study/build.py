@@ -73,7 +73,7 @@ class DeclaredModel:
     source
         What was taken from an earlier result, in words; empty where nothing was.
     by_mode
-        Parameters of the law that may differ from mode to mode.
+        Parameters of the law, and effects, that may differ from mode to mode.
     """
 
     law: AbstractConstitutiveLaw

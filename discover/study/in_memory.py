@@ -136,7 +136,7 @@ def with_known(
     free
         Names of its constants.
     by_mode
-        Which of them may differ from mode to mode.
+        Which of them, and which effects, may differ from mode to mode.
 
     Raises
     ------

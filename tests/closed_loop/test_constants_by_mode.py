@@ -11,6 +11,7 @@ from independent.homogeneous import GiesekusFluid
 import discover as dc
 from discover.closed_loop import DeclaredModel
 from discover.dataset import Dataset, Run
+from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.by_mode import DEGREE
@@ -82,17 +83,64 @@ def test_a_mode_that_no_flow_reaches_is_not_determined():
     assert slow.modes[2].ci95 is None
 
 
-@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
-def test_the_forward_model_gives_each_mode_its_constant(kind):
-    mobilities = np.array([0.1, 0.3, 0.6])
-    declared = DeclaredModel.named(
+def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
+    base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
+    asked = {"effects": ["giesekus_mobility", "stress_gain"], "by_mode": ["giesekus_mobility"]}
+    result = dc.close_loop(data((0.1, 0.3, 0.6)), base, **asked)
+    (stage,) = result.stages
+    found = stage.parameters["alpha"]
+    of_law = loop((0.1, 0.3, 0.6)).declared_parameters["alpha"]
+    assert (result.verdict, found.degree) == ("effects_added", 1)
+    # the same fluid as the Giesekus law by mode, to where fits stop
+    for mode, same in zip(found.modes, of_law.modes, strict=True):
+        assert mode.value == pytest.approx(same.value, rel=1e-5)
+    with pytest.raises(InputError, match="giesekus_mobility differs"):
+        result.equation()
+    # and with equal mobilities it stays one constant
+    equal = dc.close_loop(data((0.3, 0.3, 0.3)), base, **asked)
+    assert equal.by_mode["giesekus_mobility"].degree == 0
+    assert equal.equation().terms[0].coefficient == pytest.approx(0.3, rel=0.02)
+
+
+def test_a_library_term_by_mode_that_does_not_differ_is_the_term():
+    name = "tr(sigma.sigma)*sigma"
+    run = data((0.3, 0.3, 0.3)).runs[2]
+    batch, predicted = make_batch([run]), []
+    for by_mode in ((), (name,)):
+        declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=by_mode)
+        model = AugmentedModel(declared, [make_effect(name)])
+        theta = model.zero()
+        theta[model.positions(name)] = 0.02
+        predicted.append(model.predict(theta, batch))
+        theta[model.varying(name)[:1]] = 1e-3
+        varied = model.predict(theta, batch)
+    np.testing.assert_allclose(*predicted, rtol=1e-12)
+    assert np.max(np.abs(varied / predicted[1] - 1.0)) > 1e-3
+
+
+CONSTANTS = {
+    "alpha": lambda: DeclaredModel.named(
         "giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"], by_mode=("alpha",)
-    )
-    model, theta = AugmentedModel(declared, []), None
+    ),
+    "giesekus_mobility": lambda: DeclaredModel.maxwell(
+        MODULI,
+        TIMES,
+        effects=known_effects({"giesekus_mobility": "fit"}),
+        by_mode=("giesekus_mobility",),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CONSTANTS)
+@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+def test_the_forward_model_gives_each_mode_its_constant(kind, name):
+    mobilities = np.array([0.1, 0.3, 0.6])
+    declared = CONSTANTS[name]()
+    model = AugmentedModel(declared, [])
     theta = model.zero()
+    theta[model.constant(name)[1]] = 0.3
     deviations = np.log(mobilities / (1.0 - mobilities)) - np.log(0.3 / 0.7)
-    at = declared.by_mode_slices["alpha"]
-    theta[at.start + DEGREE : at.stop] = deviations
+    theta[model.varying(name)[DEGREE:]] = deviations
     times = np.linspace(0.05, 2.0, 30)
     truth = sum(
         GiesekusFluid((g,), (t,), a).recorded(kind, lambda _: 2.0, times)
@@ -128,6 +176,12 @@ def test_a_law_by_mode_is_not_written_out_as_one():
         ({"by_mode": ("alpha", "alpha")}, "twice"),
         ({"by_mode": "alpha"}, r"Write \['alpha'\]"),
         ({"by_mode": ("alpha",), "modes": 1}, "has one mode"),
+        ({"by_mode": ("thixotropy",)}, "adds no term to the law of each mode"),
+        ({"by_mode": ("ptt_linear",), "effects": ["stress_gain"]}, "nor a candidate"),
+        (
+            {"by_mode": ("ptt_linear",), "known_effects": {"ptt_linear": {"epsilon": 0.1}}},
+            "whose epsilon has a value",
+        ),
     ],
 )
 def test_what_cannot_differ_by_mode_is_refused(options, text):

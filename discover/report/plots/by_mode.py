@@ -14,7 +14,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
-from discover.report.wording import readable, significant
+from discover.report.wording import effect_title, readable, significant
 
 _DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
 
@@ -43,7 +43,7 @@ def by_mode_picture(result: LoopResult) -> Picture | None:
                 )  # fmt: skip
             make_logarithmic(panel.xaxis)
             panel.set_xlabel("relaxation time (s)")
-            panel.set_ylabel(literal(readable(name)))
+            panel.set_ylabel(literal(readable(effect_title(name))))
         legend_above(drawing, axes)
         said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
         doubt = ""
@@ -63,7 +63,7 @@ def by_mode_picture(result: LoopResult) -> Picture | None:
 
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     """Return what the data say of a constant by mode."""
-    symbol = readable(name)
+    symbol = readable(effect_title(name))
     gains = [significant(gain, 2) for gain in constant.evidence[1:]]
     tried = f" (evidence over one constant, linear and quadratic: {' and '.join(gains)})"
     tried = tried if len(gains) > 1 else f" (evidence over one constant, linear: {gains[0]})"
