@@ -84,7 +84,7 @@ def named(name: str, parameter: StageParameter) -> str:
     if not isinstance(parameter, ConstantByMode) or not parameter.degree:
         return text
     time = significant(parameter.mean_time_s, 3)
-    return f"{text}, which differs from mode to mode, at a relaxation time of {time} s"
+    return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"
 
 
 def _loop_sure(result: LoopResult) -> str:

@@ -1,15 +1,17 @@
 """Constants of the declared law that differ from mode to mode; stresses by scipy."""
 
+import json
 from functools import cache
 
 import numpy as np
 import pytest
-from independent import multimode_giesekus
+from independent import Giesekus, multimode_giesekus
 from independent import start_up as flow
+from independent.folders import write_table
 from independent.homogeneous import GiesekusFluid
 
 import discover as dc
-from discover.closed_loop import DeclaredModel
+from discover.closed_loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
@@ -150,6 +152,50 @@ def test_the_forward_model_gives_each_mode_its_constant(kind, name):
     predicted = model.predict(theta, make_batch([run], strain_step=0.05))[0]
     # the integrator's error on such steps
     np.testing.assert_allclose(predicted, truth, atol=1e-3 * np.max(np.abs(truth)))
+
+
+def test_a_flow_curve_tells_each_constant(tmp_path):
+    # steady shear in closed form   [Bird, Armstrong & Hassager 1987, table 7.3-2]
+    mobilities, rates = (0.1, 0.3, 0.6), np.geomspace(0.03, 300.0, 60)
+    modes = [Giesekus(*of) for of in zip(mobilities, MODULI, TIMES, strict=True)]
+    stress = np.array([sum(mode.steady_shear(rate)[0] for mode in modes) for rate in rates])
+    noise = NOISE * np.random.default_rng(0).standard_normal(len(rates))
+    columns = {"shear_rate_1_s": rates, "stress_Pa": stress * (1.0 + noise)}
+    write_table(tmp_path / "flow_curve.csv", columns)
+    curve = dc.load_dataset(tmp_path).with_material_functions()
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI, TIMES)
+    found = dc.close_loop(
+        curve, base, free=["alpha"], by_mode=["alpha"], effects=["stress_gain"], max_effects=0
+    ).declared_parameters["alpha"]
+    assert found.degree > 0
+    for mode, mobility in zip(found.modes, mobilities, strict=True):
+        low, high = mode.ci95
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+
+
+class Interrupted(BaseException):
+    """Ctrl-C, when the effect is in."""
+
+
+class Store(dict):
+    def load(self, part):
+        return json.loads(self[part]) if part in self else None
+
+    def save(self, part, content):
+        self[part] = json.dumps(content)
+        if content["active"]:
+            raise Interrupted
+
+
+def test_an_interrupted_loop_keeps_the_degrees():
+    declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=("giesekus_mobility",))
+    options = {"effects": ["giesekus_mobility", "stress_gain"], "store": Store()}
+    with pytest.raises(Interrupted):
+        run_loop(data((0.1, 0.3, 0.6)), declared, **options)
+    again = run_loop(data((0.1, 0.3, 0.6)), declared, **options)
+    undisturbed = run_loop(data((0.1, 0.3, 0.6)), declared, effects=options["effects"])
+    assert again.stages == undisturbed.stages
+    assert again.by_mode["giesekus_mobility"].degree == 1
 
 
 def test_the_picture_says_what_is_determined_and_what_is_not():
