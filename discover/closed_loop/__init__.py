@@ -4,9 +4,11 @@ from discover.closed_loop.attribution import Attribution, CandidateScore
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import (
+    ConstantByMode,
     ErrorPair,
     Fold,
     LoopResult,
+    ModeConstant,
     RunRecord,
     Stage,
     StageParameter,
@@ -16,10 +18,12 @@ from discover.forward import DeclaredModel
 __all__ = [
     "Attribution",
     "CandidateScore",
+    "ConstantByMode",
     "DeclaredModel",
     "ErrorPair",
     "Fold",
     "LoopResult",
+    "ModeConstant",
     "RunRecord",
     "Stage",
     "StageParameter",

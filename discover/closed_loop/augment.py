@@ -340,7 +340,7 @@ def _drop(
 
 def taken_out(model: AugmentedModel, fit: Fit, effect: str) -> tuple[np.ndarray, tuple[int, ...]]:
     """Return a fit's parameters with one effect at zero, and those still free without it."""
-    own = model.positions(effect)
+    own = [*model.positions(effect), *model.varying(effect)]
     theta = fit.theta.copy()
     theta[own] = model.zero()[own]
     return theta, tuple(p for p in fit.free if p not in own)

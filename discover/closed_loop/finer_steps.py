@@ -78,7 +78,7 @@ def change_on_finer_steps(
     effects = _in_use(model, active)
     small = AugmentedModel(model.declared, effects)
     values = small.zero()
-    shared = 2 + len(model.declared.free_parameters)
+    shared = model.declared.size
     values[:shared] = theta[:shared]
     for effect in effects:
         values[small.positions(effect.name)] = theta[model.positions(effect.name)]

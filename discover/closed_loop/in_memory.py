@@ -24,6 +24,7 @@ def close_loop(
     *,
     held_out: HeldOut = (),
     free: Sequence[str] = (),
+    by_mode: Sequence[str] = (),
     known_effects: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] | None = None,
     **options: Any,
@@ -42,6 +43,10 @@ def close_loop(
     free
         What of the base is fitted along: parameters of its law, which must be one with a name, and
         ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
+    by_mode
+        What may differ from mode to mode, as a smooth function of the relaxation time: parameters
+        of the law, of those in `free`, and effects by the size of their term. How smooth is for the
+        data to say.
     known_effects
         Effects that are known beside the base, as ``[model] effects`` in a study, such as
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
@@ -68,7 +73,7 @@ def close_loop(
         )
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
-    declared = forward_model(with_known(fluid, known_effects, free))
+    declared = forward_model(with_known(fluid, known_effects, free, by_mode))
     options |= {"fit": divided.fit.names, "progress": progress}
     if divided.each:
         result = run_loop_on_each(divided.dataset, declared, **options)

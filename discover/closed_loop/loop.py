@@ -1,7 +1,7 @@
 """The closed loop: residual, attribution, augmentation, before and after."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +14,7 @@ from discover.closed_loop.before_after import (
     record_runs,
     strain_of,
 )
+from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations import BEAM_WIDTH, carry, explain, with_band
 from discover.closed_loop.finer_steps import on_finer_steps
@@ -21,6 +22,7 @@ from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import (
+    ConstantByMode,
     DeclaredEffect,
     KnownParameter,
     LoopResult,
@@ -149,6 +151,7 @@ def run_loop(
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
     _require_samples(fitted_runs, declared)
     known = {effect.name for effect in declared.effects}
+    _require_present(declared, {*known, *(effect.name for effect in candidates)})
     candidates = [effect for effect in candidates if effect.name not in known]
     _require_possible(declared, [*fitted_runs, *held_runs])
     # of one mode nothing can differ from another's
@@ -193,8 +196,11 @@ def run_loop(
         records += judging
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
+    by_mode = constants_by_mode(model, batch, current, bounds, search.degrees, search.prior)
+    differ = {name for name, found in by_mode.items() if found.degree}
+    of_law = {p.name: by_mode[p.name] for p in declared.free_parameters if p.name in by_mode}
     stages = tuple(
-        _stage(search, name, bounds, errors_of(records, i))
+        _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)
     )
     after = errors_of(records, len(thetas) - 1)
@@ -244,11 +250,11 @@ def run_loop(
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
-        declared_parameters=_declared_parameters(declared, current, bounds),
-        declared_effects=_declared_effects(model, current, bounds),
-        declared_law=_declared_law(declared, current),
+        declared_parameters=_declared_parameters(declared, current, bounds) | of_law,
+        declared_effects=_declared_effects(model, current, bounds, by_mode),
+        declared_law=None if differ & {*of_law} else _declared_law(declared, current),
         explanations=side_by_side,
-        fluid=_fluid(model, current, [*active, *known]),
+        fluid=None if differ else _fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )
 
@@ -337,6 +343,17 @@ def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
             )
 
 
+def _require_present(declared: DeclaredModel, present: set[str]) -> None:
+    """Refuse an effect by mode that is neither declared nor a candidate."""
+    free = {parameter.name for parameter in declared.free_parameters}
+    absent = [name for name in declared.by_mode if name not in free and name not in present]
+    if absent:
+        raise InputError(
+            f"by_mode names the effect {absent[0]}, which is neither declared nor a candidate. Add "
+            "it to [model] effects or to [loop] effects, or take it out of by_mode."
+        )
+
+
 def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
     if effects is None:
         return [*named_effects().values(), *library_effects()]
@@ -397,7 +414,7 @@ def _settle(search: Search, runs: Sequence[Run], max_effects: int, say) -> None:
         small, lambda effect: effect.kind != "constitutive", "at_small_strain"
     )
     if not linear.resume():
-        linear.start()
+        linear.start(by_mode=False)
     linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
     if linear.active and linear.explained:
         search.adopt(linear)
@@ -412,13 +429,15 @@ def _with_refusals(judgement: Judgement, search: Search) -> str:
     return f"{judgement.description} {' '.join(f'{text}.' for text in refused)}"
 
 
-def _stage(search: Search, name: str, bounds, error) -> Stage:
+def _stage(search: Search, name: str, bounds, error, by_mode: ConstantByMode | None) -> Stage:
     model, fit = search.model, search.fit
     effect = next(e for e in model.effects if e.name == name)
     parameters = {
         p.name: StageParameter(float(fit.theta[at]), bounds[at], p.unit)
         for p, at in zip(effect.parameters, model.positions(name), strict=True)
     }
+    if by_mode is not None:
+        parameters[effect.parameters[0].name] = by_mode
     return Stage(
         effect=name,
         kind=effect.kind,
@@ -436,7 +455,7 @@ def _stage(search: Search, name: str, bounds, error) -> Stage:
     )
 
 
-def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
+def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds) -> dict[str, StageParameter]:
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
     # of several modes only a common factor is fitted, which has no unit
     single = len(declared.modulus) == 1
@@ -446,7 +465,7 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
         if single
         else ("relaxation_time_factor", 1.0, ""),
     }
-    out = {}
+    out: dict[str, StageParameter] = {}
     for at in declared.free_positions:
         values = np.array([fit.theta[at], *bounds[at]])
         name, scale, unit = constants.get(at) or (named[at], 1.0, "")
@@ -458,14 +477,18 @@ def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds):
     return out
 
 
-def _declared_effects(model: AugmentedModel, fit: Fit, bounds) -> tuple[DeclaredEffect, ...]:
+def _declared_effects(
+    model: AugmentedModel, fit: Fit, bounds, by_mode: Mapping[str, ConstantByMode]
+) -> tuple[DeclaredEffect, ...]:
     """Return the known effects with their values in the final model."""
     found = []
     for known in model.declared.effects:
-        parameters = {
+        parameters: dict[str, KnownParameter | ConstantByMode] = {
             p.name: KnownParameter(float(fit.theta[at]), bounds.get(at), p.unit)
             for p, at in zip(known.effect.parameters, model.positions(known.name), strict=True)
         }
+        if known.name in by_mode:
+            parameters[known.effect.parameters[0].name] = by_mode[known.name]
         found.append(DeclaredEffect(known.name, known.effect.kind, parameters))
     return tuple(found)
 

@@ -49,7 +49,7 @@ def names_not_needed(
     at = model.positions(by_mode.name)
     starts, free, owners = [], [], []
     for group in groups:
-        gone = [position for name in group for position in model.positions(name)]
+        gone = [p for name in group for p in (*model.positions(name), *model.varying(name))]
         for exponent in _STARTS:
             theta = fit.theta.copy()
             theta[gone] = model.zero()[gone]

@@ -37,6 +37,51 @@ class StageParameter:
 
 
 @dataclass(frozen=True)
+class ModeConstant:
+    """The constant of one mode.
+
+    Attributes
+    ----------
+    relaxation_time_s
+        Of the mode.
+    value, ci95
+        The constant with its 95 % interval, given that it is a smooth function of the time (see
+        `discover.closed_loop.by_mode`); without one where it is left open.
+    left_open
+        Whether these data leave it open: the interval leaves hardly a value out, or the runs are as
+        well described whatever this mode's constant. What stands here then comes from the other
+        modes and the smooth function alone.
+    """
+
+    relaxation_time_s: float
+    value: float
+    ci95: tuple[float, float] | None
+    left_open: bool
+
+
+@dataclass(frozen=True)
+class ConstantByMode(StageParameter):
+    """A constant by mode; `value` and `ci95` are those at the mean time.
+
+    Attributes
+    ----------
+    mean_time_s
+        Mean relaxation time by viscosity.
+    degree
+        Of the polynomial in log λ; 0 for one constant of all modes.
+    evidence
+        For each degree over one constant.
+    modes
+        In the order of the declared modes.
+    """
+
+    mean_time_s: float
+    degree: int
+    evidence: tuple[float, ...]
+    modes: tuple[ModeConstant, ...]
+
+
+@dataclass(frozen=True)
 class Stage:
     """An effect that was added.
 
@@ -90,7 +135,7 @@ class DeclaredEffect:
 
     effect: str
     kind: str
-    parameters: dict[str, KnownParameter]
+    parameters: dict[str, KnownParameter | ConstantByMode]
 
 
 @dataclass(frozen=True)
@@ -136,7 +181,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
         Every run with its predictions.
     declared_parameters
         What was fitted of the declared model: modulus in Pa and relaxation time in s, or for
-        several modes a common factor on each, and parameters of the law.
+        several modes a common factor on each, and parameters of the law; those that may differ
+        from mode to mode are a `ConstantByMode`.
     declared_effects
         Effects that were part of the declared model, and so are no finding.
     declared_law
@@ -182,6 +228,22 @@ class LoopResult(PageView, HasEquation, NotebookView):
         judged = "" if held is None else f", held out {100 * held:.2g} %"
         return f"<LoopResult: {self.verdict}; {added}; error {100 * fit:.2g} %{judged}>"
 
+    @property
+    def by_mode(self) -> dict[str, ConstantByMode]:
+        """Constants that might differ from mode to mode: by their name, or by their effect's."""
+        of_law = self.declared_parameters.items()
+        found = {name: one for name, one in of_law if isinstance(one, ConstantByMode)}
+        for effect in (*self.declared_effects, *self.stages):
+            for one in effect.parameters.values():
+                if isinstance(one, ConstantByMode):
+                    found[effect.effect] = one
+        return found
+
+    @property
+    def differing_by_mode(self) -> tuple[str, ...]:
+        """Names of those of them that do."""
+        return tuple(name for name, one in self.by_mode.items() if one.degree)
+
     def equation(self) -> Equation:
         """Return the augmented fluid as an equation, with the box in which it was tested.
 
@@ -191,6 +253,13 @@ class LoopResult(PageView, HasEquation, NotebookView):
             If an effect gives the fluid a state, or adds what is no sum of library terms.
         """
         fluid = self.fluid
+        differing = self.differing_by_mode
+        if differing:
+            raise InputError(
+                f"{', '.join(differing)} differs from one relaxation mode to the next, so the law "
+                "cannot be written out as one equation for all. declared_parameters has the "
+                "constants of each mode."
+            )
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(
@@ -310,6 +379,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             "declared": {
                 "law": None if self.declared_law is None else equation_to_json(self.declared_law),
                 "effects": [asdict(effect) for effect in self.declared_effects],
+                "by_mode": list(self.differing_by_mode),
             },
             "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
             "ranking": [

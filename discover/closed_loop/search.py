@@ -18,6 +18,7 @@ from discover.closed_loop.augment import (
     simplest,
     taken_out,
 )
+from discover.closed_loop.degrees import choose_degrees, positions_of
 from discover.closed_loop.left_out import left_out_errors
 from discover.closed_loop.mode_dependence import names_not_needed
 from discover.closed_loop.numerical_resolution import NumericalResolution
@@ -140,8 +141,24 @@ class Search(SearchState):
         """Go on from the last stage that was kept, and return whether there was one."""
         return self.checkpoint.restore(self)
 
-    def start(self) -> None:
+    def positions(self, active: Sequence[str]) -> list[int]:
+        """Return what is fitted with these effects, constants by mode as chosen."""
+        own = [position for name in active for position in self.model.positions(name)]
+        fitted = [*self.model.free_positions, *own]
+        present = {
+            name: found
+            for name, found in self.degrees.items()
+            if self.model.constant(name)[1] in fitted
+        }
+        return [*fitted, *positions_of(self.model, present)]
+
+    def start(self, by_mode: bool = True) -> None:
         """Fit the declared model; an unknown relaxation time from several starts.
+
+        Parameters
+        ----------
+        by_mode
+            Whether constants may differ from mode to mode, as far as the model says so.
 
         Raises
         ------
@@ -165,8 +182,33 @@ class Search(SearchState):
                 "The declared model cannot be integrated through the fitted runs: its stress runs "
                 "away. Check its parameters, modes and units."
             )
+        if by_mode:
+            self._choose_degrees()
         self.path = [self.fit.theta]
         self._leave_out()
+
+    def _choose_degrees(self) -> bool:
+        """Choose how constants by mode depend on the time, and return whether that is new."""
+        before = {name: found.degree for name, found in self.degrees.items()}
+        if before:
+            self.fit, self.degrees = choose_degrees(
+                self.model, self.batch, self.fit, self.degrees, self.prior
+            )
+        return before != {name: found.degree for name, found in self.degrees.items()}
+
+    def _choose_degrees_again(self, say: Callable[[str], None]) -> bool:
+        """Choose again beside the effects that were found; return whether that changed anything.
+
+        A degree was chosen when they were missing, and may have stood for a part of them.
+        """
+        if not self.active or not self._choose_degrees():
+            return False
+        self.unasked = set(self.active)
+        self._fit_path()
+        self._leave_out()
+        chosen = (f"{name} of degree {found.degree}" for name, found in self.degrees.items())
+        say(f"constants by mode: {', '.join(chosen)}")
+        return True
 
     def _starts_of_known(self) -> list[np.ndarray]:
         """Return starts from other inner times and exponents of known effects to be fitted."""
@@ -192,10 +234,16 @@ class Search(SearchState):
         What then has a value at the end of its physical range, or one that the data leave open, is
         taken out again, and the search goes on without it.
         """
+        chosen_again = 0
         while True:
             self._add_all(max_effects, say, look_ahead)
             refused = self._refuse()
             if not refused:
+                if look_ahead and chosen_again < _ROUNDS and self._choose_degrees_again(say):
+                    chosen_again += 1
+                    self.rounds = 0
+                    self.checkpoint.save(self)
+                    continue
                 break
             self.rounds = 0
             say(f"no finding: {self.not_named[refused]}")
@@ -444,6 +492,8 @@ class Search(SearchState):
         self.unasked = set(self.active)
         kept = [*self.active, name]
         self.fit = self._sharpened(chosen.fit)
+        if name in self.degrees:
+            self._choose_degrees()
         self._polish()
         self.fit, self.active = prune(
             self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
@@ -470,16 +520,18 @@ class Search(SearchState):
                 deviation = (bounds[at][1] - bounds[at][0]) / (2.0 * 1.96)
                 if deviation > 0.0:
                     self.known[at] = (float(other.fit.theta[at]), deviation)
-        self.fit = self._fit(self.active, other.fit.theta)
+        values = other.fit.theta.copy()
+        if self.degrees:
+            # at small strain nothing tells a constant of one mode from another's
+            own = self.model.declared.size
+            values[:own] = self.fit.theta[:own]
+        self.fit = self._fit(self.active, values)
         self._polish()
         self._fit_path()
         self._leave_out()
 
     def _fit(self, active: Sequence[str], values: np.ndarray) -> Fit:
-        positions = [
-            *self.model.free_positions,
-            *(p for name in active for p in self.model.positions(name)),
-        ]
+        positions = self.positions(active)
         start = self.model.zero()
         start[positions] = values[positions]
         return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]

@@ -10,6 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.degrees import Degree
 from discover.closed_loop.search_state import SearchState
 from discover.closed_loop.seen_sets import SeenSets
 from discover.forward.least_squares import Fit
@@ -58,7 +59,9 @@ class SearchCheckpoint:
 
 def _model_of(search: SearchState) -> list[str]:
     """Return what the positions in a parameter vector mean."""
-    return [effect.name for effect in search.model.effects]
+    return [f"{name} by mode" for name in search.model.declared.by_mode] + [
+        effect.name for effect in search.model.effects
+    ]
 
 
 def _state(search: SearchState) -> dict[str, Any]:
@@ -86,6 +89,7 @@ def _state(search: SearchState) -> dict[str, Any]:
         "refused": sorted(search.refused),
         "unasked": sorted(search.unasked),
         "seen": search.seen.to_json(),
+        "degrees": {name: asdict(found) for name, found in search.degrees.items()},
         "known": [[at, *pair] for at, pair in search.known.items()],
     }
 
@@ -119,4 +123,8 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.refused = set(state.get("refused", ()))
     search.unasked = set(state.get("unasked", ()))
     search.seen = SeenSets.from_json(state.get("seen", {}))
+    search.degrees = {
+        name: Degree(found["degree"], tuple(found["evidence"]))
+        for name, found in state.get("degrees", {}).items()
+    }
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

@@ -3,6 +3,7 @@
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.degrees import Degree
 from discover.closed_loop.seen_sets import SeenSets
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
@@ -45,6 +46,8 @@ class SearchState:
         Every set of effects that was fitted.
     unasked
         Effects whose aliases were found beside others than those that are in the model now.
+    degrees
+        Degree in log λ of each constant by mode, and the evidence for each degree.
     """
 
     fit: Fit  # the first stage makes it
@@ -64,3 +67,4 @@ class SearchState:
         self.refused: set[str] = set()
         self.unasked: set[str] = set()
         self.seen = SeenSets()
+        self.degrees = {name: Degree() for name in model.declared.by_mode}

@@ -42,7 +42,7 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
     """
     declared = model.declared
     off = replace(declared, modulus=_OFF * declared.modulus, solvent_viscosity=0.0)
-    theta, fluid = fit.theta.copy(), max(len(declared.free_positions), 1)
+    theta, fluid = fit.theta.copy(), max(sum(at < declared.size for at in fit.free), 1)
     on = {*active, *(known.name for known in declared.effects)}
     for effect in model.effects:
         if effect.name in on and isinstance(effect, ConstitutiveEffect):

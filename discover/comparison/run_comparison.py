@@ -98,6 +98,11 @@ def compare(
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
+    if declared.by_mode:
+        raise InputError(
+            "[model] by_mode is for close-loop: a comparison has one set of constants for all "
+            "relaxation modes, in the known part and in each learner. Leave it out here."
+        )
     following_options = options.next
     grid = list(
         itertools.product(following_options.weissenberg_numbers, following_options.deborah_numbers)

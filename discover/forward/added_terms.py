@@ -7,6 +7,8 @@ an effect at zero amplitude adds nothing, so that leaving it out changes nothing
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from operator import add
 from typing import NamedTuple
 
 import jax
@@ -53,10 +55,24 @@ class AddedTerms:
         Effects of the fluid; those that add no term are passed over.
     slices
         Where the parameters of each effect stand in the vector.
+    varying
+        Where, of effects whose amplitude may differ from mode to mode, what varies it stands.
     """
 
-    def __init__(self, effects: Sequence[ConstitutiveEffect], slices: Mapping[str, slice]):
-        plain = [e for e in effects if isinstance(e, LibraryTerm) and e.term.closed_form is None]
+    def __init__(
+        self,
+        effects: Sequence[ConstitutiveEffect],
+        slices: Mapping[str, slice],
+        varying: Mapping[str, slice] | None = None,
+    ):
+        self._varying = dict(varying or {})
+        plain = [
+            e
+            for e in effects
+            if isinstance(e, LibraryTerm)
+            and e.term.closed_form is None
+            and e.name not in self._varying
+        ]
         self._library = LibraryMatrix(plain, [slices[term.name].start for term in plain])
         self._others = [e for e in effects if e.adds_term and e not in plain]
         self._slices = slices
@@ -64,7 +80,7 @@ class AddedTerms:
     def in_use(self, theta: Float[np.ndarray, " p"]) -> InUse:
         """Return the branches that a parameter vector takes."""
         tensors = self._library.tensors_in_use(theta)
-        others = [i for i, e in enumerate(self._others) if theta[self._slices[e.name].start] != 0.0]
+        others = [i for i, e in enumerate(self._others) if self._is_used(theta, e)]
         several = len(self._others) + 1
         return InUse(
             np.int32(min(len(tensors), 2)),
@@ -72,10 +88,27 @@ class AddedTerms:
             np.int32(0 if not others else others[0] + 1 if len(others) == 1 else several),
         )
 
-    def rate(self, theta: Float[Array, " p"], used: InUse) -> ModesRate:
-        """Return the function that sums what is in use, dimensionless."""
+    def _is_used(self, theta, effect: ConstitutiveEffect) -> bool:
+        varied = self._varying.get(effect.name, slice(0))
+        return bool(theta[self._slices[effect.name].start] != 0.0 or np.any(theta[varied]))
+
+    def rate(
+        self,
+        theta: Float[Array, " p"],
+        used: InUse,
+        amplitudes: Mapping[str, Float[Array, " k"]] | None = None,
+    ) -> ModesRate:
+        """Return the function that sums what is in use, dimensionless.
+
+        Parameters
+        ----------
+        theta, used
+            The parameters, and the branches that they take.
+        amplitudes
+            Of each mode, of effects in which they differ.
+        """
         library = self._library_rate(theta, used) if self._library.tensors else _nothing
-        others = self._others_rate(theta, used) if self._others else _nothing
+        others = self._others_rate(theta, used, amplitudes or {}) if self._others else _nothing
 
         def total(stress, gradient):
             return library(stress, gradient) + others(stress, gradient)
@@ -101,13 +134,25 @@ class AddedTerms:
 
         return lambda *flow: jax.lax.switch(used.library, [_nothing, one, every], *flow)
 
-    def _others_rate(self, theta, used: InUse) -> ModesRate:
+    def _others_rate(self, theta, used: InUse, amplitudes) -> ModesRate:
+        def values_of(effect: ConstitutiveEffect):
+            values = theta[self._slices[effect.name]]
+            if effect.name not in amplitudes:
+                return values
+            own = amplitudes[effect.name]
+            inner = jnp.broadcast_to(values[1:], (len(own), len(values) - 1))
+            return jnp.concatenate([own[:, None], inner], axis=1)
+
         def of(effects: Sequence[ConstitutiveEffect]) -> ModesRate:
-            return _over_modes(
-                lambda stress, rate: sum(
-                    e.extra_term(theta[self._slices[e.name]], stress, rate) for e in effects
-                )
-            )
+            def of_mode(values, stress, gradient):
+                rate = rate_of_deformation(gradient)
+                pairs = zip(effects, values, strict=True)
+                return reduce(add, (e.extra_term(own, stress, rate) for e, own in pairs))
+
+            by_mode = [0 if e.name in amplitudes else None for e in effects]
+            every = jax.vmap(of_mode, in_axes=(by_mode, -1, -1), out_axes=-1)
+            values = [values_of(e) for e in effects]
+            return lambda stress, gradient: every(values, stress, gradient)
 
         branches = [_nothing, *(of([e]) for e in self._others), of(self._others)]
         return lambda *flow: jax.lax.switch(used.others, branches, *flow)

@@ -16,7 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect
-from discover.forward.declared import DeclaredModel
+from discover.forward.by_mode import LARGEST
+from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
 from discover.forward.run_batch import Batch, MixedBatch, Part
 
@@ -64,6 +65,7 @@ class AugmentedModel:
                 declared.parameters if free else (),
                 declared.fit_modulus,
                 declared.fit_relaxation_time,
+                tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
             )
         )
         self.slices, self.size = self._program.slices, self._program.size
@@ -72,15 +74,16 @@ class AugmentedModel:
         units = [sizes.get(p.range_scale, 1.0) for p in parameters]
         lows = [p.low * unit for p, unit in zip(parameters, units, strict=True)]
         highs = [p.high * unit for p, unit in zip(parameters, units, strict=True)]
-        self.low = np.array([-10.0, -10.0, *(p.low for p in free), *lows])
-        self.high = np.array([10.0, 10.0, *(p.high for p in free), *highs])
+        varying = [LARGEST] * (declared.size - 2 - len(free))
+        self.low = np.array([-10.0, -10.0, *(p.low for p in free), *np.negative(varying), *lows])
+        self.high = np.array([10.0, 10.0, *(p.high for p in free), *varying, *highs])
         trials = [p.first_trial * sizes.get(p.scale, 1.0) for p in parameters]
         # well inside the range, whatever the data's own size suggests
         trials = [
             float(np.clip(trial, max(low, _TRIAL_SHARE * low), _TRIAL_SHARE * high))
             for trial, low, high in zip(trials, lows, highs, strict=True)
         ]
-        self.first_trial = np.array([0.01] * (2 + len(free)) + trials)
+        self.first_trial = np.array([0.01] * (2 + len(free)) + [1.0] * len(varying) + trials)
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -122,6 +125,20 @@ class AugmentedModel:
         """Return the positions of an effect's parameters in the vector."""
         at = self.slices[name]
         return list(range(at.start, at.stop))
+
+    def varying(self, name: str) -> list[int]:
+        """Return the positions of what varies a constant by mode; none where it is no such one."""
+        at = self.declared.by_mode_slices.get(name, slice(0))
+        return list(range(at.start or 0, at.stop))
+
+    def constant(self, name: str) -> tuple[FreeParameter, int]:
+        """Return a constant by mode, of the law or the amplitude of an effect, and its position."""
+        for i, parameter in enumerate(self.declared.free_parameters):
+            if parameter.name == name:
+                return parameter, 2 + i
+        at = self.slices[name].start
+        start, low, high = (float(of[at]) for of in (self.first_trial, self.low, self.high))
+        return FreeParameter(name, start, low, high), at
 
     def predict(self, theta, batch: Batch) -> Float[np.ndarray, "runs n"]:
         """Return the predicted records: stresses in Pa, and strains of runs at a given stress."""

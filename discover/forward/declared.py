@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import KnownEffect
+from discover.effects import ConstitutiveEffect, KnownEffect, make_effect
 from discover.errors import InputError
+from discover.forward.by_mode import DEGREE
 from discover.laws import LAWS, AbstractConstitutiveLaw, UpperConvectedMaxwell, make_law
 
 MODULUS, RELAXATION_TIME = "modulus_Pa", "relaxation_time_s"
@@ -49,6 +50,14 @@ class DeclaredModel:
         can be expected to do better.
     effects
         What is known beside the law: effects of fluid and instrument, with values or to be fitted.
+    by_mode
+        Free parameters of the law, and effects by the amplitude of their term, that may differ from
+        mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
+
+    Raises
+    ------
+    InputError
+        If modes are none, or a constant by mode cannot be one, or has one mode alone.
     """
 
     law: AbstractConstitutiveLaw
@@ -62,6 +71,7 @@ class DeclaredModel:
     free_parameters: tuple[FreeParameter, ...] = ()
     linear_error: float = 0.0
     effects: tuple[KnownEffect, ...] = ()
+    by_mode: tuple[str, ...] = ()
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):
@@ -73,6 +83,41 @@ class DeclaredModel:
             raise InputError(
                 f"A model needs as many moduli as relaxation times; got {len(self.modulus)} and "
                 f"{len(self.relaxation_time)}."
+            )
+        for name in self.by_mode:
+            self._require_by_mode(name)
+        if self.by_mode and len(self.modulus) < 2:
+            raise InputError(
+                "by_mode lets constants differ from one relaxation mode to the next, and the "
+                'declared model has one mode. Give several (modes = "lve"), or leave by_mode out.'
+            )
+        if len(set(self.by_mode)) < len(self.by_mode):
+            raise InputError(f"by_mode names a constant twice: {', '.join(self.by_mode)}.")
+
+    def _require_by_mode(self, name: str) -> None:
+        """Refuse what is no parameter of the law to be fitted, and no term of an effect."""
+        if name in (free := [parameter.name for parameter in self.free_parameters]):
+            return
+        known = next((one for one in self.effects if one.name == name), None)
+        try:
+            effect = make_effect(name) if known is None else known.effect
+        except InputError:
+            raise InputError(
+                f"by_mode names {name!r}, which is no parameter of the law that is fitted (these "
+                f"are: {', '.join(free) or 'none'}), and no effect. Write parameters = {{ {name} = "
+                f'"fit" }}, or from Python free=["{name}"], or take it out of by_mode.'
+            ) from None
+        amplitude = effect.parameters[0]
+        adds = isinstance(effect, ConstitutiveEffect) and effect.adds_term
+        if not adds or amplitude.range_scale != "one":
+            raise InputError(
+                f"by_mode names the effect {name}, which adds no term to the law of each mode. "
+                "Name effects that do, such as giesekus_mobility, or parameters of the law."
+            )
+        if known is not None and amplitude.name not in known.free:
+            raise InputError(
+                f"by_mode names the effect {name}, whose {amplitude.name} has a value. Write "
+                f'{amplitude.name} = "fit", or take it out of by_mode.'
             )
 
     @classmethod
@@ -147,6 +192,23 @@ class DeclaredModel:
         for parameter, value in zip(self.free_parameters, values, strict=True):
             known[parameter.name] = value
         return LAWS[self.law_name].build(*known.values())
+
+    @property
+    def by_mode_slices(self) -> dict[str, slice]:
+        """Where, after the law's free parameters, each constant by mode has what varies it.
+
+        First the coefficients of a polynomial, then the deviation of each mode from it.
+        """
+        start, each = 2 + len(self.free_parameters), DEGREE + len(self.modulus)
+        return {
+            name: slice(start + i * each, start + (i + 1) * each)
+            for i, name in enumerate(self.by_mode)
+        }
+
+    @property
+    def size(self) -> int:
+        """How many places of the parameter vector are the declared law's."""
+        return 2 + len(self.free_parameters) + len(self.by_mode) * (DEGREE + len(self.modulus))
 
     @property
     def free_positions(self) -> list[int]:

@@ -248,13 +248,8 @@ def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[
     """
     if not fit.free:
         return {}
-    n_runs, n = fit.residual.shape
-    design = fit.jacobian.reshape(len(fit.free), -1).T
-    rows = np.arange(n_runs * n).reshape(n_runs, n)
-    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
-    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
-    independent = max(noise.effective_samples - len(fit.free), 1.0)
-    half = student.ppf(0.975, independent) * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+    half = quantile * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     bounds = {}
     for position, h in zip(fit.free, half, strict=True):
         value, low, high = fit.theta[position], model.low[position], model.high[position]
@@ -265,3 +260,24 @@ def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[
             float(min(value + h, high)),
         )
     return bounds
+
+
+def uncertainty(
+    batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
+) -> tuple[Float[np.ndarray, "free free"], float]:
+    """Return the covariance of fitted parameters, and how many deviations hold 95 %.
+
+    Parameters
+    ----------
+    batch
+        The fitted runs.
+    residual, jacobian
+        Weighted residuals of the fit, and their derivatives in the parameters.
+    """
+    n_runs, n = residual.shape
+    design = jacobian.reshape(len(jacobian), -1).T
+    rows = np.arange(n_runs * n).reshape(n_runs, n)
+    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
+    covariance, _, noise = least_squares_covariance(design, residual.ravel(), sequences)
+    independent = max(noise.effective_samples - len(jacobian), 1.0)
+    return covariance, float(student.ppf(0.975, independent))

@@ -21,6 +21,7 @@ from discover.effects import (
     StateEffect,
 )
 from discover.forward.added_terms import AddedTerms, InUse
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
 from discover.forward.imposed_stress import strain_at_stress
 from discover.forward.integrator import integrate
@@ -50,6 +51,8 @@ class Structure(NamedTuple):
     parameters: tuple[tuple[str, float], ...]
     fit_modulus: bool
     fit_relaxation_time: bool
+    by_mode: tuple[tuple[str, int, int], ...] = ()
+    """Constants that may differ from mode to mode, and where what varies them begins and ends."""
 
 
 class Program:
@@ -60,13 +63,23 @@ class Program:
         effects = structure.effects
         self.slices: dict[str, slice] = {}
         # first the logarithms of the factors on moduli and times, then the law's free parameters
-        position = 2 + len(structure.free_parameters)
+        position = max(
+            [2 + len(structure.free_parameters), *(end for *_, end in structure.by_mode)]
+        )
         for effect in effects:
             self.slices[effect.name] = slice(position, position + len(effect.parameters))
             position += len(effect.parameters)
         self.size = position
         self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
-        self.added = AddedTerms(self._constitutive, self.slices)
+        # of the law's constants, and of effects' amplitudes
+        slots = {name: slice(start, end) for name, start, end in structure.by_mode}
+        free = structure.free_parameters
+        self._varying_law = {name: at for name, at in slots.items() if name in free}
+        self._varying_effects = {
+            e: slots[e.name] for e in self._constitutive if e.name in slots and e.name not in free
+        }
+        of_effects = {e.name: at for e, at in self._varying_effects.items()}
+        self.added = AddedTerms(self._constitutive, self.slices, of_effects)
         self._by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self._states = [e for e in effects if isinstance(e, StateEffect)]
@@ -182,15 +195,37 @@ class Program:
             total = total + viscous / intensity * shear
         return total
 
-    def _law(self, numbers, theta):
-        """Return the law with the values of its free parameters."""
+    def _varied(self, theta, mean, ends: tuple[float, float], at: slice, places):
+        """Return a constant of each mode; one that an effect adds deviates from no polynomial."""
+        coefficients, deviations = jnp.split(theta[at], [DEGREE])
+        deviations = jnp.append(deviations, jnp.zeros(len(places) - len(deviations)))
+        low, high = ends
+        mean = jnp.asarray(mean)
+        return constants_of_modes(mean, low, high, coefficients, deviations, places)
+
+    def _law(self, theta, numbers, places):
+        """Return the law with the values of its free parameters, or one for each mode as one tree.
+
+        Of constants by mode, a mode that an effect adds has the one of its own time.
+        """
         free = self.structure.free_parameters
         if not free:
             return numbers.law
+        named = LAWS[self.structure.law_name]
         known = dict(self.structure.parameters) | dict(
             zip(free, theta[2 : 2 + len(free)], strict=True)
         )
-        return LAWS[self.structure.law_name].build(*known.values())
+        if not self._varying_law:
+            return named.build(*known.values())
+        for name, at in self._varying_law.items():
+            known[name] = self._varied(theta, known[name], named.parameters[name], at, places)
+        columns = [jnp.broadcast_to(value, places.shape) for value in known.values()]
+        return jax.vmap(named.build)(*columns)
+
+    def _over_modes(self, of_mode):
+        """Return a function of a law and of one mode as one of all modes."""
+        law = 0 if self._varying_law else None
+        return jax.vmap(of_mode, in_axes=(law, -1, -1), out_axes=-1)
 
     def _terms_by_mode(self, law, added, theta, modes: Modes):
         """Return the function by how much h of each mode differs from that of equal constants."""
@@ -198,36 +233,51 @@ class Program:
         assert by_mode is not None
         factors = by_mode.factors(self._values(theta, by_mode), *modes)
 
-        def of_mode(stress, gradient):
+        def of_mode(law, stress, gradient):
             return law.extra_term(stress, rate_of_deformation(gradient))
 
-        of_law = jax.vmap(of_mode, in_axes=-1, out_axes=-1)
+        of_law = self._over_modes(of_mode)
 
         def differing(stress, gradient):
             # a mode that an effect adds stands after the declared ones, and is as they are in mean
             declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
-            return (declared - 1.0) * (of_law(stress, gradient) + added(stress, gradient))
+            return (declared - 1.0) * (of_law(law, stress, gradient) + added(stress, gradient))
 
         return differing
 
     def _dynamics(self, numbers, used, theta, flow: Kinematics | None) -> Dynamics:
-        law = self._law(numbers, theta)
+        extra = None
+        if self._modes:
+            pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
+            extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
+        places = None
+        if self._varying_law or self._varying_effects:
+            places = decades(numbers.modulus, numbers.relaxation_time)
+            if extra is not None:
+                declared = numbers.modulus, numbers.relaxation_time
+                places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
+        law = self._law(theta, numbers, places)
         # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
         if self.structure.fit_modulus:
             modulus = modulus * jnp.exp(theta[0])
         if self.structure.fit_relaxation_time:
             relaxation_time = relaxation_time * jnp.exp(theta[1])
-        of_law = jax.vmap(law.stress_rate, in_axes=-1, out_axes=-1)
-        added = self.added.rate(theta, used)
-
-        extra = None
-        if self._modes:
-            pairs = [effect.mode(self._values(theta, effect)) for effect in self._modes]
-            extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
+        of_law = self._over_modes(lambda law, *flow: law.stress_rate(*flow))
+        amplitudes = {
+            e.name: self._varied(
+                theta,
+                self._values(theta, e)[0],
+                (float(e.parameters[0].low), float(e.parameters[0].high)),
+                at,
+                places,
+            )
+            for e, at in self._varying_effects.items()
+        }
+        added = self.added.rate(theta, used, amplitudes)
 
         def modes_rate(stress, gradient):
-            same = of_law(stress, gradient) - added(stress, gradient)
+            same = of_law(law, stress, gradient) - added(stress, gradient)
             if self._by_mode is None:
                 return same
             differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))

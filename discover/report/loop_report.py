@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from discover.closed_loop.result import Fold, LoopResult, Stage
+from discover.closed_loop.result import ConstantByMode, Fold, LoopResult, Stage
 from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError
@@ -16,6 +16,7 @@ from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import made_by, render
+from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop import (
     ranking_picture,
     reading_picture,
@@ -27,7 +28,7 @@ from discover.report.plots.loop import (
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import loop_predictions, write_predictions
-from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict
+from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict, named
 from discover.report.wording import effect_title, percent, significant
 from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
@@ -72,6 +73,7 @@ def write_loop(
         reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),
+        by_mode_picture(result),
     ]
     drawn = [p for p in pictures if p is not None]
     for one in drawn:
@@ -213,7 +215,7 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "formula": formula(stage.equation, f"formula{number}"),
         "parameters": [
             {
-                "name": name,
+                "name": named(name, p) if isinstance(p, ConstantByMode) else name,
                 "symbol": symbols.get(name, "–"),
                 "value": p.value,
                 "ci95": p.ci95,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.result import LoopResult, Stage
+from discover.closed_loop.result import ConstantByMode, LoopResult, Stage, StageParameter
 from discover.report.wording import (
     effect_title,
     estimate,
@@ -63,7 +63,7 @@ def _loop_found(result: LoopResult) -> str:
     parts = []
     for i, stage in enumerate(result.stages):
         values = ", ".join(
-            f"{readable(name.replace('_', ' '))} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+            f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
             + f" (95 % {interval(p.ci95)})"
             for name, p in stage.parameters.items()
         )
@@ -77,6 +77,15 @@ def _loop_found(result: LoopResult) -> str:
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
     return sentence([verdict, *parts])
+
+
+def named(name: str, parameter: StageParameter) -> str:
+    """Return a parameter's name in the field's letters, and of one by mode, at which time it is."""
+    text = readable(name.replace("_", " "))
+    if not isinstance(parameter, ConstantByMode) or not parameter.degree:
+        return text
+    time = significant(parameter.mean_time_s, 3)
+    return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"
 
 
 def _loop_sure(result: LoopResult) -> str:

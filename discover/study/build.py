@@ -72,6 +72,8 @@ class DeclaredModel:
         Effects known beside the law, with values or to be fitted.
     source
         What was taken from an earlier result, in words; empty where nothing was.
+    by_mode
+        Parameters of the law, and effects, that may differ from mode to mode.
     """
 
     law: AbstractConstitutiveLaw
@@ -84,6 +86,7 @@ class DeclaredModel:
     solvent_viscosity: float = 0.0
     effects: tuple[KnownEffect, ...] = ()
     source: str = ""
+    by_mode: tuple[str, ...] = ()
 
     @property
     def free_constants(self) -> tuple[str, ...]:
@@ -282,6 +285,7 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         spectrum,
         model.solvent_viscosity_Pa_s,
         effects,
+        by_mode=model.by_mode,
     )
 
 
@@ -293,6 +297,7 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
         "solvent_viscosity": declared.solvent_viscosity,
         "linear_error": 0.0 if spectrum is None else spectrum.relative_error,
         "effects": declared.effects,
+        "by_mode": declared.by_mode,
     }
     if declared.law.linear_relaxation and declared.law_name in LAWS:
         named = declared.law_name, declared.parameters

@@ -112,6 +112,12 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
             f"[model] from: {file} does not say what its loop started from: it was written by an "
             f"earlier version. {_AGAIN}"
         )
+    if declared.get("by_mode"):
+        raise InputError(
+            f"[model] from: in the loop of {file} {', '.join(map(str, declared['by_mode']))} "
+            "differs from one relaxation mode to the next, and from takes laws that are the same "
+            "in all. Declare the law in the study, with by_mode, and leave from out."
+        )
     if declared.get("law") is None:
         raise InputError(
             f"[model] from: the law that the loop of {file} started from is no sum of library "

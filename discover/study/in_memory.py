@@ -120,7 +120,10 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
 
 
 def with_known(
-    declared: DeclaredModel, effects: Mapping[str, Any] | None, free: Sequence[str] = ()
+    declared: DeclaredModel,
+    effects: Mapping[str, Any] | None,
+    free: Sequence[str] = (),
+    by_mode: Sequence[str] = (),
 ) -> DeclaredModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
@@ -132,14 +135,17 @@ def with_known(
         As ``[model] effects`` in a study; None for none.
     free
         Names of its constants.
+    by_mode
+        Which of them, and which effects, may differ from mode to mode.
 
     Raises
     ------
     InputError
         If an effect, a value or a constant is not as it should be.
     """
-    if isinstance(free, str):
-        raise InputError(f"free must be a list of names; got {free!r}. Write [{free!r}].")
+    for option, names in (("free", free), ("by_mode", by_mode)):
+        if isinstance(names, str):
+            raise InputError(f"{option} must be a list of names; got {names!r}. Write [{names!r}].")
     possible = (*declared.parameters, *MODE_CONSTANTS)
     unknown = [name for name in free if name not in possible]
     if unknown:
@@ -148,7 +154,7 @@ def with_known(
             "name has no constant that could; register it with register_law."
         )
     known = known_effects(effects or {}, "known_effects")
-    return replace(declared, effects=known, free=tuple(dict.fromkeys(free)))
+    return replace(declared, effects=known, free=tuple(dict.fromkeys(free)), by_mode=tuple(by_mode))
 
 
 def _spectrum(data: Dataset, modulus, relaxation_time) -> RelaxationSpectrum | None:

@@ -110,6 +110,7 @@ class Model(Section):
     sweep_rad_s: tuple[Positive, Positive] | None = None
     solvent_viscosity_Pa_s: Annotated[float, Field(ge=0, le=_MOST)] = 0.0
     parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
+    by_mode: tuple[str, ...] = ()
     known_relaxation: bool = True
     effects: dict[str, dict[str, float | Literal["fit"]] | Literal["fit"]] = Field(
         default_factory=dict

@@ -178,6 +178,11 @@ BAD_STUDIES = {
         STUDY + '\n[model]\nlaw = "giesekus"\nparameters = {alpha = 0.1}\nknown_relaxation = false',
         "known_relaxation",
     ),
+    # a comparison knows no constants by mode, and a loop none of a single mode
+    "by_mode": (
+        STUDY + '\n[model]\nlaw = "giesekus"\nparameters = {alpha = "fit"}\nby_mode = ["alpha"]',
+        "by_mode",
+    ),
 }
 
 

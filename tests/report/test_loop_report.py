@@ -9,9 +9,11 @@ import pytest
 
 from discover.closed_loop import CandidateScore
 from discover.closed_loop.result import (
+    ConstantByMode,
     ErrorPair,
     Fold,
     LoopResult,
+    ModeConstant,
     RunRecord,
     Stage,
     StageParameter,
@@ -103,6 +105,28 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tm
     contents = json.loads((tmp_path / "loop.json").read_text())
     assert contents["folds"][0]["effects"] == ["tr(sigma)*sigma"]
     assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
+
+
+def test_the_page_says_which_modes_the_data_leave_open(tmp_path):
+    modes = (ModeConstant(5.0, 0.1, (0.08, 0.12), False), ModeConstant(0.05, 0.6, None, True))
+    found = ConstantByMode(0.15, (0.14, 0.16), "", 2.0, 1, (0.0, 12.3), modes)
+    stage = Stage(
+        "giesekus_mobility", "constitutive", {"alpha": found}, (), ErrorPair(0.01, 0.2), 50.0,
+        "", "a source", "a check",
+    )  # fmt: skip
+    result = replace(loop_result(), stages=(stage,), verdict="unexplained")
+    page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    table = page[page.index('<table id="by-mode-1"') :]
+    rows = table[: table.index("</table>")].split("<tr>")[2:]
+    assert "0.08 to 0.12" in rows[0]
+    assert "not determined" not in rows[0]
+    assert "not determined" in rows[1]
+    assert "α (it differs from mode to mode) at a relaxation time of 2 s = 0.15" in page
+    caption = page[page.index('<figure id="by_mode">') :]
+    assert "linear in log λ (evidence over one constant, linear: 12)" in caption
+    assert "no constants of the fluid" in caption
+    (written,) = json.loads((tmp_path / "loop.json").read_text())["stages"]
+    assert written["parameters"]["alpha"]["modes"][1]["ci95"] is None
 
 
 def test_a_loop_shows_itself_as_tables():

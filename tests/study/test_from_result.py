@@ -119,6 +119,11 @@ _NO_TERM = {
         ("loop.json", None, "holds neither loop.json nor comparison.json"),
         ("loop.json", {"verdict": "no_signal"}, "hold no signal"),
         ("loop.json", {"verdict": "effects_added"}, "written by an earlier version"),
+        (
+            "loop.json",
+            {**LOOP, "declared": {"law": None, "effects": [], "by_mode": ["alpha"]}},
+            "alpha differs from one relaxation mode to the next",
+        ),
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),
         ("loop.json", _NOTHING, "there is nothing to take"),

@@ -119,9 +119,7 @@ def _note_shorter(search: Search) -> None:
     for n in range(len(active)):
         sets.append(active[:n])
         starts.append(search.path[n])
-        free.append(
-            tuple([*model.free_positions, *(p for e in active[:n] for p in model.positions(e))])
-        )
+        free.append(tuple(search.positions(active[:n])))
     for name in active[:-1]:
         theta, positions = taken_out(model, search.fit, name)
         sets.append([other for other in active if other != name])

@@ -1,0 +1,149 @@
+"""The constant of each mode as finally fitted, and whether the data say anything of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.degrees import Degree
+from discover.closed_loop.result import ConstantByMode, ModeConstant
+from discover.forward import AugmentedModel, Batch, FreeParameter
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
+from discover.forward.least_squares import (
+    NO_PRIOR,
+    Fit,
+    Prior,
+    fit_batch,
+    jacobians,
+    uncertainty,
+)
+
+_OPEN = float(np.log(0.95 / 0.05))
+"""Half width of an interval, on the link's scale, from which on nothing is determined: about the
+middle of a range it holds nine tenths of it, about a small constant a factor of 19 either way."""
+
+_FARTHEST = 50.0  # e^50 of a constant is any
+
+_SMALL = 0.1
+"""Share of the range within which an interval determines that a constant is small, or large."""
+
+
+def constants_by_mode(
+    model: AugmentedModel,
+    batch: Batch,
+    fit: Fit,
+    bounds: Mapping[int, tuple[float, float]],
+    degrees: Mapping[str, Degree],
+    prior: Prior = NO_PRIOR,
+) -> dict[str, ConstantByMode]:
+    """Return the constants by mode of a final fit.
+
+    The interval of a mode holds that of the chosen degree and that of one degree more, where there
+    is one: evidence for the lower degree does not say that the next coefficient is zero.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    bounds
+        95 % interval of each fitted parameter, by position.
+    degrees
+        Degree of each constant by mode.
+    prior
+        What is known of some parameters.
+    """
+    declared, found = model.declared, {}
+    modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
+    places = np.asarray(decades(modulus, time))
+    times = declared.relaxation_time * np.exp(fit.theta[1])
+    for name, of in degrees.items():
+        law, at = model.constant(name)
+        if at not in fit.free:
+            continue
+        constant = _Constant(law, at, declared.by_mode_slices[name].start, places)
+        low, high, half = constant.band(batch, fit, of.degree)
+        if of.degree + 1 < len(of.evidence):
+            free = (*fit.free, constant.start + of.degree)
+            wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
+            if wider.usable:
+                more = constant.band(batch, wider, of.degree + 1)
+                low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
+                half = np.maximum(half, more[2])
+        own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
+        alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)
+        known = _says(low, high, half, constant.law) & _says(*alone, own, constant.law)
+        each = zip(times, constant.of_modes(fit), low, high, known, strict=True)
+        found[name] = ConstantByMode(
+            float(fit.theta[constant.at]),
+            bounds[constant.at],
+            "",
+            float(times[0] / 10.0 ** places[0]),
+            of.degree,
+            of.evidence,
+            tuple(
+                ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
+                for t, v, a, b, k in each
+            ),
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _Constant:
+    """A constant by mode: its range, where it and its coefficients stand, and where the modes."""
+
+    law: FreeParameter
+    at: int
+    start: int
+    places: Float[np.ndarray, " k"]
+
+    def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
+        """Return the constant of each mode, moved on the link's scale."""
+        moved = np.clip(np.broadcast_to(shift, self.places.shape), -_FARTHEST, _FARTHEST)
+        coefficients = fit.theta[self.start : self.start + DEGREE]
+        given = map(jnp.asarray, (coefficients, moved, self.places))
+        mean = jnp.asarray(fit.theta[self.at])
+        return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
+
+    def band(
+        self, batch: Batch, fit: Fit, degree: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the 95 % interval of each mode, and half its width on the link's scale.
+
+        To first order there, so that it keeps the range.
+        """
+        covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+        slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
+        half = np.full(len(self.places), np.inf)
+        if np.isfinite(slope):
+            gradient = np.zeros((len(self.places), len(fit.free)))
+            gradient[:, fit.free.index(self.at)] = slope
+            for i in range(degree):
+                gradient[:, fit.free.index(self.start + i)] = self.places ** (i + 1)
+            variance = np.einsum("ki,ij,kj->k", gradient, covariance, gradient)
+            half = quantile * np.sqrt(np.clip(variance, 0.0, None))
+        return self.of_modes(fit, -half), self.of_modes(fit, half), half
+
+
+def _own_half_widths(model, batch, fit, first: int) -> Float[np.ndarray, " k"]:
+    """Return half the interval of each mode's constant, were nothing else fitted.
+
+    On the link's scale. No other question of one mode alone is easier for the data, so that what
+    is open here is open indeed.
+    """
+    at = range(first, first + len(model.declared.modulus))
+    columns = jacobians(model, batch, [fit.theta], fit.residual[None], [list(at)])[0]
+    half = np.full(len(columns), np.inf)
+    for i, column in enumerate(columns):
+        if np.any(column) and np.all(np.isfinite(column)):
+            variance, quantile = uncertainty(batch, fit.residual, column[None])
+            half[i] = quantile * float(np.sqrt(variance[0, 0]))
+    return half
+
+
+def _says(low, high, half, law: FreeParameter):
+    """Return where an interval tells a constant."""
+    width = law.high - law.low
+    return (half < _OPEN) | (np.isfinite(width) & (high - low < _SMALL * width))

@@ -1,0 +1,81 @@
+"""Constants that may differ from mode to mode, against the relaxation time."""
+
+import numpy as np
+
+from discover.closed_loop import ConstantByMode, LoopResult
+from discover.report.plots.style import (
+    BEFORE,
+    NETWORK,
+    SHADE,
+    Picture,
+    figure,
+    legend_above,
+    literal,
+    make_logarithmic,
+    picture,
+)
+from discover.report.wording import effect_title, readable, significant
+
+_DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
+
+
+def by_mode_picture(result: LoopResult) -> Picture | None:
+    """Return each constant by mode with its band; None where there is none."""
+    constants = result.by_mode
+    if not constants:
+        return None
+    with figure(1, len(constants), width=min(9.0, 5.0 * len(constants)), height=3.0) as (
+        drawing,
+        axes,
+    ):
+        for panel, (name, constant) in zip(axes[0], constants.items(), strict=True):
+            told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
+            if told:
+                times, low, high = np.array(sorted(told)).T
+                panel.fill_between(times, low, high, color=SHADE, label="95 % interval")
+            for left_open, colour, fill in ((False, NETWORK, NETWORK), (True, BEFORE, "none")):
+                shown = [mode for mode in constant.modes if mode.left_open is left_open]
+                panel.plot(
+                    [mode.relaxation_time_s for mode in shown],
+                    [mode.value for mode in shown],
+                    "o", ms=5.0, color=colour, mfc=fill, ls="none",
+                    label="not determined by these data" if left_open else "fitted",
+                )  # fmt: skip
+            make_logarithmic(panel.xaxis)
+            panel.set_xlabel("relaxation time (s)")
+            panel.set_ylabel(literal(readable(effect_title(name))))
+        legend_above(drawing, axes)
+        said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
+        doubt = ""
+        if result.verdict == "unexplained":
+            doubt = (
+                " The data are not explained, so these are the values that come nearest, and no "
+                "constants of the fluid."
+            )
+        return picture(
+            drawing,
+            "by_mode",
+            f"{said}{doubt} Intervals take it that the law is the fluid's and the constant a "
+            "smooth function of the relaxation time; they hold one degree more than was chosen, "
+            "where one was tried.",
+        )
+
+
+def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
+    """Return what the data say of a constant by mode."""
+    symbol = readable(effect_title(name))
+    gains = [significant(gain, 2) for gain in constant.evidence[1:]]
+    tried = f" (evidence over one constant, linear and quadratic: {' and '.join(gains)})"
+    tried = tried if len(gains) > 1 else f" (evidence over one constant, linear: {gains[0]})"
+    text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
+    if not constant.degree:
+        return f"{text}: {significant(constant.value, 2)}. These data show no difference."
+    known = [mode for mode in constant.modes if not mode.left_open]
+    if not known:
+        return f"{text}, and not determined by these data in any mode."
+    parts = [f"{significant(m.value, 2)} at {significant(m.relaxation_time_s, 2)} s" for m in known]
+    open_ones = [significant(m.relaxation_time_s, 2) for m in constant.modes if m.left_open]
+    text = f"{text}: {', '.join(parts)}."
+    if open_ones:
+        text += f" Not determined by these data in the modes of {', '.join(open_ones)} s."
+    return text
