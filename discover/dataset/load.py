@@ -24,7 +24,7 @@ DATA_VARIABLE = "DISCOVER_DATA"
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
 
-DATA_FILES = (INDEX_FILE, SWEEP_FILE, "amplitude_sweep.csv", *(f"{kind}.csv" for kind in TABLES))
+DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
 """Files of which a folder needs one to be a data set."""
 
 

@@ -9,10 +9,16 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import units
+from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.run import Run
 from discover.dataset.table import Table, read_table
 from discover.errors import InputError
-from discover.protocols.control import imposed_stress, jumps_at_start, steady_rates
+from discover.protocols.control import (
+    imposed_stress,
+    jumps_at_start,
+    oscillations,
+    steady_rates,
+)
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import in_flow, measured_rate, start_up
 
@@ -103,6 +109,47 @@ def _creep(table: Table) -> Run:
     )
 
 
+def _amplitude_sweep(table: Table) -> Run:
+    strain, frequency = table.required(units.STRAIN), table.required(units.ANGULAR_FREQUENCY)
+    _require_positive(table, strain, "strain")
+    _require_positive(table, frequency, "omega")
+    storage, loss = table.required(units.STORAGE_MODULUS), table.required(units.LOSS_MODULUS)
+    order = np.lexsort((strain, frequency))
+    return _oscillations(
+        table.name, "amplitude sweep", *(v[order] for v in (strain, frequency, storage, loss))
+    )
+
+
+def linear_sweep_as_run(sweep: LinearSweep, name: str = "lve.csv") -> Run:
+    """Return a linear sweep as a run: oscillations of a strain of `LINEAR_STRAIN`.
+
+    Parameters
+    ----------
+    sweep
+        G′ and G″.
+    name
+        Of the run.
+    """
+    strain = np.full(len(sweep), LINEAR_STRAIN)
+    moduli = sweep.storage_modulus, sweep.loss_modulus
+    what = f"linear sweep, at a strain of {LINEAR_STRAIN:g}"
+    return _oscillations(name, what, strain, sweep.angular_frequency, *moduli)
+
+
+def _oscillations(name, what, strain, frequency, storage, loss) -> Run:
+    return Run(
+        name,
+        np.arange(1.0, len(strain) + 1.0),
+        oscillations(strain, frequency),
+        strain * frequency,
+        strain * np.hypot(storage, loss),
+        strain=strain,
+        metadata={"test": what},
+        storage_modulus=storage,
+        loss_modulus=loss,
+    )
+
+
 def _over_time(
     table: Table, quantity: units.Quantity
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
@@ -130,10 +177,12 @@ _READERS: Mapping[str, Callable[[Table], Run]] = {
     "flow_curve": _flow_curve,
     "relaxation": _relaxation,
     "creep": _creep,
+    "amplitude_sweep": _amplitude_sweep,
 }
 
 TABLES = tuple(_READERS)
-"""Kinds of tables; the file of each is called so."""
+"""Kinds of tables; the file of each is called so. The linear sweep is one more, which gives the
+modes and is fitted or judged only where that is asked for."""
 
 
 def at_measured_rate(run: Run) -> Run:
@@ -142,7 +191,8 @@ def at_measured_rate(run: Run) -> Run:
     Raises
     ------
     InputError
-        If the stress was put on at once, which no finite rate follows, or it is a flow curve.
+        If the stress was put on at once, which no finite rate follows, or it is a flow curve or
+        moduli.
     """
     if run.protocol.control == "rate":
         return run
@@ -150,6 +200,11 @@ def at_measured_rate(run: Run) -> Run:
         raise InputError(
             f"{run.name} is a flow curve, which a learner that follows a rate in time cannot fit. "
             "discover close-loop fits it; leave it out here."
+        )
+    if run.protocol.control == "oscillation":
+        raise InputError(
+            f"{run.name} holds moduli of oscillations, which a learner that follows a rate in time "
+            "cannot fit. discover close-loop fits them; leave it out here."
         )
     if jumps_at_start(run.protocol):
         raise InputError(

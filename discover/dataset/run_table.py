@@ -45,6 +45,9 @@ def run_line(run: Run) -> dict[str, Any]:
 def _flow(run: Run) -> str:
     if run.protocol.control == "steady":
         return "flow curve"
+    if run.protocol.control == "oscillation":
+        sweep = run.strain is not None and np.ptp(run.strain) > 0.0
+        return "amplitude sweep" if sweep else "frequency sweep"
     if run.protocol.control == "stress":
         return "creep" if jumps_at_start(run.protocol) else "given stress"
     if not run.flows:

@@ -18,7 +18,7 @@ from jaxtyping import Float
 from discover.effects import AbstractEffect
 from discover.forward.declared import DeclaredModel
 from discover.forward.program import Numbers, Structure, program_of
-from discover.forward.run_batch import Batch, MixedBatch, Part
+from discover.forward.run_batch import Batch, MixedBatch, OscillationBatch, Part
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -124,7 +124,7 @@ class AugmentedModel:
         return list(range(at.start, at.stop))
 
     def predict(self, theta, batch: Batch) -> Float[np.ndarray, "runs n"]:
-        """Return the predicted records: stresses in Pa, and strains of runs at a given stress."""
+        """Return the predicted records: stresses or moduli in Pa, or strains at a given stress."""
         return self.predictions([theta], batch)[0]
 
     def predictions(
@@ -136,10 +136,15 @@ class AugmentedModel:
         out = np.zeros((len(thetas), *batch.recorded.shape))
         for rows, part in zip(batch.rows, batch.parts, strict=True):
             found = self._of_part(thetas, part)
+            if isinstance(part, OscillationBatch):
+                sweeps, moduli = np.array(batch.moduli).T
+                found = found[:, sweeps, moduli]
             out[:, rows, : found.shape[2]] = found
         return out
 
-    def _of_part(self, thetas, part: Part) -> Float[np.ndarray, "trials runs n"]:
+    def _of_part(
+        self, thetas, part: Part | OscillationBatch
+    ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self._program
 
         def one(theta: np.ndarray) -> np.ndarray:
