@@ -186,6 +186,8 @@ class Dataset(NotebookView):
         if self.linear_sweep is not None:
             there["lve"] = linear_sweep_as_run(self.linear_sweep)
         for kind in kinds or ():
+            if f"{kind}.csv" in self.set_aside:
+                raise InputError(f"{kind}.csv cannot be used: {self.set_aside[f'{kind}.csv']}.")
             if kind not in there:
                 raise InputError(
                     f"The data set {self.name!r} has no {kind}.csv; it has "

@@ -30,8 +30,10 @@ COMPLIANCE = units.Quantity("compliance", "compliance_1_Pa", "1/Pa")
 RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa", "Pa")
 
 
-def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, Run]:
-    """Return the tables of a data folder as runs, by kind: those of `TABLES`.
+def read_material_functions(
+    root: Path, runs: Sequence[str] = (), frequency: float | None = None
+) -> tuple[dict[str, Run], dict[str, str]]:
+    """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
 
     Parameters
     ----------
@@ -39,13 +41,15 @@ def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, R
         The folder.
     runs
         Files that ``runs.csv`` names: they are runs, whatever they are called.
+    frequency
+        In rad/s, of an amplitude sweep that does not give its own.
 
     Raises
     ------
     InputError
         If a file is wrong.
     """
-    found = {}
+    found, aside = {}, {}
     for kind, read in _READERS.items():
         path = root / f"{kind}.csv"
         if path.name in runs or not os.path.lexists(path):
@@ -54,8 +58,18 @@ def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, R
             raise InputError(
                 f"{path.name} is a link to outside the folder. Put the file itself in the folder."
             )
-        found[kind] = read(read_table(path))
-    return found
+        table = read_table(path)
+        if kind == "amplitude_sweep" and table.quantity(units.ANGULAR_FREQUENCY) is None:
+            if frequency is None:
+                aside[path.name] = (
+                    "it has no column omega_rad_s, and moduli belong to a frequency. Add it, or "
+                    "write amplitude_sweep_rad_s in [data]"
+                )
+                continue
+            same = {units.ANGULAR_FREQUENCY.column: [repr(frequency)] * len(table)}
+            table = replace(table, columns={**table.columns, **same})
+        found[kind] = read(table)
+    return found, aside
 
 
 def _flow_curve(table: Table) -> Run:

@@ -277,15 +277,16 @@ def _oscillations(
             sweeps.append((strain, frequency))
         moduli.append((at, MODULI.index(run.quantity)))
     n = max(len(strain) for strain, _ in sweeps)
-    columns = [
+    strains, frequencies = (
         jnp.asarray(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
         for column in zip(*sweeps, strict=True)
-    ]
+    )
     # half a cycle goes through twice the amplitude
     largest = max(float(np.max(strain)) for strain, _ in sweeps)
     steps = int(min(np.ceil(max(2.0 * largest, _FEWEST_STEPS) / strain_step), _MOST_STEPS))
     phase = np.linspace(0.0, np.pi, 2 * steps + 1)
-    return OscillationBatch(*columns, jnp.asarray(np.tile(phase, (len(sweeps), 1)))), tuple(moduli)
+    phases = jnp.asarray(np.tile(phase, (len(sweeps), 1)))
+    return OscillationBatch(strains, frequencies, phases), tuple(moduli)
 
 
 def _at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:

@@ -133,6 +133,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             rate_is_measured=data.rate == "measured",
             rate_before=data.rate_before,
             sequence=data.sequence,
+            amplitude_sweep_rad_s=data.amplitude_sweep_rad_s,
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out

@@ -100,6 +100,7 @@ class Data(Section):
     relaxation: Role = None
     creep: Role = None
     amplitude_sweep: Role = None
+    amplitude_sweep_rad_s: Positive | None = None
     lve: Role = None
 
     @model_validator(mode="after")

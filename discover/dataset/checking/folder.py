@@ -9,6 +9,7 @@ import numpy as np
 
 from discover.dataset import units
 from discover.dataset.checking.among_runs import doubts_among_runs
+from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
 from discover.dataset.checking.one_run import doubts_of_run
@@ -109,14 +110,25 @@ def check_folder(
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
     try:
-        tables = read_material_functions(root, index.columns["file"])
+        tables, aside = read_material_functions(root, index.columns["file"])
     except InputError as error:
-        tables = {}
+        tables, aside = {}, {}
         findings.append(Finding("error", "tables", "", str(error)))
     for table in tables.values():
-        what = f"{table.name} is taken for a {run_line(table)['flow']}"
+        kind = str(run_line(table)["flow"])
+        what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
         text = f"{what}, {len(table)} samples: it judges, unless the study says that it is fitted."
         findings.append(Finding("note", "tables", table.name, text))
+    for name, reason in aside.items():
+        findings.append(Finding("warning", "tables", name, f"{name} is set aside: {reason}."))
+    if sweep is not None and "amplitude_sweep" in tables:
+        text = (
+            f"{SWEEP_FILE} is taken for a frequency sweep at small strain, {len(sweep)} "
+            "frequencies: it gives the modes, and is fitted or judges only if the study says so."
+        )
+        findings.append(Finding("note", "tables", SWEEP_FILE, text))
+    if "amplitude_sweep" in tables:
+        findings += doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)
     findings += _folder(root, index, [*runs, *tables.values()])
     rank = {"error": 0, "warning": 1, "note": 2}
     return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
