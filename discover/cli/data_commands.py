@@ -234,5 +234,6 @@ def import_data(
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         say(f"{out}: {len(imported.files) + 1} files written.")
+        say(f"To see every test drawn: discover data show {out} --out DIR")
     if errors:
         raise typer.Exit(2)
