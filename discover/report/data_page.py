@@ -16,7 +16,8 @@ from discover.dataset.run_table import run_line
 from discover.errors import InputError
 from discover.report.page import render
 from discover.report.parts import attempt
-from discover.report.plots.data import data_pictures
+from discover.report.plots.data import counted, data_pictures, linear_function
+from discover.report.wording import significant
 
 # From so many runs on one can be spared to judge
 _ENOUGH_TO_HOLD_OUT = 3
@@ -52,36 +53,41 @@ def data_page(dataset: Dataset, findings: Sequence[Finding], folder: str) -> str
         notes=[str(finding) for finding in findings if finding.severity == "note"],
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
-        lines=[_line(run) for run in (*dataset, *tables)],
+        lines=[*map(_line, dataset), *(_line(run, is_table=True) for run in tables)],
         study=first_study(dataset, folder),
-        modes=0 if spectrum is None else len(spectrum),
+        modes="" if spectrum is None else counted(len(spectrum), "mode"),
     )
 
 
-def _line(run: Run) -> dict[str, Any]:
-    stated = run.protocol.control in ("steady", "oscillation")
+def _line(run: Run, *, is_table: bool = False) -> dict[str, Any]:
+    """Return what the page says of one file, with the values that it holds."""
+    values, unit = run.recorded, "" if run.quantity == "strain" else "Pa"
+    rate = _ends(run.rate, "1/s")
+    along = _ends(run.time, "s")
     if run.protocol.control == "oscillation":
-        along = (run.angular_frequency, "rad/s")
+        values = np.concatenate([record.recorded for record in run.records])
+        along, rate = _ends(run.angular_frequency, "rad/s"), "–"
         if run.strain is not None and np.ptp(run.strain) > 0.0:
-            along = (run.strain, "strain")
-        values = [*(record.recorded for record in run.records)]
-    else:
-        along = (run.rate, "1/s") if stated else (run.time, "s")
-        values = [run.recorded]
-    unit = "strain" if run.quantity == "strain" else "Pa"
+            along = f"{_ends(run.strain, 'strain')}, {along}"
+    elif run.protocol.control == "steady":
+        along = "–"
+    elif is_table:
+        rate = "–"
+        _, values, unit = linear_function(run)
     return {
         "name": run.name,
         "taken_for": run_line(run)["flow"],
         "samples": len(run),
-        "along": (*_ends(along[0]), along[1]),
-        "rate": None if run.protocol.control == "oscillation" else _ends(run.rate),
-        "values": (*_ends(np.concatenate(values)), unit),
-        "beside": ", ".join(run.beside),
+        "along": along,
+        "rate": rate,
+        "recorded": _ends(values, unit),
+        "beside": ", ".join(run.beside) or "–",
     }
 
 
-def _ends(values: np.ndarray) -> tuple[float, float]:
-    return float(np.min(values)), float(np.max(values))
+def _ends(values: np.ndarray, unit: str) -> str:
+    low, high = (significant(float(end), 3) for end in (np.min(values), np.max(values)))
+    return f"{low if low == high else f'{low} to {high}'} {unit}".strip()
 
 
 def first_study(dataset: Dataset, folder: str) -> str:

@@ -24,7 +24,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import FIGURE_SYMBOLS
+from discover.report.wording import FIGURE_SYMBOLS, percent
 
 _MOST_RUNS = 24
 """Panels of runs, beyond which a page is too long to look through."""
@@ -67,10 +67,11 @@ def _runs(runs: Sequence[Run]) -> Picture:
             _draw_run(panel, run)
         for panel in axes[-1]:
             panel.set_xlabel("time (s)")
-        for row, panel in enumerate(axes[:, 0]):
-            run = shown[row * columns]
-            unit = "" if run.quantity == "strain" else " (Pa)"
-            panel.set_ylabel(FIGURE_SYMBOLS[run.quantity] + unit)
+        for place, (panel, run) in enumerate(zip(axes.ravel(), shown, strict=False)):
+            # once a row, unless something else is recorded
+            if place % columns == 0 or run.quantity != shown[place - 1].quantity:
+                unit = "" if run.quantity == "strain" else " (Pa)"
+                panel.set_ylabel(FIGURE_SYMBOLS[run.quantity] + unit)
         legend_above(drawing, axes)
         more = f" The first {len(shown)} of {len(runs)} runs." if len(runs) > len(shown) else ""
         return picture(
@@ -138,9 +139,9 @@ def _linear_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum | None) -> Pi
             for edge in (1.0 / omega[0], 1.0 / omega[-1]):
                 modes.axvline(edge, color=BEFORE, lw=0.8, ls=":")
             caption += (
-                f" Lines: the {len(spectrum)} modes found from it, which miss it by "
-                f"{100.0 * spectrum.relative_error:.2g} %; right: these modes, and dotted the ends "
-                "of the sweep, beyond which it says nothing of them."
+                f" Lines: the {counted(len(spectrum), 'mode')} found from it, off by "
+                f"{percent(spectrum.relative_error)} (root mean square). Right: modulus and time "
+                "of each; dotted, the ends of the sweep, beyond which it says nothing of them."
             )
         legend_above(drawing, axes)
         return picture(drawing, "linear_sweep", caption)
@@ -151,7 +152,7 @@ def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> Picture:
     assert run.storage_modulus is not None
     assert run.loss_modulus is not None
     omega = run.angular_frequency
-    with figure(1, 1, width=7.0, height=3.2) as (drawing, axes):
+    with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
         panel = axes[0, 0]
         groups = np.unique(np.round(omega, 9))
         for value in groups:
@@ -219,17 +220,28 @@ def _flow_curve(run: Run, sweep: LinearSweep | None) -> Picture:
         return picture(drawing, "flow_curve", caption)
 
 
+def linear_function(run: Run) -> tuple[str, Float[np.ndarray, " n"], str]:
+    """Return symbol, values and unit of a linear function in time, as its file holds it."""
+    if run.quantity == "strain":
+        return "J", run.recorded / run.stress, "1/Pa"
+    return "G", run.recorded / np.asarray(run.strain), "Pa"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 def _over_time(runs: Sequence[Run]) -> Picture:
     with figure(1, len(runs), width=5.0 * len(runs), height=3.0) as (drawing, axes):
         for panel, run in zip(axes[0], runs, strict=True):
-            creep = run.quantity == "strain"
-            values = run.recorded / (run.stress if creep else np.asarray(run.strain))
+            symbol, values, unit = linear_function(run)
             panel.plot(run.time, values, color=NETWORK, marker="o", **_POINTS)
             panel.set(
                 xscale="log",
                 yscale="log",
                 xlabel="time (s)",
-                ylabel="J (1/Pa)" if creep else "G (Pa)",
+                ylabel=f"{symbol} ({unit})",
                 title=literal(run.name),
             )
         return picture(

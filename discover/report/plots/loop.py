@@ -100,9 +100,10 @@ def runs_picture(result: LoopResult) -> Picture:
         for panel, record in zip(axes.ravel(), records, strict=False):
             if panel in below or not record.is_transient:
                 panel.set_xlabel(record.along[0])
-        for row in range(rows):
-            panel_records = records[row * columns : (row + 1) * columns]
-            axes[row, 0].set_ylabel(_label(panel_records[:1]))
+        for place, (panel, record) in enumerate(zip(axes.ravel(), records, strict=False)):
+            # once a row, unless something else is recorded
+            if place % columns == 0 or record.quantity != records[place - 1].quantity:
+                panel.set_ylabel(_label([record]))
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -159,6 +160,8 @@ def shortened(name: str, longest: int = 30) -> str:
     longest
         Most characters.
     """
+    for modulus in MODULI:
+        name = name.replace(f".csv ({modulus})", f" {FIGURE_SYMBOLS[modulus]}")
     name = name.removesuffix(".csv")
     if len(name) <= longest:
         return name
