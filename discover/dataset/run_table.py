@@ -48,8 +48,8 @@ def _flow(run: Run) -> str:
     if run.protocol.control == "steady":
         return "flow curve"
     if run.protocol.control == "oscillation":
-        sweep = run.strain is not None and np.ptp(run.strain) > 0.0
-        return "amplitude sweep" if sweep else "frequency sweep"
+        linear = str(run.metadata.get("test", "")).startswith("linear")
+        return "frequency sweep" if linear else "amplitude sweep"
     if run.protocol.control == "stress":
         return "creep" if jumps_at_start(run.protocol) else "given stress"
     if not run.flows:
