@@ -74,12 +74,8 @@ def show(
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
     page = None if out is None else _write_page(dataset, name, out)
     if as_json:
-        typer.echo(
-            json.dumps(
-                {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep},
-                indent=2,
-            )
-        )
+        content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
+        typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
         return
     say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
     typer.echo(

@@ -78,6 +78,7 @@ def test_the_check_says_what_each_table_was_taken_for(tmp_path):
     assert "amplitude_sweep.csv is taken for an amplitude sweep" in said
     assert "flow_curve.csv is taken for a flow curve" in said
     assert "lve.csv is taken for a frequency sweep" in said
+    assert "In amplitude_sweep.csv, strain_percent" in said
     assert not found.of("error")
 
 

@@ -28,7 +28,12 @@ from discover.dataset.load import (
     read_index,
     resolve_folder,
 )
-from discover.dataset.material_functions import TABLES, read_material_functions
+from discover.dataset.material_functions import (
+    COMPLIANCE,
+    RELAXATION_MODULUS,
+    TABLES,
+    read_material_functions,
+)
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
@@ -47,6 +52,7 @@ _RUN_QUANTITIES = (
     units.HENCKY_STRAIN,
 )
 _SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
+_TABLE_QUANTITIES = (*_RUN_QUANTITIES, *_SWEEP_QUANTITIES, COMPLIANCE, RELAXATION_MODULUS)
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
@@ -98,6 +104,7 @@ def check_folder(
         text = f"The column {shown(column)} in {_files(files)} is not used."
         findings.append(Finding("note", "columns", files[0], text))
     sweep, spectrum, said = _sweep(root, converted)
+    _convert_tables(root, index, converted)
     for text, files in converted.items():
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
@@ -252,6 +259,19 @@ def _sweep(
         text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
         return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
+
+
+def _convert_tables(root: Path, index: Table, converted: dict[str, list[str]]) -> None:
+    """Collect the conversions of the tables beside the runs."""
+    for name in (f"{kind}.csv" for kind in TABLES):
+        if name in index.columns["file"] or not (root / name).is_file():
+            continue
+        try:
+            columns = tuple(read_table(root / name).columns)
+            pairs = [(q, units.find_column(columns, q)) for q in _TABLE_QUANTITIES]
+        except InputError:
+            continue  # said when it is read
+        _note_conversions(name, pairs, converted)
 
 
 def _digest(run: Run) -> bytes:
