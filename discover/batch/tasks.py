@@ -156,6 +156,7 @@ def run_close_loop(
         "strain": study.loop.strain,
         "noise": study.loop.noise,
         "most_samples": study.loop.most_samples,
+        "explanations": study.loop.explanations,
         "progress": say,
         "store": folder,
     }

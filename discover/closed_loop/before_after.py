@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.result import ErrorPair
+from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.run_record import RunRecord
 from discover.dataset import Run
 from discover.errors import InputError

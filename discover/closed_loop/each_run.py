@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.explanations import BEAM_WIDTH
 from discover.closed_loop.loop import MOST_SAMPLES, run_loop
-from discover.closed_loop.result import ErrorPair, Fold, LoopResult
+from discover.closed_loop.result import Fold, LoopResult
 from discover.closed_loop.search_checkpoint import Store
 from discover.dataset import Dataset
 from discover.effects import AbstractEffect
@@ -23,6 +25,7 @@ def run_loop_on_each(
     strain: tuple[float, float] | None = None,
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
+    explanations: int = BEAM_WIDTH,
     progress: Callable[[str], None] | None = None,
     store: Store | None = None,
 ) -> LoopResult:
@@ -35,7 +38,8 @@ def run_loop_on_each(
 
     Parameters
     ----------
-    dataset, declared, effects, max_effects, strain, noise, most_samples, progress, store
+    dataset, declared, effects, max_effects, strain, noise, most_samples, explanations, progress,
+    store
         As in `run_loop`.
     fit
         Names of the runs; by default all.
@@ -64,6 +68,8 @@ def run_loop_on_each(
             strain=strain,
             noise=noise,
             most_samples=most_samples,
+            # a loop that leaves a run out only judges what it found itself
+            explanations=1 if held_out else explanations,
             progress=lambda line: say(f"{prefix}: {line}"),
             store=store,
             # the number of the run and not its name, which may hold anything

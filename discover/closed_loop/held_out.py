@@ -59,7 +59,7 @@ def held_out(
     root, correlation = np.zeros((0, 0)), np.ones(1)
     if fit.free:
         derivative = jacobians(model, resolution.batch, [theta], residual, [fit.free])[0]
-        root, correlation = _uncertainty(batch, fit)
+        root, correlation = uncertainty(batch, fit)
     columns = np.tensordot(root, derivative, axes=(0, 0))
     weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.recorded)
     kept = [w > 0 for w in weight]
@@ -73,7 +73,7 @@ def held_out(
     return HeldOut(residual[0], resolution, unseen)
 
 
-def _uncertainty(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def uncertainty(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Return a root of the constants' covariance, shape (free, free), and the noise's correlation.
 
     A column is a combination of the constants that varies by one standard deviation.

@@ -15,6 +15,8 @@ from discover.study.build import DeclaredModel as DeclaredFluid
 from discover.study.build import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 
+_OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations"}
+
 
 def close_loop(
     data: Dataset,
@@ -47,7 +49,7 @@ def close_loop(
     progress
         Called with a line of text now and then.
     **options
-        `effects`, `max_effects`, `strain`, `noise`, `most_samples` of
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations` of
         `discover.closed_loop.run_loop`.
 
     Returns
@@ -59,11 +61,10 @@ def close_loop(
     InputError
         If data, base or an option is not as it should be.
     """
-    unknown = set(options) - {"effects", "max_effects", "strain", "noise", "most_samples"}
+    unknown = sorted(set(options) - _OPTIONS)
     if unknown:
         raise InputError(
-            f"close_loop has no option {sorted(unknown)[0]!r}; it has effects, max_effects, "
-            "strain, noise and most_samples."
+            f"close_loop has no option {unknown[0]!r}; it has {', '.join(sorted(_OPTIONS))}."
         )
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)

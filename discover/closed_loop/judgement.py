@@ -42,6 +42,8 @@ class Judgement:
         whether the held-out runs are predicted as well as can be asked.
     not_judging
         Runs with too few samples to judge by, where others have more.
+    missed, unseen
+        How many times what can be asked the runs held out are missed, and how many there are.
     worst
         The run that is missed most.
     description
@@ -57,6 +59,8 @@ class Judgement:
     not_judging: tuple[str, ...]
     worst: RunRecord
     description: str
+    missed: float = 0.0
+    unseen: int = 0
 
 
 def judge(
@@ -96,12 +100,14 @@ def judge(
     resolution = tolerated.resolution.limit(fit.theta, active, asked)
     known = given or error <= STRUCTURE * resolution
     missed_held_out = _error([record for record in records if record.held_out])
-    carries_over = held is None or missed_held_out <= CARRIED * max(error, expected, resolution)
+    asked_of_held_out = max(error, expected, resolution)
+    carries_over = held is None or missed_held_out <= CARRIED * asked_of_held_out
     if held is not None and not carries_over:
         # held-out runs may be noisier than the fitted ones, or rounded more coarsely
         own = summarise(held.residual, held.weight).noise
         limit = held.resolution.limit(fit.theta, active, missed_held_out)
-        carries_over = missed_held_out <= CARRIED * max(held.resolution.mean(own), limit)
+        asked_of_held_out = max(asked_of_held_out, held.resolution.mean(own), limit)
+        carries_over = missed_held_out <= CARRIED * asked_of_held_out
         # and a few samples, off by chance, decide nothing
         carries_over |= tells_noise(weight) and not tells_noise(held.weight)
     pattern = False
@@ -196,7 +202,11 @@ def judge(
         text += f" Runs of fewer samples do not judge: {', '.join(short)}."
     # what does not explain the fitted runs has nothing to carry over
     carries_over = carries_over or not explained
-    return Judgement(verdict, structured, left, resolution, known, carries_over, short, worst, text)
+    return Judgement(
+        verdict, structured, left, resolution, known, carries_over, short, worst, text,
+        missed_held_out / asked_of_held_out if asked_of_held_out > 0.0 else 0.0,
+        sum(record.held_out for record in records),
+    )  # fmt: skip
 
 
 def _refuted_by(tolerated: ToleratedMisfit, fit: Fit, held: HeldOut, together: bool) -> bool:

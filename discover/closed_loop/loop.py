@@ -14,6 +14,8 @@ from discover.closed_loop.before_after import (
     record_runs,
     strain_of,
 )
+from discover.closed_loop.explanation import Explanations
+from discover.closed_loop.explanations import BEAM_WIDTH, carry, explain, with_band
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
@@ -87,6 +89,7 @@ def run_loop(
     strain: tuple[float, float] | None = None,
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
+    explanations: int = BEAM_WIDTH,
     progress: Callable[[str], None] | None = None,
     store: Store | None = None,
     name: str = "search",
@@ -124,6 +127,8 @@ def run_loop(
     most_samples
         Of a run with more samples at most so many are used, evenly chosen, to fit and to judge; of
         one with little noise fewer, but no fewer than 150.
+    explanations
+        How many sets of effects are carried side by side, at most.
     progress
         Called with a line of text now and then.
     store
@@ -174,14 +179,18 @@ def run_loop(
         say(f"declared model on {len(fitted_runs)} runs")
         search.start()
         _settle(search, fitted_runs, max_effects, say)
+    carried = []
     if not silent:
         search.run(max_effects, say)
+        carried = carry(search, max_effects, explanations, say)
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     order = dataset.names
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False, order=order)
+    judging = []
     if held_batch is not None:
-        records += record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
+        judging = record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
+        records += judging
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
     stages = tuple(
@@ -201,6 +210,13 @@ def run_loop(
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
+    side_by_side = Explanations()
+    if carried:
+        runs = (fitted_runs, held_runs)
+        tried = [effect.name for effect in candidates if search.admitted(effect)]
+        side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
+        parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
+        records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),
@@ -231,6 +247,7 @@ def run_loop(
         declared_parameters=_declared_parameters(declared, current, bounds),
         declared_effects=_declared_effects(model, current, bounds),
         declared_law=_declared_law(declared, current),
+        explanations=side_by_side,
         fluid=_fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )

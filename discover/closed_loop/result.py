@@ -12,6 +12,8 @@ import numpy as np
 import pandas as pd
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.reading import Reading, read_residual
 from discover.closed_loop.run_record import RunRecord
 from discover.equations import Equation, HasEquation, Tested, equation_to_json, law_terms
@@ -23,14 +25,6 @@ from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
-
-
-@dataclass(frozen=True)
-class ErrorPair:
-    """Relative errors, mean over runs: on the fitted runs and on those held out, if any."""
-
-    fit: float
-    held_out: float | None
 
 
 @dataclass(frozen=True)
@@ -151,6 +145,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
     fluid
         The augmented fluid, without instrument effects; None where an effect gives it a state that
         no law of stress and rate can carry.
+    explanations
+        What explains the fitted runs about as well as what was found, and how probable each is.
     folds
         The loops that left each run out in turn, where they were asked for; the held-out errors
         are then their means.
@@ -172,6 +168,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_effects: tuple[DeclaredEffect, ...] = ()
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
+    explanations: Explanations = field(default_factory=Explanations)
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
@@ -230,6 +227,16 @@ class LoopResult(PageView, HasEquation, NotebookView):
     def readings(self) -> tuple[Reading, Reading]:
         """On what the residuals of the declared and of the augmented model depend."""
         return read_residual(self.records, 0), read_residual(self.records, -1)
+
+    @property
+    def held_in_band(self) -> float | None:
+        """Share of the samples held out that lie in the band of all explanations, if any judge."""
+        inside = [
+            (record.band[0] <= record.measured) & (record.measured <= record.band[1])
+            for record in self.records
+            if record.held_out and record.band is not None
+        ]
+        return float(np.mean(np.concatenate(inside))) if inside else None
 
     def table(self) -> pd.DataFrame:
         """Return the effects that were added, one line for each of their parameters."""
@@ -325,6 +332,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 record.name: {"held_out": record.held_out, "errors": record.errors}
                 for record in self.records
             },
+            **self.explanations.to_json(),
+            "held_out_in_band": self.held_in_band,
             "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,
             **self._law(),

@@ -35,6 +35,8 @@ class RunRecord:
     quantity
         What is recorded: ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or
         ``loss_modulus`` in Pa, or ``strain``.
+    band
+        Where 95 % of the measurements should lie by all explanations together, shape (2, n).
     control
         What was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
         strain and rate of an oscillation are amplitudes.
@@ -52,6 +54,7 @@ class RunRecord:
     conditions: dict[str, float] = field(default_factory=dict)
     flow: FlowKind = "shear"
     quantity: str = "sigma12"
+    band: Float[np.ndarray, "2 n"] | None = None
     control: Control = "rate"
 
     def line(self) -> dict[str, Any]:

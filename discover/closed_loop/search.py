@@ -300,7 +300,7 @@ class Search(SearchState):
         while len(kept) < max_effects:
             leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.candidate).leading
             choices = refit(self.model, self.batch, fit, leading, self.n_candidates, self.prior)
-            choices = self._possible(choices, kept)
+            choices = self.possible(choices, kept)
             if not choices:
                 break
             best = max(choices, key=lambda choice: choice.candidate.evidence or -np.inf)
@@ -373,7 +373,7 @@ class Search(SearchState):
         current = CandidateScore(name, "", 1.0, 0.0, start=self.fit.theta.copy())
         asked = [current, *leading][:_COMPARED]
         choices = refit(self.model, self.batch, without, asked, self.n_candidates, self.prior)
-        choices = self._possible(choices, others)
+        choices = self.possible(choices, others)
         return next((c for c in choices if c.candidate is current), None), choices
 
     def _exchange(self, name: str) -> bool:
@@ -432,7 +432,7 @@ class Search(SearchState):
         choices = refit(
             self.model, self.batch, self.fit, attribution.leading, self.n_candidates, self.prior
         )
-        choices = self._possible(choices, self.active)
+        choices = self.possible(choices, self.active)
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         # what cannot be told from noise gives no reason to add anything
@@ -519,11 +519,11 @@ class Search(SearchState):
             np.mean(left_out_errors(self.model, self.batch, self.fit, self.prior))
         )
 
-    def _possible(self, choices: Sequence[Choice], others: Sequence[str]) -> list[Choice]:
+    def possible(self, choices: Sequence[Choice], others: Sequence[str]) -> list[Choice]:
         """Return the choices that a fluid or an instrument can be, and that predict every flow.
 
         What is at an end of its physical range cannot win; of the others in the model none may be
-        driven there.
+        driven there. All others are noted, for what they say beside the one that is chosen.
         """
         possible = []
         for choice in choices:
@@ -535,6 +535,7 @@ class Search(SearchState):
                 self.not_named.setdefault(name, reason)
             if not reason and not at_an_end(self.model, theta, others):
                 possible.append(choice)
+                self.seen.note([*others, name], choice.fit, np.asarray(self.batch.weight))
         return possible
 
     def _predictable(self, theta: np.ndarray) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
 from discover.closed_loop.search_state import SearchState
+from discover.closed_loop.seen_sets import SeenSets
 from discover.forward.least_squares import Fit
 
 
@@ -84,6 +85,7 @@ def _state(search: SearchState) -> dict[str, Any]:
         "not_named": search.not_named,
         "refused": sorted(search.refused),
         "unasked": sorted(search.unasked),
+        "seen": search.seen.to_json(),
         "known": [[at, *pair] for at, pair in search.known.items()],
     }
 
@@ -116,4 +118,5 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
     search.unasked = set(state.get("unasked", ()))
+    search.seen = SeenSets.from_json(state.get("seen", ()))
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

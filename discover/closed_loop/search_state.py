@@ -3,6 +3,7 @@
 import numpy as np
 
 from discover.closed_loop.attribution import CandidateScore
+from discover.closed_loop.seen_sets import SeenSets
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
 
@@ -40,6 +41,8 @@ class SearchState:
         open; and why, in a sentence without its stop.
     refused
         Those of them that were in the model and are no candidates any more.
+    seen
+        Every set of effects that was fitted.
     unasked
         Effects whose aliases were found beside others than those that are in the model now.
     """
@@ -60,3 +63,4 @@ class SearchState:
         self.not_named: dict[str, str] = {}
         self.refused: set[str] = set()
         self.unasked: set[str] = set()
+        self.seen = SeenSets()

@@ -1,6 +1,7 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,8 @@ def write_loop(
         recorded=in_words(record.quantity for record in result.records),
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
+        explanations=_explanations(result),
+        inclusion=_inclusion(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         declared_effects=_declared_effects(result),
         rankings=[_ranking(ranking) for ranking in result.rankings],
@@ -223,6 +226,42 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
         "check": stage.check,
         "error": stage.error,
     }
+
+
+def _explanations(result: LoopResult) -> list[dict[str, Any]]:
+    """Return the explanations as lines of a table; none where there is only one that is certain."""
+
+    def named(effects: Sequence[str]) -> str:
+        return " + ".join(map(effect_title, effects)) or "the declared model alone"
+
+    chosen = {stage.effect for stage in result.stages}
+    return [
+        {
+            "effects": named(one.effects),
+            "twins": "; ".join(map(named, one.twins)),
+            "probability": one.probability,
+            "error": one.error,
+            "chosen": any(set(member) == chosen for member in one.members),
+        }
+        for one in result.explanations.likeliest_first
+    ]
+
+
+def _inclusion(result: LoopResult) -> str:
+    """Return in words how probable each effect is to be in the explanation, and each kind."""
+    told = result.explanations
+
+    def listed(pairs) -> str:
+        return ", ".join(f"{name} {percent(p)}" for name, p in pairs)
+
+    kinds = {KINDS[kind]: p for kind, p in told.inclusion_by_kind.items()}
+    effects = [(effect_title(name), p) for name, p in told.inclusion.items()][:_MOST_INCLUDED]
+    if not effects:
+        return ""
+    return f"Something {listed(kinds.items())}; of the effects, {listed(effects)}."
+
+
+_MOST_INCLUDED = 8
 
 
 def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:

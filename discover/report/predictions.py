@@ -80,6 +80,8 @@ def loop_predictions(result: LoopResult) -> pd.DataFrame:
     """Return the curves of a closed loop, by the declared model and by the augmented one.
 
     Units as in `comparison_predictions`. Where nothing was added there is only the declared model.
+    The limits hold where 95 % of the measurements should lie by all explanations together; they
+    stand with the model that was found.
     """
     return _table([part for record in result.records for part in _record_parts(record)])
 
@@ -95,6 +97,8 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
     if len(record.predicted) > 1:
         sources["augmented"] = record.predicted[-1]
     for source, predicted in sources.items():
+        found = source == [*sources][-1] and record.band is not None
+        low, high = record.band if found and record.band is not None else (np.nan, np.nan)
         yield _lines(
             run=record.name,
             role="held_out" if record.held_out else "fit",
@@ -104,8 +108,8 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
             quantity=record.quantity,
             source=source,
             value=predicted,
-            low95=np.nan,
-            high95=np.nan,
+            low95=low,
+            high95=high,
             measured=record.measured,
         )
 

@@ -33,6 +33,7 @@ _LOOP = {
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
 _NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
 _MOST_NAMES = 3
+_SETTLED = 0.95
 
 
 def loop_verdict(result: LoopResult) -> list[str]:
@@ -87,6 +88,9 @@ def _loop_sure(result: LoopResult) -> str:
             unseen = "on each run, by a search that did not see it,"
         said, sizes = _change(result, before.held_out, after.held_out)
         parts.append(f"{unseen} the error {said} {sizes}")
+        if result.held_in_band is not None:
+            share = percent(result.held_in_band)
+            parts.append(f"the 95 % band of all explanations holds {share} of their samples")
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
@@ -105,11 +109,29 @@ def _loop_sure(result: LoopResult) -> str:
     if count := result.remaining.get("outliers", 0):
         which = "samples are outliers" if count > 1 else "sample is an outlier"
         parts.append(f"{count} {which} and did not count")
+    if result.verdict == "effects_added" and (told := _alternatives(result)):
+        parts.append(told)
     for stage in result.stages:
         if stage.aliases:
             others = _several([*map(effect_title, stage.aliases)], "or")
             parts.append(f"these data cannot tell {effect_title(stage.effect)} from {others}")
     return sentence(parts)
+
+
+def _alternatives(result: LoopResult) -> str:
+    """Return what is likelier than what was found, or nearly as likely; empty if nothing is."""
+    chosen = {stage.effect for stage in result.stages}
+    found = result.explanations.likeliest_first
+    own = next((e for e in found if any(set(m) == chosen for m in e.members)), None)
+    others = [e for e in found if e is not own]
+    if own is None or not others:
+        return ""
+    share = own.probability / sum(e.probability for e in found)
+    if share > _SETTLED:
+        return ""
+    names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
+    rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
+    return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
 
 
 def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:

@@ -159,6 +159,7 @@ class Loop(Section):
     effects: tuple[str, ...] | Literal["named"] | None = None
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
+    explanations: Annotated[int, Field(ge=1, le=64)] = 8
 
     @model_validator(mode="after")
     def _window(self):

@@ -127,6 +127,12 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     marked, shown
         Which samples are marked as measured, and between which the models are drawn.
     """
+    if record.band is not None and record.is_transient:
+        low, high = record.band[:, shown]
+        panel.fill_between(
+            along[shown], low, high, color=_HELD if record.held_out else _FIT, alpha=0.18, lw=0,
+            label="95 % of measurements, all explanations",
+        )  # fmt: skip
     panel.plot(
         along[marked], record.measured[marked], "o", ms=2.5, mfc="none", mew=0.7, color=TRUTH,
         label="measured",

@@ -1,0 +1,73 @@
+"""What a closed loop says of several explanations."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from discover.closed_loop.error_pair import ErrorPair
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects that may be what the declared model lacks; none of them, if it is empty.
+
+    Attributes
+    ----------
+    effects
+        Their names.
+    probability
+        That this is the explanation, of those that were carried and of none of them.
+    error
+        Mean relative errors of the runs fitted and held out.
+    parameters
+        Values of the parameters of each effect.
+    twins
+        Other sets that predict these records alike. The probability is theirs together.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    error: ErrorPair
+    parameters: Mapping[str, Mapping[str, float]]
+    twins: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def members(self) -> tuple[tuple[str, ...], ...]:
+        """The set itself and its twins."""
+        return (self.effects, *self.twins)
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """Everything that explains the fitted records about as well as what was found.
+
+    Attributes
+    ----------
+    likeliest_first
+        Their probabilities add up to 1 with `unexplained_probability`.
+    unexplained_probability
+        That it is none of them.
+    inclusion, inclusion_by_kind
+        Probability that an effect, or some effect of a kind, is in the explanation. Twins share
+        that of their class in equal parts.
+    """
+
+    likeliest_first: tuple[Explanation, ...] = ()
+    unexplained_probability: float = 1.0
+    inclusion: Mapping[str, float] = field(default_factory=dict)
+    inclusion_by_kind: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def leading_share(self) -> float:
+        """Probability of the likeliest explanation, given that it is one of them."""
+        known = sum(one.probability for one in self.likeliest_first)
+        return self.likeliest_first[0].probability / known if known > 0.0 else 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``loop.json`` holds of them."""
+        return {
+            "explanations": [asdict(one) for one in self.likeliest_first],
+            "unexplained_probability": self.unexplained_probability,
+            "inclusion": dict(self.inclusion),
+            "inclusion_by_kind": dict(self.inclusion_by_kind),
+        }

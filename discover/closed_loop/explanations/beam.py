@@ -1,0 +1,221 @@
+"""Carry several sets of effects beside the one that a search chose.
+
+A search follows one path. What it fitted on the way, and did not choose, is the beginning of other
+paths: those that explain the records nearly as well are followed too, the likeliest first, until
+none is left within reach or as many stages are spent as explanations were asked for.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discover.closed_loop.attribution import CandidateScore, attribute
+from discover.closed_loop.augment import refit, taken_out
+from discover.closed_loop.search import Search
+from discover.closed_loop.seen_sets import SeenSet, SeenSets
+from discover.forward.least_squares import Fit, fit_batch
+from discover.statistics.residual import summarise
+
+BEAM_WIDTH = 8
+"""Explanations that are carried side by side, by default."""
+
+WINDOW = 20.0
+"""An explanation so many times less probable than the best is no longer carried: Occam's window
+[Madigan & Raftery 1994, J. Am. Stat. Assoc. 89, 1535]."""
+
+_SLACK = 2.0  # of the criterion, for fits that only ranked
+_LEADERS = 8
+_TWIN = 1e-3
+"""Relative difference of costs up to which two sets may be twins: what a ranking fit leaves open
+(`RANKING`)."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A set of effects that explains the records, fitted to the end.
+
+    Attributes
+    ----------
+    effects
+        In the order of the search for what it chose, else in alphabetical order.
+    fit
+        Of the set.
+    criterion
+        Twice the negative logarithm of its weight, but for a constant.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+    criterion: float
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """The information criterion by which the search chose, of whole sets; see `augment.evidence`.
+
+    Attributes
+    ----------
+    effective_samples
+        Number of independent samples of what the search left.
+    n_candidates
+        Candidates among which each effect was chosen.
+    """
+
+    effective_samples: float
+    n_candidates: int
+
+    def of(self, one: SeenSet) -> float:
+        """Return the criterion of a set of effects: small for a probable one."""
+        price = len(one.free) * np.log(max(self.effective_samples, 2.0))
+        price += 2.0 * len(one.effects) * np.log(max(self.n_candidates, 1))
+        return float(self.effective_samples * np.log(max(one.cost, np.finfo(float).tiny)) + price)
+
+
+def carry(
+    search: Search,
+    max_effects: int,
+    width: int = BEAM_WIDTH,
+    say: Callable[[str], None] = lambda line: None,
+) -> list[Carried]:
+    """Return the sets of effects that explain the records, the most probable first.
+
+    Parameters
+    ----------
+    search
+        A search that has ended.
+    max_effects
+        Largest number of effects in a set.
+    width
+        How many are carried at most, and how many stages are spent on following them.
+    say
+        Called with a line of text now and then.
+    """
+    if width > 1:
+        _note_shorter(search)
+    weight = np.asarray(search.batch.weight)
+    own = tuple(search.active)
+    search.seen.note(own, search.fit, weight)
+    effective = summarise(search.fit.residual, weight).effective_samples
+    criterion = Criterion(effective, search.n_candidates)
+    # twins of one that was followed lead nowhere else
+    followed = [one for one in search.seen if one.effects == tuple(sorted(own))]
+    spent = 0
+    while spent < width and width > 1:
+        ahead = [one for one in _in_window(search, criterion) if not _twin(one, followed)]
+        if not ahead:
+            break
+        say(f"following another explanation: {', '.join(ahead[0].effects) or 'no effect'}")
+        followed.append(ahead[0])
+        spent += _follow(search, ahead[0], max_effects)
+    found = _fitted(search, _in_window(search, criterion)[: 2 * width], criterion)[:width]
+    return sorted(found, key=lambda one: one.criterion)
+
+
+def _note_shorter(search: Search) -> None:
+    """Fit the sets that what was found contains: the stages before it, and it less one effect."""
+    model, active, weight = search.model, search.active, np.asarray(search.batch.weight)
+    sets, starts, free = [], [], []
+    for n in range(len(active)):
+        sets.append(active[:n])
+        starts.append(search.path[n])
+        free.append(
+            tuple([*model.free_positions, *(p for e in active[:n] for p in model.positions(e))])
+        )
+    for name in active[:-1]:
+        theta, positions = taken_out(model, search.fit, name)
+        sets.append([other for other in active if other != name])
+        starts.append(theta)
+        free.append(positions)
+    if not sets:
+        return
+    prior = search.prior
+    for effects, fit in zip(
+        sets, fit_batch(model, search.batch, starts, free, prior=prior), strict=True
+    ):
+        if fit.usable:
+            search.seen.note(effects, fit, weight)
+
+
+def _in_window(search: Search, criterion: Criterion) -> list[SeenSet]:
+    """Return the sets that are within reach of the best, the best first."""
+    sets = [one for one in search.seen if not search.refused & set(one.effects)]
+    worth = {one.effects: criterion.of(one) for one in sets}
+    limit = min(worth.values()) + 2.0 * np.log(WINDOW) + _SLACK
+    return sorted(
+        (one for one in sets if worth[one.effects] <= limit), key=lambda one: worth[one.effects]
+    )
+
+
+def _twin(one: SeenSet, followed: Sequence[SeenSet]) -> bool:
+    return any(
+        one.effects == other.effects
+        or (
+            len(one.free) == len(other.free)
+            and len(one.effects) == len(other.effects)
+            and abs(one.cost - other.cost) <= _TWIN * other.cost
+        )
+        for other in followed
+    )
+
+
+def _follow(search: Search, one: SeenSet, max_effects: int) -> int:
+    """Fit the neighbours of a set: an effect more, or another in the place of each.
+
+    Returns how many stages that took.
+    """
+    fit = _fits(search, [one])[0]
+    if not fit.usable:
+        return 0
+    stages = 0
+    # what leaves noise asks for nothing more
+    if len(one.effects) < max_effects and not search.tolerated.random(fit, one.effects):
+        _refit_leading(search, fit, list(one.effects))
+        stages += 1
+    for name in one.effects:
+        theta, free = taken_out(search.model, fit, name)
+        without = fit_batch(search.model, search.batch, [theta], [free], prior=search.prior)[0]
+        if without.usable:
+            _refit_leading(search, without, [other for other in one.effects if other != name])
+            stages += 1
+    return stages
+
+
+def _refit_leading(search: Search, fit: Fit, others: list[str]) -> None:
+    leading: list[CandidateScore] = attribute(
+        search.model, search.batch, fit, others, _LEADERS, search.candidate
+    ).leading
+    choices = refit(search.model, search.batch, fit, leading, search.n_candidates, search.prior)
+    search.possible(choices, others)  # which notes them
+
+
+def _fits(search: Search, sets: Sequence[SeenSet]) -> list[Fit]:
+    """Return seen sets, fitted to the end."""
+    starts = []
+    for one in sets:
+        start = search.model.zero()
+        start[list(one.free)] = one.values
+        starts.append(start)
+    free = [one.free for one in sets]
+    return fit_batch(search.model, search.batch, starts, free, prior=search.prior)
+
+
+def _fitted(search: Search, sets: Sequence[SeenSet], criterion: Criterion) -> list[Carried]:
+    own, weight = tuple(search.active), np.asarray(search.batch.weight)
+    others = [one for one in sets if one.effects != tuple(sorted(own))]
+    found = [(own, search.fit)]
+    if others:
+        found += [
+            (one.effects, fit)
+            for one, fit in zip(others, _fits(search, others), strict=True)
+            if fit.usable
+        ]
+    again = SeenSets()
+    for effects, fit in found:
+        again.note(effects, fit, weight)
+    worth = {one.effects: criterion.of(one) for one in again}
+    carried = [Carried(effects, fit, worth[tuple(sorted(effects))]) for effects, fit in found]
+    limit = min(one.criterion for one in carried) + 2.0 * np.log(WINDOW)
+    # what the search chose is among them, whatever its weight
+    kept = [one for one in carried if one.criterion <= limit or one.effects == own]
+    return sorted(kept, key=lambda one: (one.effects != own, one.criterion))

@@ -1,0 +1,105 @@
+"""What an explanation may still lack, and what that changes in other flows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import minimize_scalar
+
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit, jacobians
+from discover.statistics.residual import summarise
+
+_DECADES = 6.0
+"""By which the prior may be narrower or wider than what the best seen combination says."""
+
+
+def discrepancy(
+    model: AugmentedModel,
+    fitted: Batch,
+    fit: Fit,
+    effects: Sequence[str],
+    batch: Batch,
+) -> Float[np.ndarray, "runs n"]:
+    """Return the mean square of what small amounts of every other candidate would change.
+
+    A law that holds all candidates beside the explanation, each in an amount with a Gaussian prior
+    whose width the data choose   [MacKay 1992, Neural Comput. 4, 415], to first order about the
+    fit. Where the fitted records leave noise the width vanishes; where they leave structure, what
+    would explain it goes on into faster flows as the candidates do.
+
+    Parameters
+    ----------
+    model, fitted, fit
+        The model, the runs that were fitted, and the fit of the explanation.
+    effects
+        Candidates that are not in it.
+    batch
+        The runs to predict.
+
+    Returns
+    -------
+    In squared weighted residuals of `batch`; zero at padding.
+    """
+    weight = np.asarray(batch.weight)
+    if not effects:
+        return np.zeros_like(weight)
+    at = [model.positions(name)[0] for name in effects]
+    own = _signatures(model, fitted, fit.theta, at)
+    other = own if batch is fitted else _signatures(model, batch, fit.theta, at)
+    size = np.linalg.norm(own, axis=1)
+    # what does nothing here, or cannot be followed, says nothing there
+    usable = (size > 0.0) & np.isfinite(size) & np.all(np.isfinite(other), axis=1)
+    if not np.any(usable):
+        return np.zeros_like(weight)
+    seen = np.asarray(fitted.weight).ravel() > 0
+    free = fit.jacobian.reshape(len(fit.free), seen.size)[:, seen]
+    residual = fit.residual.ravel()[seen]
+    scaled = own[usable] / size[usable, None]
+    design, change = scaled[:, seen].T, other[usable] / size[usable, None]
+    if fit.free:
+        basis = np.linalg.qr(free.T)[0]
+        design = design - basis @ (basis.T @ design)
+    # neighbours say the same: all rows together count as many as there are independent samples
+    effective = summarise(fit.residual, np.asarray(fitted.weight)).effective_samples
+    mean, root = posterior(design, -residual, min(effective, float(len(residual))))
+    shift, spread = mean @ change, np.sum((root @ change) ** 2, axis=0)
+    return (shift**2 + spread).reshape(weight.shape)
+
+
+def posterior(
+    design: Float[np.ndarray, "n terms"], target: Float[np.ndarray, " n"], samples: float
+) -> tuple[Float[np.ndarray, " terms"], Float[np.ndarray, "rank terms"]]:
+    """Return mean and a root of the covariance of coefficients whose prior width the data choose.
+
+    The noise is as large as is likeliest at each width.
+    """
+    left, singular, right = np.linalg.svd(design, full_matrices=False)
+    told = singular > 1e-10 * singular[0]
+    left, singular, right = left[:, told], singular[told], right[told]
+    seen = left.T @ target
+    share = samples / len(target)
+    power = share * singular**2
+    total = share * float(target @ target)
+
+    def noise(narrowness: float) -> float:
+        return (
+            max(total - share * float(seen**2 @ (power / (power + narrowness))), 1e-300) / samples
+        )
+
+    def unlikely(logarithm: float) -> float:
+        narrowness = np.exp(logarithm)
+        widths = float(np.sum(np.log1p(power / narrowness)))
+        return samples * np.log(noise(narrowness)) + widths
+
+    ends = np.log(power[0]) + np.array([-_DECADES, _DECADES]) * np.log(10.0)
+    narrowness = float(np.exp(minimize_scalar(unlikely, bounds=ends, method="bounded").x))
+    mean = (np.sqrt(share * power) * seen / (power + narrowness)) @ right
+    root = np.sqrt(noise(narrowness) / (power + narrowness))[:, None] * right
+    return mean, root
+
+
+def _signatures(model, batch, theta, at) -> Float[np.ndarray, "effects samples"]:
+    residual = model.residuals([theta], batch)
+    slopes = jacobians(model, batch, [theta], residual, [tuple(at)])[0]
+    return slopes.reshape(len(at), -1)

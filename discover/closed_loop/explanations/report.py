@@ -1,0 +1,91 @@
+"""What a loop that has ended says of its explanations: their probabilities, errors and band."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.closed_loop.before_after import errors_of, record_runs
+from discover.closed_loop.explanation import Explanations
+from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.mixture import mixed_band
+from discover.closed_loop.explanations.weighing import explanations_of
+from discover.closed_loop.judgement import Judgement
+from discover.closed_loop.run_record import RunRecord
+from discover.dataset import Run
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
+from discover.statistics.residual import summarise
+
+
+def explain(
+    model: AugmentedModel,
+    batch: Batch,
+    carried: Sequence[Carried],
+    fit: Fit,
+    runs: tuple[Sequence[Run], Sequence[Run]],
+    held_batch: Batch | None,
+    judgement: Judgement,
+) -> Explanations:
+    """Return the explanations that were carried, with their probabilities and errors.
+
+    Parameters
+    ----------
+    model, batch
+        The model with all candidates, and the fitted runs as it has them.
+    carried, fit
+        The explanations, and the fit of what the search chose.
+    runs
+        The runs that were fitted, and those held out.
+    held_batch
+        These, as the model has them, if there are any.
+    judgement
+        Of what the search chose. Where it is no signal, nothing is explained.
+    """
+    if judgement.verdict == "no_signal":
+        return Explanations()
+    thetas = [one.fit.theta for one in carried]
+    records = record_runs(model, batch, runs[0], thetas, held_out=False)
+    if held_batch is not None:
+        records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
+    errors = [errors_of(records, i) for i in range(len(thetas))]
+    effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
+    return explanations_of(model, carried, errors, judgement, effective)
+
+
+def with_band(
+    model: AugmentedModel,
+    batch: Batch,
+    carried: Sequence[Carried],
+    explanations: Explanations,
+    parts: Sequence[tuple[Batch | None, Sequence[RunRecord]]],
+    judgement: Judgement,
+    candidates: Sequence[str],
+) -> list[RunRecord]:
+    """Return the records of runs with the band that the explanations predict together.
+
+    Parameters
+    ----------
+    model, batch, carried, explanations
+        As in `explain`.
+    parts
+        The runs as the model has them, and their records in the same order: fitted and held out.
+    judgement
+        Of what the search chose.
+    candidates
+        Effects that were tried.
+    """
+    of = {one.effects: one.probability for one in explanations.likeliest_first}
+    mixed = [one for one in carried if one.effects in of]
+    out = []
+    for held, records in parts:
+        if held is None or not mixed:
+            out += records
+            continue
+        shares = [of[one.effects] for one in mixed]
+        noise, structured = judgement.left.noise, judgement.structured
+        band = mixed_band(model, batch, mixed, shares, held, noise, structured, candidates)
+        out += [
+            replace(record, band=band[:, i, : len(record.time)]) for i, record in enumerate(records)
+        ]
+    return out

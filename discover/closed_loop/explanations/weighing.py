@@ -1,0 +1,141 @@
+"""Probabilities of explanations, and of none of them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.explanation import Explanation, Explanations
+from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.judgement import Judgement
+from discover.forward import AugmentedModel
+from discover.statistics.residual import STRUCTURE
+from discover.statistics.unseen import CARRIED
+from discover.statistics.whiteness import SIGNIFICANCE
+
+_CERTAIN = 30.0
+"""Logarithm of odds beyond which nothing more is said."""
+
+_SAME = 0.01
+"""Two fits are twins if they differ by less than this fraction of what is left, in mean squares."""
+
+
+def explanations_of(
+    model: AugmentedModel,
+    carried: Sequence[Carried],
+    errors: Sequence[ErrorPair],
+    judgement: Judgement,
+    effective_samples: float,
+) -> Explanations:
+    """Return the probabilities of what was carried, twins merged, the likeliest first.
+
+    Parameters
+    ----------
+    model
+        With all candidates.
+    carried, errors
+        Sets of effects, and the errors of each.
+    judgement
+        Of what the search chose; the explanations together are believed as far as that is.
+    effective_samples
+        Independent samples of what it leaves.
+    """
+    classes = _classes(carried)
+    best = min(one.criterion for one in carried)
+    # a class counts once, however many spellings the library has for it
+    weights = np.array([np.exp(-0.5 * (carried[c[0]].criterion - best)) for c in classes])
+    none = unexplained_probability(judgement, effective_samples)
+    shares = (1.0 - none) * weights / np.sum(weights)
+    found = [
+        Explanation(
+            carried[members[0]].effects,
+            float(share),
+            errors[members[0]],
+            _parameters(model, carried[members[0]]),
+            tuple(carried[i].effects for i in members[1:]),
+        )
+        for members, share in zip(classes, shares, strict=True)
+    ]
+    found.sort(key=lambda one: -one.probability)
+    kinds = {effect.name: effect.kind for effect in model.effects}
+    return Explanations(
+        tuple(found), none, _inclusion(found), _inclusion(found, lambda name: kinds[name])
+    )
+
+
+def unexplained_probability(judgement: Judgement, effective_samples: float) -> float:
+    """Return how probable it is that none of the explanations is one.
+
+    A probability p of what is left, were it noise, is evidence of at most −1/(e p ln p) against
+    noise   [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62]. The odds are even where the verdict
+    turns: at the level of the test, at the misfit, and at the error of the runs held out that are
+    tolerated. So something is always left for what no dictionary holds, some 11 % where nothing
+    speaks for it.
+
+    Parameters
+    ----------
+    judgement
+        The verdict on the best explanation, and its reasons.
+    effective_samples
+        Independent samples of what it leaves.
+    """
+    left = judgement.left
+    logarithm = np.log(_least_bayes_factor(SIGNIFICANCE))
+    # a pattern that the noise given, the linear data's error or arithmetic explains says nothing
+    explained = not judgement.structured or not judgement.carries_over
+    probability = 1.0 if left.probability is None else left.probability
+    if not (explained and probability <= SIGNIFICANCE):
+        logarithm -= np.log(_least_bayes_factor(probability))
+    if not judgement.structured:
+        return _probability(min(logarithm, 0.0))
+    tolerated = max(STRUCTURE * left.expected, np.finfo(float).tiny)
+    size = effective_samples * np.log(max(left.misfit, tolerated) / tolerated)
+    unseen = judgement.unseen * 2.0 * np.log(max(judgement.missed / CARRIED, 1.0))
+    return _probability(max(float(logarithm), float(size), float(unseen), 0.0))
+
+
+def _least_bayes_factor(probability: float) -> float:
+    """Return the least factor in favour of noise that a probability can mean."""
+    p = float(np.clip(probability, 1e-300, np.exp(-1.0)))
+    return float(-np.e * p * np.log(p))
+
+
+def _probability(log_odds: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -_CERTAIN, _CERTAIN))))
+
+
+def _classes(carried: Sequence[Carried]) -> list[list[int]]:
+    """Return which explanations predict the fitted records alike, the simplest of each first."""
+    classes: list[list[int]] = []
+    for i in sorted(range(len(carried)), key=lambda i: carried[i].criterion):
+        fit = carried[i].fit
+        for members in classes:
+            other = carried[members[0]].fit
+            apart = float(np.sum((fit.residual - other.residual) ** 2))
+            if len(fit.free) == len(other.free) and apart <= _SAME * min(fit.cost, other.cost):
+                members.append(i)
+                break
+        else:
+            classes.append([i])
+    return classes
+
+
+def _parameters(model: AugmentedModel, one: Carried) -> Mapping[str, Mapping[str, float]]:
+    effects = {effect.name: effect for effect in model.effects}
+    return {
+        name: {
+            p.name: float(one.fit.theta[at])
+            for p, at in zip(effects[name].parameters, model.positions(name), strict=True)
+        }
+        for name in one.effects
+    }
+
+
+def _inclusion(found: Sequence[Explanation], spelled=lambda name: name) -> dict[str, float]:
+    """Return the probability of each name in what its effects are spelled as, the largest first."""
+    total: dict[str, float] = {}
+    for one in found:
+        for effects in one.members:
+            for name in {spelled(effect) for effect in effects}:
+                total[name] = total.get(name, 0.0) + one.probability / len(one.members)
+    return dict(sorted(total.items(), key=lambda pair: -pair[1]))

@@ -1,0 +1,90 @@
+"""Every set of effects that a search has fitted, kept for what it says beside the one chosen."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward.least_squares import Fit
+from discover.statistics.residual import judging
+
+
+@dataclass(frozen=True)
+class SeenSet:
+    """A set of effects, as it was fitted.
+
+    Attributes
+    ----------
+    effects
+        In alphabetical order.
+    free, values
+        Positions of what was fitted, and the values.
+    cost
+        Sum over the runs that judge of the squared relative errors.
+    """
+
+    effects: tuple[str, ...]
+    free: tuple[int, ...]
+    values: tuple[float, ...]
+    cost: float
+
+
+class SeenSets:
+    """The sets that were fitted, each with its best fit.
+
+    Parameters
+    ----------
+    sets
+        To begin with.
+    """
+
+    def __init__(self, sets: Iterable[SeenSet] = ()):
+        self._sets = {one.effects: one for one in sets}
+
+    def __iter__(self) -> Iterator[SeenSet]:
+        return iter(self._sets.values())
+
+    def __contains__(self, effects: Sequence[str]) -> bool:
+        return tuple(sorted(effects)) in self._sets
+
+    def note(
+        self,
+        effects: Sequence[str],
+        fit: Fit,
+        weight: Float[np.ndarray, "runs n"],
+    ) -> None:
+        """Keep a set of effects, unless it was fitted better before.
+
+        Parameters
+        ----------
+        effects, fit
+            The set and its fit.
+        weight
+            Weights of the runs.
+        """
+        name = tuple(sorted(effects))
+        cost = float(np.sum(fit.residual[judging(weight)] ** 2))
+        if not np.isfinite(cost) or (name in self._sets and self._sets[name].cost <= cost):
+            return
+        values = tuple(float(fit.theta[at]) for at in fit.free)
+        free = tuple(int(at) for at in fit.free)
+        self._sets[name] = SeenSet(name, free, values, cost)
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the sets as JSON."""
+        return [vars(one) for one in self]
+
+    @classmethod
+    def from_json(cls, content: Iterable[dict[str, Any]]) -> "SeenSets":
+        """Return the sets that `to_json` wrote."""
+        return cls(
+            SeenSet(
+                tuple(one["effects"]),
+                tuple(one["free"]),
+                tuple(one["values"]),
+                one["cost"],
+            )
+            for one in content
+        )
