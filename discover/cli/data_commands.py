@@ -3,7 +3,7 @@
 import json
 import os
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -11,6 +11,9 @@ from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import JsonOption, OverwriteOption
 from discover.errors import InputError
+
+if TYPE_CHECKING:  # --help needs no data
+    from discover.dataset import Dataset
 
 data_app = typer.Typer(help="Look at data folders.", no_args_is_help=True)
 
@@ -52,8 +55,15 @@ def list_data(as_json: JsonOption = False) -> None:
 
 @data_app.command("show")
 @guarded
-def show(name: FolderArgument, as_json: JsonOption = False) -> None:
-    """Show the runs of a data set."""
+def show(
+    name: FolderArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for a page with every test drawn, and a study."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the runs of a data set, in a table and on a page."""
     from discover.dataset.load import load_dataset
     from discover.dataset.run_table import run_line
 
@@ -62,13 +72,10 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
+    page = None if out is None else _write_page(dataset, name, out)
     if as_json:
-        typer.echo(
-            json.dumps(
-                {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep},
-                indent=2,
-            )
-        )
+        content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
+        typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
         return
     say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
     typer.echo(
@@ -76,10 +83,29 @@ def show(name: FolderArgument, as_json: JsonOption = False) -> None:
     )
     for row in (*rows, *tables):
         words = ", ".join([row["flow"], *(key for key in ("N1", "N2") if row[key])])
+        duration = "–" if row["duration_s"] is None else f"{row['duration_s']:.4g}"
         say(
-            f"{row['run']:<32}{row['samples']:>8}{row['duration_s']:>12.4g}"
+            f"{row['run']:<32}{row['samples']:>8}{duration:>12}"
             f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {words}"
         )
+    if page is None:
+        say("Drawn, on a page, with a study to start from: add --out DIR.")
+    else:
+        say(f"Page: {page}")
+
+
+def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
+    """Write the page on a data folder and a first study beside it; return the page's path."""
+    from discover.dataset.checking.folder import check_folder
+    from discover.report.data_page import data_page, first_study
+    from discover.study.atomic import make_folder, write_text
+
+    here = Path(name)
+    # where the study lies a relative path would be another one
+    folder = here.resolve().as_posix() if here.is_dir() else name
+    make_folder(out)
+    write_text(out / "study.toml", first_study(dataset, folder))
+    return write_text(out / "report.html", data_page(dataset, check_folder(name), folder))
 
 
 @data_app.command("check")
@@ -204,5 +230,6 @@ def import_data(
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         say(f"{out}: {len(imported.files) + 1} files written.")
+        say(f"To see every test drawn: discover data show {out} --out DIR")
     if errors:
         raise typer.Exit(2)

@@ -42,8 +42,8 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
         )
     cut = []
     for run in runs:
-        if run.protocol.control == "steady":
-            cut.append(run)
+        if run.protocol.control in ("steady", "oscillation"):
+            cut.append(run)  # no course of a strain to be cut
             continue
         strain = np.abs(strain_of(run))
         keep = (strain >= low) & (strain <= high)

@@ -22,7 +22,7 @@ class RunRecord:
     rate
         Commanded, in 1/s, shape (n,); in extension the Hencky rate.
     measured
-        Recorded stress in Pa, shape (n,): σ12 in shear, σ11 − σ22 in extension.
+        The quantity recorded, shape (n,): σ12 in shear, σ11 − σ22 in extension.
     predicted
         Recorded stress in Pa by the declared model and after each stage, shape (stages + 1, n).
     errors
@@ -33,11 +33,13 @@ class RunRecord:
     flow
         Which flow it is.
     quantity
-        What is recorded: ``sigma12``, ``tensile_stress``, ``N1`` or ``N2`` in Pa, or ``strain``.
+        What is recorded: ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or
+        ``loss_modulus`` in Pa, or ``strain``.
     band
         Where 95 % of the measurements should lie by all explanations together, shape (2, n).
     control
-        What was imposed. Where it is ``steady``, time only counts the samples.
+        What was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
+        strain and rate of an oscillation are amplitudes.
     """
 
     name: str
@@ -63,8 +65,20 @@ class RunRecord:
 
     @property
     def is_transient(self) -> bool:
-        """Whether it goes on in time."""
-        return self.control != "steady"
+        """Whether it goes on in time, and is no steady or periodic state."""
+        return self.control not in ("steady", "oscillation")
+
+    @property
+    def along(self) -> tuple[str, Float[np.ndarray, " n"]]:
+        """What it is drawn against, and its values: time, shear rate, frequency or amplitude."""
+        if self.is_transient:
+            return "time (s)", self.time
+        if self.control == "steady":
+            return "shear rate (1/s)", np.abs(self.rate)
+        frequency = self.rate / self.strain
+        if np.max(frequency) > (1.0 + 1e-6) * np.min(frequency) and np.ptp(self.strain) == 0.0:
+            return "frequency (rad/s)", frequency
+        return "strain amplitude", self.strain
 
     @property
     def residual(self) -> Float[np.ndarray, "stages n"]:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
 from discover.errors import InputError
@@ -34,7 +35,8 @@ class Dataset(NotebookView):
     set_aside
         Runs of the folder that cannot be fitted, by name, with the reason.
     material_functions
-        Tables beside the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``.
+        Tables beside the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``,
+        ``amplitude_sweep``.
     """
 
     name: str
@@ -171,23 +173,30 @@ class Dataset(NotebookView):
         Parameters
         ----------
         kinds
-            Of `material_functions`; by default all.
+            Of `material_functions`, or ``lve`` for the linear sweep; by default all tables, and the
+            linear sweep only where there is nothing else. G′ and G″ of a sweep become a record
+            each, such as ``"amplitude_sweep.csv (loss_modulus)"``.
 
         Raises
         ------
         InputError
             If the data have no such table.
         """
-        there = self.material_functions
+        there = dict(self.material_functions)
+        if self.linear_sweep is not None:
+            there["lve"] = linear_sweep_as_run(self.linear_sweep)
         for kind in kinds or ():
+            if f"{kind}.csv" in self.set_aside:
+                raise InputError(f"{kind}.csv cannot be used: {self.set_aside[f'{kind}.csv']}.")
             if kind not in there:
                 raise InputError(
                     f"The data set {self.name!r} has no {kind}.csv; it has "
                     f"{', '.join(f'{name}.csv' for name in there) or 'no such table'}."
                 )
-        chosen = list(there) if kinds is None else kinds
-        added = [there[kind] for kind in chosen]
-        left = {kind: run for kind, run in there.items() if kind not in chosen}
+        alone = not self.runs and not self.material_functions
+        chosen = list(there if alone else self.material_functions) if kinds is None else kinds
+        added = [record for kind in chosen for record in there[kind].records]
+        left = {kind: run for kind, run in self.material_functions.items() if kind not in chosen}
         return replace(self, runs=(*self.runs, *added), material_functions=left)
 
     def quantity_by_quantity(self) -> "Dataset":

@@ -24,7 +24,7 @@ DATA_VARIABLE = "DISCOVER_DATA"
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
 
-DATA_FILES = (INDEX_FILE, SWEEP_FILE, "amplitude_sweep.csv", *(f"{kind}.csv" for kind in TABLES))
+DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
 """Files of which a folder needs one to be a data set."""
 
 
@@ -99,6 +99,7 @@ def load_dataset(
     rate_window: int = DEFAULT_WINDOW,
     rate_before: str | None = None,
     sequence: str | None = None,
+    amplitude_sweep_rad_s: float | None = None,
 ) -> Dataset:
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
@@ -125,6 +126,8 @@ def load_dataset(
     sequence
         Column of ``runs.csv`` that orders the runs where they were made one after another on one
         sample, such as start times; by default every run has a sample of its own.
+    amplitude_sweep_rad_s
+        Frequency of ``amplitude_sweep.csv``, if it has no column ``omega_rad_s``.
 
     Raises
     ------
@@ -133,7 +136,8 @@ def load_dataset(
     """
     root = resolve_folder(folder, base)
     index = read_index(root)
-    tables = read_material_functions(root, index.columns["file"])
+    names = index.columns["file"]
+    tables, unused = read_material_functions(root, names, amplitude_sweep_rad_s)
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
     aside = [reason_to_set_aside(index, row, before is not None) for row in range(len(index))]
@@ -162,7 +166,8 @@ def load_dataset(
         runs=runs,
         linear_sweep=find_sweep(root),
         provenance=_provenance(root),
-        set_aside={
+        set_aside=unused
+        | {
             name: reason
             for name, reason in zip(index.columns["file"], aside, strict=True)
             if reason is not None

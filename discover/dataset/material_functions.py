@@ -9,10 +9,16 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import units
+from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.run import Run
 from discover.dataset.table import Table, read_table
 from discover.errors import InputError
-from discover.protocols.control import imposed_stress, jumps_at_start, steady_rates
+from discover.protocols.control import (
+    imposed_stress,
+    jumps_at_start,
+    oscillations,
+    steady_rates,
+)
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import in_flow, measured_rate, start_up
 
@@ -24,8 +30,10 @@ COMPLIANCE = units.Quantity("compliance", "compliance_1_Pa", "1/Pa")
 RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa", "Pa")
 
 
-def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, Run]:
-    """Return the tables of a data folder as runs, by kind: those of `TABLES`.
+def read_material_functions(
+    root: Path, runs: Sequence[str] = (), frequency: float | None = None
+) -> tuple[dict[str, Run], dict[str, str]]:
+    """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
 
     Parameters
     ----------
@@ -33,13 +41,15 @@ def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, R
         The folder.
     runs
         Files that ``runs.csv`` names: they are runs, whatever they are called.
+    frequency
+        In rad/s, of an amplitude sweep that does not give its own.
 
     Raises
     ------
     InputError
         If a file is wrong.
     """
-    found = {}
+    found, aside = {}, {}
     for kind, read in _READERS.items():
         path = root / f"{kind}.csv"
         if path.name in runs or not os.path.lexists(path):
@@ -48,8 +58,18 @@ def read_material_functions(root: Path, runs: Sequence[str] = ()) -> dict[str, R
             raise InputError(
                 f"{path.name} is a link to outside the folder. Put the file itself in the folder."
             )
-        found[kind] = read(read_table(path))
-    return found
+        table = read_table(path)
+        if kind == "amplitude_sweep" and table.quantity(units.ANGULAR_FREQUENCY) is None:
+            if frequency is None:
+                aside[path.name] = (
+                    "it has no column omega_rad_s, and moduli belong to a frequency. Add it, or "
+                    "write amplitude_sweep_rad_s in [data]"
+                )
+                continue
+            same = {units.ANGULAR_FREQUENCY.column: [repr(frequency)] * len(table)}
+            table = replace(table, columns={**table.columns, **same})
+        found[kind] = read(table)
+    return found, aside
 
 
 def _flow_curve(table: Table) -> Run:
@@ -103,6 +123,47 @@ def _creep(table: Table) -> Run:
     )
 
 
+def _amplitude_sweep(table: Table) -> Run:
+    strain, frequency = table.required(units.STRAIN), table.required(units.ANGULAR_FREQUENCY)
+    _require_positive(table, strain, "strain")
+    _require_positive(table, frequency, "omega")
+    storage, loss = table.required(units.STORAGE_MODULUS), table.required(units.LOSS_MODULUS)
+    order = np.lexsort((strain, frequency))
+    return _oscillations(
+        table.name, "amplitude sweep", *(v[order] for v in (strain, frequency, storage, loss))
+    )
+
+
+def linear_sweep_as_run(sweep: LinearSweep, name: str = "lve.csv") -> Run:
+    """Return a linear sweep as a run: oscillations of a strain of `LINEAR_STRAIN`.
+
+    Parameters
+    ----------
+    sweep
+        G′ and G″.
+    name
+        Of the run.
+    """
+    strain = np.full(len(sweep), LINEAR_STRAIN)
+    moduli = sweep.storage_modulus, sweep.loss_modulus
+    what = f"linear sweep, at a strain of {LINEAR_STRAIN:g}"
+    return _oscillations(name, what, strain, sweep.angular_frequency, *moduli)
+
+
+def _oscillations(name, what, strain, frequency, storage, loss) -> Run:
+    return Run(
+        name,
+        np.arange(1.0, len(strain) + 1.0),
+        oscillations(strain, frequency),
+        strain * frequency,
+        strain * np.hypot(storage, loss),
+        strain=strain,
+        metadata={"test": what},
+        storage_modulus=storage,
+        loss_modulus=loss,
+    )
+
+
 def _over_time(
     table: Table, quantity: units.Quantity
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
@@ -130,10 +191,12 @@ _READERS: Mapping[str, Callable[[Table], Run]] = {
     "flow_curve": _flow_curve,
     "relaxation": _relaxation,
     "creep": _creep,
+    "amplitude_sweep": _amplitude_sweep,
 }
 
 TABLES = tuple(_READERS)
-"""Kinds of tables; the file of each is called so."""
+"""Kinds of tables; the file of each is called so. The linear sweep is one more, which gives the
+modes and is fitted or judged only where that is asked for."""
 
 
 def at_measured_rate(run: Run) -> Run:
@@ -142,7 +205,8 @@ def at_measured_rate(run: Run) -> Run:
     Raises
     ------
     InputError
-        If the stress was put on at once, which no finite rate follows, or it is a flow curve.
+        If the stress was put on at once, which no finite rate follows, or it is a flow curve or
+        moduli.
     """
     if run.protocol.control == "rate":
         return run
@@ -150,6 +214,11 @@ def at_measured_rate(run: Run) -> Run:
         raise InputError(
             f"{run.name} is a flow curve, which a learner that follows a rate in time cannot fit. "
             "discover close-loop fits it; leave it out here."
+        )
+    if run.protocol.control == "oscillation":
+        raise InputError(
+            f"{run.name} holds moduli of oscillations, which a learner that follows a rate in time "
+            "cannot fit. discover close-loop fits them; leave it out here."
         )
     if jumps_at_start(run.protocol):
         raise InputError(

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.protocols.history import after_steady_flow
-from discover.protocols.kinematics import FlowKind, RecordedQuantity
+from discover.protocols.kinematics import MODULI, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
 
 SLOWEST_RATE = 1e-12
@@ -39,7 +39,10 @@ class Run:
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
     strain
-        Strain at the sampling times, where recorded; computed from the rate otherwise.
+        Strain at the sampling times, where recorded; computed from the rate otherwise. Of
+        oscillations by their first harmonic the amplitude, as are rate and stress.
+    storage_modulus, loss_modulus
+        G′ and G″ in Pa of such oscillations, shape (n,).
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``; differs from one for data that
         were shifted to another temperature.
@@ -67,6 +70,8 @@ class Run:
     rate_before: float = 0.0
     strain_before: float = 0.0
     metadata: Mapping[str, float | str] = field(default_factory=dict)
+    storage_modulus: Float[np.ndarray, " _"] | None = None
+    loss_modulus: Float[np.ndarray, " _"] | None = None
 
     def __post_init__(self):
         # shapes are checked here, not by annotation: users build runs by hand
@@ -80,6 +85,8 @@ class Run:
             ("first_normal_stress_difference", self.first_normal_stress_difference),
             ("second_normal_stress_difference", self.second_normal_stress_difference),
             ("strain", self.strain),
+            ("storage_modulus", self.storage_modulus),
+            ("loss_modulus", self.loss_modulus),
         ):
             if values is None:
                 continue
@@ -122,6 +129,13 @@ class Run:
         return f"<Run {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
 
     def _recorded(self) -> dict[str, np.ndarray | None]:
+        if self.protocol.control == "oscillation":
+            return {
+                "strain": self.strain,
+                "omega_rad_s": self.angular_frequency,
+                "Gp_Pa": self.storage_modulus,
+                "Gpp_Pa": self.loss_modulus,
+            }
         in_shear = self.flow == "shear"
         return {
             "time_s": self.time,
@@ -155,13 +169,20 @@ class Run:
             "N1": self.first_normal_stress_difference,
             "N2": self.second_normal_stress_difference,
             "strain": self.strain,
+            "storage_modulus": self.storage_modulus,
+            "loss_modulus": self.loss_modulus,
         }.get(self.quantity, self.stress)
         if values is None:
             raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
         return values
 
     def observing(self, quantity: RecordedQuantity) -> "Run":
-        """Return the same run with N1 or N2 as what is fitted or judged, under a name of its own.
+        """Return the same run with another quantity fitted or judged, under a name of its own.
+
+        Parameters
+        ----------
+        quantity
+            N1 or N2 in shear; a modulus of oscillations.
 
         Raises
         ------
@@ -182,6 +203,26 @@ class Run:
         if self.quantity != "sigma12":
             return ()
         return tuple(q for q, values in zip(both, columns, strict=True) if values is not None)
+
+    @property
+    def records(self) -> "tuple[Run, ...]":
+        """What of the run is fitted or judged by default: itself, or the moduli of oscillations."""
+        if self.protocol.control != "oscillation":
+            return (self,)
+        return tuple(replace(self, name=self.source).observing(modulus) for modulus in MODULI)
+
+    @property
+    def angular_frequency(self) -> Float[np.ndarray, " n"]:
+        """ω in rad/s of oscillations by their first harmonic, shape (n,): rate over strain.
+
+        Raises
+        ------
+        InputError
+            If the run has no strain.
+        """
+        if self.strain is None:
+            raise InputError(f"The run {self.name!r} has no strain, so no frequency is known.")
+        return self.rate / self.strain
 
     @property
     def source(self) -> str:
@@ -220,6 +261,8 @@ class Run:
             first_normal_stress_difference=cut(self.first_normal_stress_difference),
             second_normal_stress_difference=cut(self.second_normal_stress_difference),
             strain=cut(self.strain),
+            storage_modulus=cut(self.storage_modulus),
+            loss_modulus=cut(self.loss_modulus),
         )
 
 

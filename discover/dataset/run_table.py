@@ -12,6 +12,7 @@ from discover.protocols.control import jumps_at_start
 # many where the stress was commanded, and noise
 _PERIODIC = 0.7
 _VARYING = "varying rate"
+_STATES = ("steady", "oscillation")
 
 
 def run_line(run: Run) -> dict[str, Any]:
@@ -32,7 +33,8 @@ def run_line(run: Run) -> dict[str, Any]:
         "run": run.name,
         "flow": _oscillating(run) if wave and flow == _VARYING else flow,
         "samples": len(run),
-        "duration_s": float(run.time[-1]),
+        # of states, time counts the samples
+        "duration_s": None if run.protocol.control in _STATES else float(run.time[-1]),
         "largest_rate_1_s": float(np.max(np.abs(run.rate))),
         "frequency_rad_s": wave[0] if wave else None,
         "strain_amplitude": wave[1] / wave[0] if wave else None,
@@ -45,6 +47,9 @@ def run_line(run: Run) -> dict[str, Any]:
 def _flow(run: Run) -> str:
     if run.protocol.control == "steady":
         return "flow curve"
+    if run.protocol.control == "oscillation":
+        linear = str(run.metadata.get("test", "")).startswith("linear")
+        return "frequency sweep" if linear else "amplitude sweep"
     if run.protocol.control == "stress":
         return "creep" if jumps_at_start(run.protocol) else "given stress"
     if not run.flows:

@@ -116,7 +116,11 @@ def thin_run(run: Run, most: int) -> Run:
     keep[np.unique(np.round(np.linspace(0, n - 1, most)).astype(int))] = True
     thinned = run.window(keep)
     sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
-    if sampled and _strain_error(run.time, run.rate, keep) < _FOLLOWED:
+    if (
+        run.protocol.control == "rate"
+        and sampled
+        and _strain_error(run.time, run.rate, keep) < _FOLLOWED
+    ):
         followed = measured_rate(thinned.time, thinned.rate)
         thinned = replace(thinned, protocol=in_flow(followed, run.flow))
     return thinned

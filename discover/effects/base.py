@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Complex, Float
 
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
@@ -101,8 +101,8 @@ class AbstractEffect(ABC):
     complexity: int = 1
     kind: ClassVar[Kind]
     acts_on_steady_states: ClassVar[bool] = False
-    """Of an effect of the instrument or a state: whether it changes what is steady, sample by
-    sample, without regard to time or strain."""
+    """Of an effect of the instrument or a state: whether it changes what is steady or periodic,
+    sample by sample, without regard to time or strain."""
 
 
 @dataclass(frozen=True)
@@ -311,6 +311,21 @@ class SignalEffect(AbstractEffect):
     @abstractmethod
     def recorded_stress(self, values: Float[Array, " p"], record: Record) -> Float[Array, " n"]:
         """Return the stress recorded, from the one that would be recorded without this effect."""
+
+    def response(
+        self, values: Float[Array, " p"], frequency: Float[Array, ""]
+    ) -> Complex[Array, ""] | Float[Array, ""]:
+        """Return by what the stress of an oscillation that has gone on is multiplied.
+
+        Parameters
+        ----------
+        values
+            Parameters in their order.
+        frequency
+            In rad/s.
+        """
+        del frequency
+        return jnp.ones_like(values[0])
 
     def inertia(self, values: Float[Array, " p"]) -> Float[Array, ""]:
         """Return I of σ_rec = σ + I dγ̇/dt in Pa s², which a given stress accelerates too."""

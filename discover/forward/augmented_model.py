@@ -19,7 +19,7 @@ from discover.effects import AbstractEffect
 from discover.forward.by_mode import LARGEST
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
-from discover.forward.run_batch import Batch, MixedBatch, Part
+from discover.forward.run_batch import Batch, MixedBatch, OscillationBatch, Part
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -141,7 +141,7 @@ class AugmentedModel:
         return FreeParameter(name, start, low, high), at
 
     def predict(self, theta, batch: Batch) -> Float[np.ndarray, "runs n"]:
-        """Return the predicted records: stresses in Pa, and strains of runs at a given stress."""
+        """Return the predicted records: stresses or moduli in Pa, or strains at a given stress."""
         return self.predictions([theta], batch)[0]
 
     def predictions(
@@ -153,10 +153,15 @@ class AugmentedModel:
         out = np.zeros((len(thetas), *batch.recorded.shape))
         for rows, part in zip(batch.rows, batch.parts, strict=True):
             found = self._of_part(thetas, part)
+            if isinstance(part, OscillationBatch):
+                sweeps, moduli = np.array(batch.moduli).T
+                found = found[:, sweeps, moduli]
             out[:, rows, : found.shape[2]] = found
         return out
 
-    def _of_part(self, thetas, part: Part) -> Float[np.ndarray, "trials runs n"]:
+    def _of_part(
+        self, thetas, part: Part | OscillationBatch
+    ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self._program
 
         def one(theta: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from discover.simulate.exponential_runge_kutta import (
 _JUMP = 1e-9
 
 
-def _weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 10 k"]:
+def step_weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 10 k"]:
     """Return the weights of every step, in the dimensionless time of each mode."""
     h = width[:, None] / relaxation_time
     z = -h if linear_relaxation else jnp.zeros_like(h)
@@ -54,9 +54,9 @@ def integrate(
     width = jnp.diff(times)
     states, series = dynamics.states, dynamics.series
     linear_relaxation = dynamics.linear_relaxation
-    weights = [_weights(dynamics.declared.relaxation_time, width, linear_relaxation)]
+    weights = [step_weights(dynamics.declared.relaxation_time, width, linear_relaxation)]
     if dynamics.extra is not None:
-        weights.append(_weights(dynamics.extra.relaxation_time, width, linear_relaxation))
+        weights.append(step_weights(dynamics.extra.relaxation_time, width, linear_relaxation))
     # so that it is traced once, and not at each of the four stages
     slope = jax.jit(lambda stress, rate, slow: dynamics.change(stress, rate, slow, flow))
     combined = dynamics.combined

@@ -25,7 +25,14 @@ from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
 from discover.forward.imposed_stress import strain_at_stress
 from discover.forward.integrator import integrate
-from discover.forward.run_batch import Part, RunBatch, SteadyBatch, StressBatch
+from discover.forward.periodic_states import complex_modulus, first_harmonic
+from discover.forward.run_batch import (
+    OscillationBatch,
+    Part,
+    RunBatch,
+    SteadyBatch,
+    StressBatch,
+)
 from discover.forward.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled
@@ -106,7 +113,9 @@ class Program:
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
 
-    def _predict_run(self, numbers, used, theta, run: Part):
+    def _predict_run(self, numbers, used, theta, run: Part | OscillationBatch):
+        if isinstance(run, OscillationBatch):
+            return self._predict_moduli(numbers, used, theta, run)
         if isinstance(run, SteadyBatch):
             return self._predict_steady_states(numbers, used, theta, run)
         if isinstance(run, StressBatch):
@@ -155,6 +164,51 @@ class Program:
                 record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
                 stress = self._as_recorded(theta, effect, record, flow)
         return stress
+
+    def _predict_moduli(self, numbers, used, theta, run: OscillationBatch):
+        places = jnp.arange(run.strain.shape[0], dtype=run.strain.dtype)
+        nominal = run.frequency * run.strain
+        rate = nominal
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+                rate = effect.felt_rate(self._values(theta, effect), places, rate)
+        dynamics = self._dynamics(numbers, used, theta, None)
+        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
+        dynamics = dynamics._replace(states=kept)
+
+        def beside(felt):
+            return self._beside(numbers, theta, felt, None)
+
+        def one(rate, nominal, frequency):
+            found = complex_modulus(dynamics, rate / frequency, frequency, run.phase, beside)
+            found = found * rate / nominal
+            for effect in self._signal:
+                found = self._modulus_as_recorded(theta, effect, found, nominal, frequency, run)
+            return jnp.stack([found.real, found.imag])
+
+        return jax.vmap(one, out_axes=1)(rate, nominal, run.frequency)
+
+    def _modulus_as_recorded(self, theta, effect, found, nominal, frequency, run: OscillationBatch):
+        """Return G′ + iG″ in Pa after an effect of the torque's signal.
+
+        What acts sample by sample acts on the wave of the first harmonic. An oscillation takes the
+        inertia of the tool, and what answers late, each frequency by itself.
+        """
+        values = self._values(theta, effect)
+        found = found * effect.response(values, frequency) - effect.inertia(values) * frequency**2
+        if not effect.acts_on_steady_states:
+            return found
+        phase, strain = run.phase[::2], nominal / frequency
+        stress = strain * (found.real * jnp.sin(phase) + found.imag * jnp.cos(phase))
+        # at the ends of the stroke the tool is at rest, whatever the rounding
+        rate = nominal * jnp.where(jnp.abs(jnp.cos(phase)) < 1e-9, 0.0, jnp.cos(phase))
+        there, back = (
+            effect.recorded_stress(
+                values, Record(phase / frequency, sign * rate, sign * stress, jnp.ones(()))
+            )
+            for sign in (1.0, -1.0)
+        )
+        return first_harmonic(0.5 * (there - back), phase) / strain
 
     def _predict_strain(self, numbers, used, theta, run: StressBatch):
         flow = run.kinematics

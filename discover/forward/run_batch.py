@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
-from discover.protocols.kinematics import Kinematics, stack_kinematics
+from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 from discover.simulate.grid import make_grid, stress_grid
 
@@ -20,8 +20,15 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 _LONG, _GROWTH = 2000, 0.05
 
 
-# Of the largest stress of a flow curve: below it the noise is no longer in proportion
+# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
 _LEAST_STEADY = 1e-4
+
+# Of a radian: the time in which a change of a periodic stress is seen, in its phase
+_SEEN = 0.1
+
+# Steps in half a cycle: at most this much strain in each, at least this many, and a limit that only
+# a strain given in the wrong unit reaches
+_FEWEST_STEPS, _MOST_STEPS = 12.0, 4000
 
 
 class RunBatch(eqx.Module):
@@ -122,8 +129,29 @@ class StressBatch(eqx.Module):
         return float(np.max(ends))
 
 
+class OscillationBatch(eqx.Module):
+    """Periodic states, padded, with a leading axis of sweeps: both moduli of each are computed.
+
+    Attributes
+    ----------
+    strain, frequency
+        Amplitude and rad/s, shape (sweeps, n).
+    phase
+        ωt at step ends and middles in turn over half a cycle, shape (sweeps, m).
+    """
+
+    strain: Float[Array, "sweeps n"]
+    frequency: Float[Array, "sweeps n"]
+    phase: Float[Array, "sweeps m"]
+
+    @property
+    def longest(self) -> float:
+        """Zero: a periodic state knows no time since it began."""
+        return 0.0
+
+
 Part = RunBatch | SteadyBatch | StressBatch
-"""Runs of one control, which share one program."""
+"""Runs of one control, which share one program, one row for each run."""
 
 
 class MixedBatch(eqx.Module):
@@ -135,12 +163,15 @@ class MixedBatch(eqx.Module):
         The runs of each control.
     rows
         Which runs these are.
+    moduli
+        Of each run that is a modulus, which sweep of its part, and whether G′ (0) or G″ (1).
     weight, recorded
         Of all runs in their order, as in `RunBatch`.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[Part | OscillationBatch, ...]
     rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    moduli: tuple[tuple[int, int], ...] = eqx.field(static=True)
     weight: Float[np.ndarray, "runs n"]
     recorded: Float[np.ndarray, "runs n"]
 
@@ -169,28 +200,30 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
         "stress": lambda some: _at_given_stress(some, strain_step),
     }
     controls = list(dict.fromkeys(run.protocol.control for run in runs))
-    if len(controls) == 1:
+    if len(controls) == 1 and controls[0] in make:
         return make[controls[0]](runs)
+    moduli: tuple[tuple[int, int], ...] = ()
     rows = tuple(
         tuple(i for i, run in enumerate(runs) if run.protocol.control == control)
         for control in controls
     )
-    parts = tuple(
-        make[control]([runs[i] for i in some]) for control, some in zip(controls, rows, strict=True)
-    )
-    shape = (len(runs), max(part.recorded.shape[1] for part in parts))
-    weight, recorded = np.zeros(shape), np.zeros(shape)
-    for some, part in zip(rows, parts, strict=True):
-        n = part.recorded.shape[1]
-        weight[some, :n], recorded[some, :n] = part.weight, part.recorded
-    return MixedBatch(parts, rows, weight, recorded)
+    parts = []
+    for control, some in zip(controls, rows, strict=True):
+        if control == "oscillation":
+            part, moduli = _oscillations([runs[i] for i in some], strain_step)
+        else:
+            part = make[control]([runs[i] for i in some])
+        parts.append(part)
+    n = max(len(run) for run in runs)
+    weight, recorded = zip(*(_measured(run, n) for run in runs), strict=True)
+    return MixedBatch(tuple(parts), rows, moduli, np.stack(weight), np.stack(recorded))
 
 
 def _measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return weights and values of a run's samples, padded to a length."""
     size = np.full(len(run), np.sqrt(np.mean(run.recorded**2)))
-    if run.protocol.control == "steady":
-        # over decades of stress the noise is in proportion to it, and each decade counts
+    if run.protocol.control in ("steady", "oscillation"):
+        # over decades of values the noise is in proportion to them, and each decade counts
         largest = float(np.max(np.abs(run.recorded)))
         size = np.maximum(np.abs(run.recorded), _LEAST_STEADY * largest)
     scale = 1.0 / (np.where(size > 0, size, 1.0) * np.sqrt(len(run)))
@@ -201,7 +234,7 @@ def _measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
 def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return by what values of one run are divided so that their noise has one size.
 
-    Ones but for a flow curve, whose noise is in proportion to it.
+    Ones but for a flow curve or a sweep, whose noise is in proportion to it.
 
     Parameters
     ----------
@@ -221,6 +254,39 @@ def _steady_states(runs: Sequence[Run]) -> SteadyBatch:
     return SteadyBatch(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )
+
+
+def _oscillations(
+    runs: Sequence[Run], strain_step: float
+) -> tuple[OscillationBatch, tuple[tuple[int, int], ...]]:
+    """Return the sweeps, and of each run which of them it is and which modulus of it."""
+    sweeps: list[tuple[np.ndarray, np.ndarray]] = []
+    moduli = []
+    for run in runs:
+        strain, frequency = np.asarray(run.strain), run.angular_frequency
+        # G′ and G″ of one sweep are computed together
+        at = next(
+            (
+                i
+                for i, (other, beside) in enumerate(sweeps)
+                if np.array_equal(other, strain) and np.array_equal(beside, frequency)
+            ),
+            len(sweeps),
+        )
+        if at == len(sweeps):
+            sweeps.append((strain, frequency))
+        moduli.append((at, MODULI.index(run.quantity)))
+    n = max(len(strain) for strain, _ in sweeps)
+    strains, frequencies = (
+        jnp.asarray(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
+        for column in zip(*sweeps, strict=True)
+    )
+    # half a cycle goes through twice the amplitude
+    largest = max(float(np.max(strain)) for strain, _ in sweeps)
+    steps = int(min(np.ceil(max(2.0 * largest, _FEWEST_STEPS) / strain_step), _MOST_STEPS))
+    phase = np.linspace(0.0, np.pi, 2 * steps + 1)
+    phases = jnp.asarray(np.tile(phase, (len(sweeps), 1)))
+    return OscillationBatch(strains, frequencies, phases), tuple(moduli)
 
 
 def _at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
@@ -288,14 +354,21 @@ def data_scales(runs: Sequence[Run]) -> dict[str, float]:
 
     Times are on the instrument's clock, but for ``run_time``, which is the material's.
     """
-    gaps = [float(np.min(np.diff(run.time))) / run.clock_factor for run in runs if len(run) > 1]
-    lengths = [float(run.time[-1]) / run.clock_factor for run in runs]
+    sweeps = [run for run in runs if run.protocol.control == "oscillation"]
+    timed = [run for run in runs if run.protocol.control != "oscillation"]
+    gaps = [float(np.min(np.diff(run.time))) / run.clock_factor for run in timed if len(run) > 1]
+    lengths = [float(run.time[-1]) / run.clock_factor for run in timed]
     strains = [
         float(np.sum(np.abs(run.rate[1:]) * np.diff(run.time)))
         + abs(float(run.rate[0])) * float(run.time[0])
-        for run in runs
+        for run in timed
     ]
-    material_lengths = [float(run.time[-1]) for run in runs]
+    strains += [float(np.max(np.abs(run.strain))) for run in sweeps if run.strain is not None]
+    material_lengths = [float(run.time[-1]) for run in timed]
+    # an oscillation changes within a radian; what is seen of it is a part of that
+    radians = [1.0 / float(np.median(run.angular_frequency)) for run in sweeps]
+    gaps += [_SEEN * radian for radian in radians]
+    lengths, material_lengths = lengths + radians, material_lengths + radians
     stresses = [float(np.sqrt(np.mean(run.stress**2))) for run in runs]
     rates = [float(np.max(np.abs(run.rate))) for run in runs]
     stress, gap = float(np.median(stresses)) or 1.0, float(np.median(gaps or [1.0]))

@@ -1,7 +1,7 @@
 """Protocols: the rate of deformation in time, the flow that has it, and what came before."""
 
 from discover import first_use as first_use  # double precision, before any array is made
-from discover.protocols.control import imposed_stress, steady_rates
+from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import after_alternation, after_steady_flow, after_step_strain
 from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
@@ -31,6 +31,7 @@ __all__ = [
     "in_flow",
     "kinematics_of",
     "measured_rate",
+    "oscillations",
     "oscillatory_shear",
     "paper_test_protocols",
     "paper_training_protocols",

@@ -1,4 +1,4 @@
-"""Protocols that impose a stress, or rates each held until the flow is steady."""
+"""Protocols that impose a stress, or states each held until it is steady or periodic."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,6 +25,20 @@ def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
     """
     counted = np.arange(1.0, len(rates) + 1.0)
     return replace(measured_rate(counted, rates), control="steady")
+
+
+def oscillations(
+    strains: Sequence[float] | np.ndarray, frequencies: Sequence[float] | np.ndarray
+) -> FlowProtocol:
+    """Return oscillations each gone on until it is periodic: one sample for each of them.
+
+    Parameters
+    ----------
+    strains, frequencies
+        Amplitude and rad/s of each, shape (n,).
+    """
+    amplitudes = np.asarray(strains, dtype=float) * np.asarray(frequencies, dtype=float)
+    return replace(steady_rates(amplitudes), control="oscillation", modulus="storage_modulus")
 
 
 def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:

@@ -17,10 +17,16 @@ from discover.errors import InputError
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 
-RecordedQuantity = Literal["sigma12", "tensile_stress", "N1", "N2", "strain"]
+RecordedQuantity = Literal[
+    "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
+]
 
-Control = Literal["rate", "stress", "steady"]
-"""What a protocol imposes: a rate, a stress, or rates each held until the flow is steady."""
+MODULI: tuple[RecordedQuantity, RecordedQuantity] = ("storage_modulus", "loss_modulus")
+"""What is recorded of an oscillation by its first harmonic."""
+
+Control = Literal["rate", "stress", "steady", "oscillation"]
+"""What a protocol imposes: a rate, a stress, rates each held until the flow is steady, or
+oscillations each gone on until they are periodic."""
 
 KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
 """Flows by name; the first is the default everywhere."""
@@ -48,6 +54,8 @@ _IN_WORDS = {
     "N2": "N2",
     "tensile_stress": "tensile stress",
     "strain": "strain",
+    "storage_modulus": "G′",
+    "loss_modulus": "G″",
 }
 
 

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from discover.errors import InputError
 from discover.programs import compiled
 from discover.protocols.kinematics import (
+    MODULI,
     Control,
     FlowKind,
     Kinematics,
@@ -46,7 +47,10 @@ class FlowProtocol(eqx.Module):
     control
         ``rate``; ``stress`` where the table holds the recorded stress that is imposed, in Pa, and
         the strain is what is recorded; ``steady`` where each sample is a steady state at its rate,
-        and time only counts the samples.
+        and ``oscillation`` where it is a periodic state whose rate has this amplitude; time then
+        only counts the samples.
+    modulus
+        Which modulus is recorded of oscillations.
     """
 
     table_times: Float[Array, " m"]
@@ -57,6 +61,7 @@ class FlowProtocol(eqx.Module):
     begins: Float[Array, ""] = eqx.field(default=0.0, converter=jnp.asarray)
     kinematics: Kinematics | None = None
     control: Control = eqx.field(static=True, default="rate")
+    modulus: RecordedQuantity | None = eqx.field(static=True, default=None)
 
     def velocity_gradient(self, time: Float[Array, ""]) -> VelocityGradient:
         """Return L(t) in 1/s: its four components, or the scalar shear rate in simple shear."""
@@ -71,6 +76,8 @@ class FlowProtocol(eqx.Module):
     @property
     def quantity(self) -> RecordedQuantity:
         """What is recorded, as studies and results spell it."""
+        if self.modulus is not None:
+            return self.modulus
         return "strain" if self.control == "stress" else quantity_of(self.kinematics)
 
     def recorded_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
@@ -256,7 +263,9 @@ def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
 
 
 def recording(protocol: FlowProtocol, quantity: RecordedQuantity) -> FlowProtocol:
-    """Return the same flow with another stress of it recorded: N1 or N2 in shear."""
+    """Return the same flow with another quantity recorded: N1 or N2 in shear, or a modulus."""
+    if quantity in MODULI:
+        return replace(protocol, modulus=quantity)
     return replace(protocol, kinematics=kinematics_of(protocol.flow, quantity))
 
 

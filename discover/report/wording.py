@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
+from discover.protocols.kinematics import MODULI
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
@@ -15,14 +16,18 @@ FIGURE_SYMBOLS = {
     "N2": "N₂",
     "tensile_stress": "σ₁₁ − σ₂₂",
     "strain": "γ",
+    "storage_modulus": "G′",
+    "loss_modulus": "G″",
 }
 """Symbols of what is recorded, as figures write them."""
 
 
 def recorded_symbol(quantities: Iterable[str]) -> str:
-    """Return the symbol of what is recorded, or ``stress`` for several kinds of it."""
+    """Return the symbol of what is recorded, or ``modulus`` or ``stress`` for several kinds."""
     found = set(quantities)
-    return FIGURE_SYMBOLS[found.pop()] if len(found) == 1 else "stress"
+    if len(found) > 1:
+        return "modulus" if found <= set(MODULI) else "stress"
+    return FIGURE_SYMBOLS[found.pop()]
 
 
 _LEARNERS = {

@@ -1,7 +1,7 @@
 """From a study to its data, its split and its declared fluid."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from discover.dataset import Dataset, LinearSweep
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.load import load_dataset
 from discover.dataset.material_functions import TABLES
-from discover.dataset.run import SLOWEST_RATE, require_signal
+from discover.dataset.run import SLOWEST_RATE, Run, require_signal
 from discover.effects import KnownEffect, known_effects
 from discover.errors import InputError
 from discover.forward import DeclaredModel as ForwardDeclared
@@ -17,6 +17,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
+from discover.protocols.kinematics import MODULI
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Study
@@ -135,6 +136,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
             rate_is_measured=data.rate == "measured",
             rate_before=data.rate_before,
             sequence=data.sequence,
+            amplitude_sweep_rad_s=data.amplitude_sweep_rad_s,
         )
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out
@@ -147,8 +149,8 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     if not len(dataset):
         raise InputError(
             f"The data set {dataset.name!r} has no run, and no table that could be fitted in place "
-            "of one. Add runs.csv with one line a run, or flow_curve.csv, relaxation.csv or "
-            "creep.csv."
+            "of one. Add runs.csv with one line a run, or one of "
+            f"{', '.join(f'{kind}.csv' for kind in TABLES)} or lve.csv."
         )
     if not fit_names:
         raise InputError("Every run is held out; leave at least one run to fit.")
@@ -170,17 +172,28 @@ def _with_tables(
     A table judges, unless the study says that it is fitted or there is nothing else to fit.
     """
     data = study.data
-    asked = {kind: getattr(data, kind) for kind in TABLES if getattr(data, kind) is not None}
+    kinds = (*TABLES, "lve")
+    asked = {kind: getattr(data, kind) for kind in kinds if getattr(data, kind) is not None}
     dataset.with_material_functions(list(asked))  # those that are not there are refused
-    tables = dataset.material_functions
-    roles = {kind: asked.get(kind, "judge" if len(dataset) else "fit") for kind in tables}
+    there = list(dataset.material_functions)
+    # the linear sweep gives the modes, and is no judge unless it is asked for
+    if "lve" in asked or (dataset.linear_sweep is not None and not there and not len(dataset)):
+        there.append("lve")
+    roles = {kind: asked.get(kind, "judge" if len(dataset) else "fit") for kind in there}
     if data.held_out == "each":
         # each run judges in turn, and nothing beside them
         roles = {kind: role for kind, role in roles.items() if role == "fit" or kind in asked}
     if not roles:
         return dataset, held_out, data.fit
-    fitted = tuple(tables[kind].name for kind, role in roles.items() if role == "fit")
-    judging = tuple(tables[kind].name for kind, role in roles.items() if role == "judge")
+    fitted, judging = (
+        tuple(
+            run.name
+            for kind, role in roles.items()
+            if role == wanted
+            for run in replace(dataset, runs=()).with_material_functions([kind])
+        )
+        for wanted in ("fit", "judge")
+    )
     fit = None if data.fit is None else (*data.fit, *(n for n in fitted if n not in data.fit))
     return dataset.with_material_functions(list(roles)), (*held_out, *judging), fit
 
@@ -206,9 +219,11 @@ def _observed(
     wanted = dataset.names if fit is None else fit
     by_name = {run.name: [] for run in dataset}
     for run in whole:
-        by_name[run.source].append(run)
+        by_name[run.name if run.quantity in MODULI else run.source].append(run)
+    # both moduli of a sweep are fitted, unless one of them is named
+    observed = set(observe) if set(observe) & set(MODULI) else {*observe, *MODULI}
     for name in fit or ():
-        if not any(run.quantity in observe for run in by_name[name]):
+        if not any(run.quantity in observed for run in by_name[name]):
             raise InputError(
                 f"[data] fit names {name!r}, which recorded nothing that is in observe = "
                 f"{list(observe)}. Leave the run out of fit, or add what it recorded to observe."
@@ -218,7 +233,7 @@ def _observed(
         for name in wanted
         if name not in held_out
         for run in by_name[name]
-        if run.quantity in observe
+        if run.quantity in observed
     ]
     judging = [
         run.name
@@ -361,15 +376,18 @@ def _linear_start(dataset: Dataset) -> dict[str, float]:
     """Return a modulus and relaxation time of the right order from the runs themselves.
 
     The relaxation time is that of the slowest change a run can show, a tenth of the median
-    duration, or the inverse of a flow curve's middle rate; the modulus follows from the largest
-    stress over rate times that.
+    duration, or the inverse of a flow curve's middle rate or a sweep's middle frequency; the
+    modulus follows from the largest stress over rate times that.
     """
-    times = [
-        1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
-        if run.protocol.control == "steady"
-        else 0.1 * run.time[-1]
-        for run in dataset
-    ]
+
+    def slowest(run: Run) -> float:
+        if run.protocol.control == "oscillation":
+            return 1.0 / float(np.median(run.angular_frequency))
+        if run.protocol.control == "steady":
+            return 1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
+        return 0.1 * float(run.time[-1])
+
+    times = [slowest(run) for run in dataset]
     time = float(np.median(times))
     viscosities = [
         np.max(np.abs(run.stress)) / np.max(np.abs(run.rate))

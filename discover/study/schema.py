@@ -80,11 +80,28 @@ class Data(Section):
     clock_factor: str | None = None
     rate: Literal["commanded", "measured"] = "commanded"
     rate_before: str | None = None
-    observe: tuple[Literal["sigma12", "tensile_stress", "N1", "N2", "strain"], ...] | None = None
+    observe: (
+        tuple[
+            Literal[
+                "sigma12",
+                "tensile_stress",
+                "N1",
+                "N2",
+                "strain",
+                "storage_modulus",
+                "loss_modulus",
+            ],
+            ...,
+        ]
+        | None
+    ) = None
     sequence: str | None = None
     flow_curve: Role = None
     relaxation: Role = None
     creep: Role = None
+    amplitude_sweep: Role = None
+    amplitude_sweep_rad_s: Positive | None = None
+    lve: Role = None
 
     @model_validator(mode="after")
     def _one_source(self):

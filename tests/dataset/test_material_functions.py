@@ -5,6 +5,7 @@ import pytest
 
 from discover.comparison import compare
 from discover.dataset import load_dataset
+from discover.dataset.checking.folder import check_folder
 from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.build import load_study_data
@@ -13,6 +14,10 @@ TABLES = {
     "flow_curve.csv": "shear_rate_1_s,stress_kPa,N1_Pa\n1,0.02,5\n0.1,0.003,0.1\n10,0.1,90\n",
     "relaxation.csv": "time_s,relaxation_modulus_Pa\n0.1,90\n1,40\n10,1\n",
     "creep.csv": "time_s,compliance_1_Pa\n0.1,0.01\n1,0.02\n10,0.11\n",
+}
+SWEEPS = {
+    "amplitude_sweep.csv": "strain_percent,omega_rad_s,Gp_kPa,Gpp_Pa\n100,2,0.03,40\n1,2,0.05,50\n",
+    "lve.csv": "omega_rad_s,Gp_Pa,Gpp_Pa\n0.1,1,10\n1,50,50\n10,99,10\n",
 }
 RUN = "time_s,shear_rate_1_s,stress_Pa\n0.1,1,9\n0.5,1,40\n1,1,63\n2,1,86\n"
 
@@ -34,6 +39,67 @@ def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
     data = load_study_data(study(folder))
     assert data.fit.names == (name,)
     assert not len(data.held_out)
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_a_folder_of_one_sweep_is_a_data_set_of_two_moduli_which_are_fitted(tmp_path, name):
+    data = load_study_data(study(write(tmp_path, {name: SWEEPS[name]})))
+    assert data.fit.names == (f"{name} (storage_modulus)", f"{name} (loss_modulus)")
+    assert load_dataset(tmp_path).with_material_functions().names == data.fit.names
+
+
+def test_an_amplitude_sweep_is_sorted_by_strain_and_converted(tmp_path):
+    run = load_dataset(write(tmp_path, SWEEPS)).material_functions["amplitude_sweep"]
+    storage, loss = run.records
+    np.testing.assert_allclose(run.strain, [0.01, 1.0])
+    np.testing.assert_allclose(run.angular_frequency, [2.0, 2.0])
+    np.testing.assert_allclose(storage.recorded, [50.0, 30.0])
+    np.testing.assert_allclose(loss.recorded, [50.0, 40.0])
+
+
+def test_an_amplitude_sweep_judges_and_the_linear_sweep_gives_modes_unless_asked(tmp_path):
+    folder = write(tmp_path, {**SWEEPS, "runs.csv": "file\na.csv\n", "a.csv": RUN})
+    sweep = [f"amplitude_sweep.csv ({name})" for name in ("storage_modulus", "loss_modulus")]
+    linear = [name.replace("amplitude_sweep", "lve") for name in sweep]
+    plain = load_study_data(study(folder))
+    assert plain.fit.names == ("a.csv",)
+    assert list(plain.held_out.names) == sweep
+    asked = load_study_data(study(folder, amplitude_sweep="fit", lve="judge"))
+    assert list(asked.fit.names) == ["a.csv", *sweep]
+    assert list(asked.held_out.names) == linear
+    one = load_study_data(study(folder, lve="fit", observe=["sigma12", "loss_modulus"]))
+    assert list(one.fit.names) == ["a.csv", linear[1]]
+    assert set(one.held_out.names) == {*sweep, linear[0]}
+
+
+def test_the_check_says_what_each_table_was_taken_for(tmp_path):
+    found = check_folder(write(tmp_path, {**TABLES, **SWEEPS}))
+    said = " ".join(str(finding) for finding in found)
+    assert "amplitude_sweep.csv is taken for an amplitude sweep" in said
+    assert "flow_curve.csv is taken for a flow curve" in said
+    assert "lve.csv is taken for a frequency sweep" in said
+    assert "In amplitude_sweep.csv, strain_percent" in said
+    assert not found.of("error")
+
+
+def test_an_amplitude_sweep_without_a_frequency_is_set_aside_until_one_is_given(tmp_path):
+    folder = write(tmp_path, {"amplitude_sweep.csv": "strain,Gp_Pa,Gpp_Pa\n0.1,5,4\n1,3,4\n"})
+    write(folder, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    assert "no column omega_rad_s" in load_dataset(folder).left_out
+    with pytest.raises(InputError, match="write amplitude_sweep_rad_s"):
+        load_study_data(study(folder, amplitude_sweep="fit"))
+    data = load_study_data(study(folder, amplitude_sweep="judge", amplitude_sweep_rad_s=2.0))
+    np.testing.assert_allclose(data.dataset.runs[1].angular_frequency, 2.0)
+
+
+def test_a_strain_in_per_cent_without_its_unit_is_doubted(tmp_path):
+    rows = [f"{s},2,50,{40 - 0.1 * s}" for s in (1, 10, 100, 300)]
+    text = "\n".join(["strain,omega_rad_s,Gp_Pa,Gpp_Pa", *rows])
+    doubts = check_folder(write(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
+    assert any("strain_percent" in str(doubt) for doubt in doubts)
+    text = text.replace("strain,", "strain_percent,")
+    doubts = check_folder(write(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
+    assert not any("strain_percent" in str(doubt) for doubt in doubts)
 
 
 def test_a_flow_curve_is_sorted_by_rate_and_converted(tmp_path):
@@ -92,6 +158,7 @@ def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
         ("creep.csv", "time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
         ("creep.csv", "time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),
         ("relaxation.csv", "time_s,relaxation_modulus_Pa\n", "relaxation.csv"),
+        ("amplitude_sweep.csv", "strain,omega_rad_s,Gp_Pa,Gpp_Pa\n0,1,1,1\n", "strain .* positive"),
     ],
 )
 def test_a_wrong_table_is_refused_with_file_and_line(tmp_path, name, text, message):
@@ -113,6 +180,12 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
 def test_the_comparison_refuses_what_its_learners_cannot_follow(tmp_path):
     folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
     with pytest.raises(InputError, match=r"is a flow curve, .* discover close-loop fits it"):
+        compare(study(folder))
+
+
+def test_the_comparison_refuses_moduli(tmp_path):
+    folder = write(tmp_path, {"lve.csv": SWEEPS["lve.csv"]})
+    with pytest.raises(InputError, match=r"holds moduli .* discover close-loop fits them"):
         compare(study(folder))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from discover.dataset import units
 from discover.dataset.checking.among_runs import doubts_among_runs
+from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
 from discover.dataset.checking.one_run import doubts_of_run
@@ -27,7 +28,12 @@ from discover.dataset.load import (
     read_index,
     resolve_folder,
 )
-from discover.dataset.material_functions import TABLES, read_material_functions
+from discover.dataset.material_functions import (
+    COMPLIANCE,
+    RELAXATION_MODULUS,
+    TABLES,
+    read_material_functions,
+)
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
@@ -46,6 +52,7 @@ _RUN_QUANTITIES = (
     units.HENCKY_STRAIN,
 )
 _SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
+_TABLE_QUANTITIES = (*_RUN_QUANTITIES, *_SWEEP_QUANTITIES, COMPLIANCE, RELAXATION_MODULUS)
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
 
@@ -97,6 +104,7 @@ def check_folder(
         text = f"The column {shown(column)} in {_files(files)} is not used."
         findings.append(Finding("note", "columns", files[0], text))
     sweep, spectrum, said = _sweep(root, converted)
+    _convert_tables(root, index, converted)
     for text, files in converted.items():
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
@@ -109,14 +117,25 @@ def check_folder(
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
     try:
-        tables = read_material_functions(root, index.columns["file"])
+        tables, aside = read_material_functions(root, index.columns["file"])
     except InputError as error:
-        tables = {}
+        tables, aside = {}, {}
         findings.append(Finding("error", "tables", "", str(error)))
     for table in tables.values():
-        what = f"{table.name} is taken for a {run_line(table)['flow']}"
+        kind = str(run_line(table)["flow"])
+        what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
         text = f"{what}, {len(table)} samples: it judges, unless the study says that it is fitted."
         findings.append(Finding("note", "tables", table.name, text))
+    for name, reason in aside.items():
+        findings.append(Finding("warning", "tables", name, f"{name} is set aside: {reason}."))
+    if sweep is not None and "amplitude_sweep" in tables:
+        text = (
+            f"{SWEEP_FILE} is taken for a frequency sweep at small strain, {len(sweep)} "
+            "frequencies: it gives the modes, and is fitted or judges only if the study says so."
+        )
+        findings.append(Finding("note", "tables", SWEEP_FILE, text))
+    if "amplitude_sweep" in tables:
+        findings += doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)
     findings += _folder(root, index, [*runs, *tables.values()])
     rank = {"error": 0, "warning": 1, "note": 2}
     return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
@@ -240,6 +259,19 @@ def _sweep(
         text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
         return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
+
+
+def _convert_tables(root: Path, index: Table, converted: dict[str, list[str]]) -> None:
+    """Collect the conversions of the tables beside the runs."""
+    for name in (f"{kind}.csv" for kind in TABLES):
+        if name in index.columns["file"] or not (root / name).is_file():
+            continue
+        try:
+            columns = tuple(read_table(root / name).columns)
+            pairs = [(q, units.find_column(columns, q)) for q in _TABLE_QUANTITIES]
+        except InputError:
+            continue  # said when it is read
+        _note_conversions(name, pairs, converted)
 
 
 def _digest(run: Run) -> bytes:

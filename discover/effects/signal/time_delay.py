@@ -13,6 +13,10 @@ class TimeDelay(SignalEffect):
         earlier = record.instrument_times - values[0]
         return jnp.interp(earlier, record.instrument_times, record.stress, left=0.0)
 
+    def response(self, values, frequency):
+        """Return exp(−iωδ)."""
+        return jnp.exp(-1j * frequency * values[0])
+
 
 EFFECT = TimeDelay(
     name="time_delay",

@@ -11,6 +11,10 @@ class TransducerLag(SignalEffect):
         """Return the lagged stress: τ σ_rec' + σ_rec = σ, from rest."""
         return first_order_lag(record.instrument_times, record.stress, values[0])
 
+    def response(self, values, frequency):
+        """Return 1/(1 + iωτ)."""
+        return 1.0 / (1.0 + 1j * frequency * values[0])
+
 
 EFFECT = TransducerLag(
     name="transducer_lag",

@@ -7,6 +7,7 @@ from matplotlib.ticker import EngFormatter
 
 from discover.closed_loop import LoopResult, RunRecord
 from discover.closed_loop.reading import differences
+from discover.protocols.kinematics import MODULI
 from discover.report.plots.style import (
     BEFORE,
     GREEN,
@@ -29,7 +30,8 @@ Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
 
 _FIT, _HELD = NETWORK, SPARSE
-_THOUSANDS = 1e4  # Pa, from which digits would crowd an axis
+THOUSANDS = 1e4
+"""In Pa, from which digits would crowd an axis."""
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
 
@@ -47,8 +49,13 @@ def _label(records: Sequence[RunRecord]) -> str:
     return symbol if all(r.quantity == "strain" for r in records) else f"{symbol} (Pa)"
 
 
+def along_in_common(records: Sequence[RunRecord]) -> str:
+    """Return what records are drawn against, in words for the axis of all of them."""
+    return " or ".join(dict.fromkeys(record.along[0] for record in records))
+
+
 def _as_flow_curve(panel, record: RunRecord) -> None:
-    """Draw stress over rate with logarithmic axes, from a little below the least that was seen."""
+    """Draw states with logarithmic axes, from a little below the least that was seen."""
     seen = record.measured[record.measured > 0.0]
     panel.set_xscale("log")
     if seen.size == record.measured.size:
@@ -62,7 +69,8 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     tension = kinds.pop("tensile_stress", "")
     told = [f"{' or '.join(kinds.values())} in shear"] * bool(kinds)
     told += [f"{tension} in extension"] * bool(tension)
-    return f" Stress is {', '.join(told)}." * (len(found) > 1)
+    what = "Recorded is" if found & set(MODULI) else "Stress is"
+    return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
 def runs_picture(result: LoopResult) -> Picture:
@@ -75,8 +83,7 @@ def runs_picture(result: LoopResult) -> Picture:
             panel.set_visible(False)
         for panel, record in zip(axes.ravel(), records, strict=False):
             every = max(1, record.time.size // 60)
-            along = record.time if record.is_transient else np.abs(record.rate)
-            draw_run(panel, record, along, slice(None, None, every), slice(None))
+            draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -86,18 +93,17 @@ def runs_picture(result: LoopResult) -> Picture:
                 make_logarithmic(panel.xaxis)
             if not record.is_transient:
                 _as_flow_curve(panel, record)
-            elif high > _THOUSANDS:
+            elif high > THOUSANDS:
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
         below = {panel for panel in axes[-1]}
         for panel, record in zip(axes.ravel(), records, strict=False):
-            if not record.is_transient:
-                panel.set_xlabel("shear rate (1/s)")
-            elif panel in below:
-                panel.set_xlabel("time (s)")
-        for row in range(rows):
-            panel_records = records[row * columns : (row + 1) * columns]
-            axes[row, 0].set_ylabel(_label(panel_records[:1]))
+            if panel in below or not record.is_transient:
+                panel.set_xlabel(record.along[0])
+        for place, (panel, record) in enumerate(zip(axes.ravel(), records, strict=False)):
+            # once a row, unless something else is recorded
+            if place % columns == 0 or record.quantity != records[place - 1].quantity:
+                panel.set_ylabel(_label([record]))
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -160,6 +166,8 @@ def shortened(name: str, longest: int = 30) -> str:
     longest
         Most characters.
     """
+    for modulus in MODULI:
+        name = name.replace(f".csv ({modulus})", f" {FIGURE_SYMBOLS[modulus]}")
     name = name.removesuffix(".csv")
     if len(name) <= longest:
         return name
@@ -170,10 +178,10 @@ def shortened(name: str, longest: int = 30) -> str:
 def residual_picture(result: LoopResult) -> Picture:
     """Return the residual against time and strain, before and after."""
     records = [record for record in result.records if record.is_transient]
-    only_steady = not records
+    only_states = not records
     records = records or list(result.records)
-    start_ups = only_steady or all(map(_through_decades, records))
-    labels = ("shear rate (1/s)", _label(records)) if only_steady else ("time (s)", "strain")
+    start_ups = only_states or all(map(_through_decades, records))
+    labels = (along_in_common(records), _label(records)) if only_states else ("time (s)", "strain")
     with figure(2, 2, height=2.4) as (drawing, axes):
         for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
             limit = 0.0
@@ -185,9 +193,8 @@ def residual_picture(result: LoopResult) -> Picture:
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
                 }
-                along = (
-                    (record.rate, record.measured) if only_steady else (record.time, record.strain)
-                )
+                other = record.measured if only_states else record.strain
+                along = (record.along[1], other)
                 axes[row, 0].plot(along[0], relative, **style)
                 # a logarithmic axis has no place for strains against the positive direction
                 axes[row, 1].plot(np.abs(along[1]) if start_ups else along[1], relative, **style)
@@ -205,7 +212,7 @@ def residual_picture(result: LoopResult) -> Picture:
             drawing,
             "residual",
             "Prediction minus measurement, over each run's root-mean-square stress, against "
-            + ("rate and stress" if only_steady else "time and strain")
+            + ("what was varied and what was measured" if only_states else "time and strain")
             + ". Note the different scales above and below. What is left should look like "
             "noise around zero; anything else is an effect still missing.",
         )

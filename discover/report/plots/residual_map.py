@@ -11,7 +11,7 @@ from discover.closed_loop.result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
 from discover.report.plots.flows import units
-from discover.report.plots.loop import shortened
+from discover.report.plots.loop import along_in_common, shortened
 from discover.report.plots.style import (
     INK,
     NETWORK,
@@ -51,22 +51,22 @@ class ResidualRow:
 def loop_residual_map(result: LoopResult) -> Picture:
     """Return the residual of every run before and after, over time or strain."""
     transients = [record for record in result.records if record.is_transient]
-    steady = not transients
+    states = not transients
     records = sorted(
         transients or result.records, key=lambda r: (r.held_out, np.max(np.abs(r.rate)))
     )
-    started = steady or all(runs_through_decades(r.time, r.rate) for r in records)
+    started = states or all(runs_through_decades(r.time, r.rate) for r in records)
     panels = {}
     for stage, title in ((0, "declared model"), (-1, "augmented model")):
         panels[title] = [
             ResidualRow(
                 f"{shortened(r.name)}{' (held out)' if r.held_out else ''}",
-                r.rate if steady else r.strain if started else r.time,
+                r.along[1] if states else r.strain if started else r.time,
                 r.relative_residual[stage],
             )
             for r in records
         ]
-    label = "shear rate (1/s)" if steady else "strain" if started else "time (s)"
+    label = along_in_common(records) if states else "strain" if started else "time (s)"
     return _draw(panels, label, started, "from slow to fast")
 
 

@@ -1,0 +1,63 @@
+"""First harmonics of oscillations that scipy integrates until they are periodic."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+SAMPLES = 128
+"""Of one cycle."""
+
+
+def oscillating(
+    change: Callable, start: Sequence[float], frequency: float, cycles: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and states over the cycle that follows a number of them."""
+    period = 2.0 * np.pi / frequency
+    times = (cycles + np.arange(SAMPLES) / SAMPLES) * period
+    found = solve_ivp(
+        change, (0.0, times[-1]), start, method="LSODA", t_eval=times, rtol=1e-9, atol=1e-9
+    )
+    return times, found.y
+
+
+def first_harmonic(times: np.ndarray, stress: np.ndarray, frequency: float) -> complex:
+    """Return G′ + iG″ times the strain of a stress over one cycle, for the strain sin ωt."""
+    turn = np.exp(-1j * frequency * times)
+    return complex(2j * np.mean(stress * turn))
+
+
+def giesekus_modulus(
+    mobility: float,
+    modulus: float,
+    relaxation_time: float,
+    strain: float,
+    frequency: float,
+    slip: float = 0.0,
+) -> complex:
+    """Return G′ + iG″ in Pa of a Giesekus fluid   [Giesekus 1982, JNNFM 11, 69].
+
+    Parameters
+    ----------
+    mobility, modulus, relaxation_time
+        α, G in Pa and λ in s.
+    strain, frequency
+        Of the tool: γ₀ sin ωt.
+    slip
+        In 1/(Pa s): the fluid feels the rate less this times its stress.
+    """
+
+    def change(t, y):
+        first, second, third, shear = y
+        rate = strain * frequency * np.cos(frequency * t) - slip * modulus * shear
+        quadratic = [first**2 + shear**2, second**2 + shear**2, third**2]
+        quadratic.append(shear * (first + second))
+        convected = [2.0 * rate * shear, 0.0, 0.0, rate * (1.0 + second)]
+        return [
+            c - (s + mobility * q) / relaxation_time
+            for c, s, q in zip(convected, y, quadratic, strict=True)
+        ]
+
+    cycles = int(np.ceil(25.0 * relaxation_time * frequency / (2.0 * np.pi))) + 2
+    times, values = oscillating(change, [0.0] * 4, frequency, cycles)
+    return modulus * first_harmonic(times, values[3], frequency) / strain

@@ -1,0 +1,269 @@
+"""Periodic states of a fluid in oscillatory shear, and the moduli of their first harmonic."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from discover.forward.dynamics import Dynamics
+from discover.forward.integrator import step_weights
+from discover.simulate.exponential_runge_kutta import KrogstadWeights, relax
+
+# Half cycles from rest before Newton's steps, most iterations in all, and the relative step below
+# which the next one would change nothing that is seen: Newton's error goes as its square
+_FROM_REST, _MOST, _TOLERANCE = 2, 60, 1e-8
+
+# A step that made things worse is tried again this much shorter; below the other, it is rounding
+_SHORTER, _EXACT = 0.25, 1e-12
+
+# Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
+_SHARE, _SECANT = 10.0, (0.2, 5.0)
+
+# Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
+_ROUNDING = 1e-13
+
+# Half a period later the flow is its own mirror image in the plane across it
+_MIRROR = jnp.array([1.0, 1.0, 1.0, -1.0])[:, None]
+
+
+class _Half(NamedTuple):
+    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends."""
+
+    stress: Float[Array, "4 k"]
+    levels: tuple[Float[Array, ""], ...]
+    left: tuple[Float[Array, ""], ...]
+    wave: Float[Array, " s"]
+
+
+class _Iterate(NamedTuple):
+    """An approximation to the state at zero strain, and the best one that was tried."""
+
+    stress: Float[Array, "4 k"]
+    levels: tuple[Float[Array, ""], ...]
+    felt: Float[Array, ""]
+    felt_before: Float[Array, ""]
+    lacking_before: Float[Array, ""]
+    moved: Float[Array, ""]
+    best: Float[Array, "4 k"]
+    best_misfit: Float[Array, " k"]
+    best_step: Float[Array, "4 k"]
+    share: Float[Array, " k"]
+    number: Float[Array, ""]
+    change: Float[Array, ""]
+
+
+def complex_modulus(
+    dynamics: Dynamics,
+    strain: Float[Array, ""],
+    frequency: Float[Array, ""],
+    phase: Float[Array, " m"],
+    beside: Callable[[Float[Array, " s"]], Float[Array, " s"]],
+) -> Complex[Array, ""]:
+    """Return G′ + iG″ in Pa of the first harmonic at a strain γ₀ sin ωt of the tool.
+
+    The periodic state is solved for and not waited for: it is the fixed point of half a cycle
+    followed by the mirror image that half a period is in simple shear. Newton's steps take the
+    derivative of that map along the four components of each mode, which change by themselves; a
+    step that leads astray is shortened   [shooting and the modified Newton method: Stoer & Bulirsch
+    2002, Introduction to Numerical Analysis, sections 7.3 and 5.4]. Not finite where this does not
+    converge.
+
+    G′ = (2/Tγ₀) ∫ σ sin ωt dt and G″ = (2/Tγ₀) ∫ σ cos ωt dt   [Hyun et al. 2011, Prog. Polym. Sci.
+    36, 1697]. Slip and compliance in series take their share of the first harmonic; that they also
+    feel the higher ones is neglected.
+
+    Parameters
+    ----------
+    dynamics
+        The fluid, with what gives way in series with it.
+    strain, frequency
+        Amplitude γ₀ and ω in rad/s.
+    phase
+        ωt at step ends and middles in turn over half a cycle, 0 to π, evenly spaced.
+    beside
+        Recorded stress beside the modes in Pa, of rates in 1/s.
+    """
+    wave = frequency * jnp.cos(phase)
+    width = (phase[2] - phase[0]) / frequency
+    half = _half_cycle(dynamics, wave, width)
+
+    def modulus(found: _Half, felt):
+        stress = found.wave + beside(felt * wave[::2])
+        return first_harmonic(stress, phase[::2]) / felt
+
+    def taken(whole):
+        """Return by how much the tool turns further than the fluid."""
+        series = dynamics.series
+        if series is None:
+            return jnp.ones((), dtype=complex)
+        return 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
+
+    def improved(now: _Iterate) -> _Iterate:
+        found, jacobian = _with_derivative(half, now)
+        difference = found.stress - now.stress
+        misfit = _size(difference) / (1.0 + _size(now.stress))
+        begins = now.number <= _FROM_REST
+        # never where it is not a number
+        # what changed beside the modes since may cost its share
+        better = (misfit <= now.best_misfit + _SHARE * now.moved) | (misfit < _EXACT)
+        better = better | (begins & jnp.isfinite(misfit))
+        matrix = jnp.eye(4) - jnp.swapaxes(jacobian, 1, 2)
+        step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
+        step = jnp.where(now.number < _FROM_REST, difference, step)
+        step = jnp.where(better, step, now.best_step)
+        best = jnp.where(better, now.stress, now.best)
+        share = jnp.where(better, 1.0, _SHORTER * now.share)
+        stress = best + share * step
+        levels = tuple(
+            # what a cycle adds and leaves decides where a level comes to rest
+            (after - left * before) / (1.0 - left)
+            for before, after, left in zip(now.levels, found.levels, found.left, strict=True)
+        )
+        felt, lacking = next_felt(now, found)
+        told = 1.0 + _ROUNDING / _TOLERANCE * frequency * dynamics.modes.relaxation_time
+        changes = [
+            jnp.max(_size(stress - now.stress) / (1.0 + _size(now.stress)) / told),
+            jnp.abs(felt / now.felt - 1.0),
+            *(jnp.abs(a - b) for a, b in zip(levels, now.levels, strict=True)),
+        ]
+        return _Iterate(
+            stress=stress,
+            levels=levels,
+            felt=felt,
+            felt_before=now.felt,
+            lacking_before=lacking,
+            moved=jnp.max(jnp.stack(changes[1:])),
+            best=best,
+            best_misfit=jnp.where(better, misfit, now.best_misfit),
+            best_step=step,
+            share=share,
+            number=now.number + 1.0,
+            change=jnp.where(jnp.all(better), jnp.max(jnp.stack(changes)), jnp.inf),
+        )
+
+    def next_felt(now: _Iterate, found: _Half):
+        """Return the next amplitude that the fluid feels, by the secant, and what it lacked."""
+        if dynamics.series is None:
+            return now.felt, now.lacking_before
+        lacking = jnp.log(strain / now.felt) - jnp.log(jnp.abs(taken(modulus(found, now.felt))))
+        lacking = jnp.where(jnp.isfinite(lacking), lacking, 0.0)
+        passed = jnp.log(now.felt / now.felt_before)
+        slope = (now.lacking_before - lacking) / jnp.where(passed == 0.0, 1.0, passed)
+        # 1 of a linear fluid; small of one that thins and gives way
+        slope = jnp.where(passed == 0.0, 1.0, jnp.clip(slope, *_SECANT))
+        return now.felt * jnp.exp(lacking / slope), lacking
+
+    stress, levels = dynamics.rest()
+    free = jnp.full(stress.shape[1], jnp.inf)
+    amplitude, zero = jnp.asarray(strain), jnp.zeros(())
+    start = _Iterate(
+        stress=stress,
+        levels=levels,
+        felt=amplitude,
+        felt_before=amplitude,
+        lacking_before=zero,
+        moved=zero,
+        best=stress,
+        best_misfit=free,
+        best_step=jnp.zeros_like(stress),
+        share=jnp.ones_like(free),
+        number=zero,
+        change=jnp.asarray(jnp.inf),
+    )
+    end = jax.lax.while_loop(
+        lambda now: (now.number < _MOST) & ~((now.number > _FROM_REST) & (now.change < _TOLERANCE)),
+        improved,
+        start,
+    )
+    whole = modulus(half(end.stress, end.levels, end.felt), end.felt)
+    found = whole / taken(whole)
+    return jnp.where(end.change < _TOLERANCE, found, jnp.nan)
+
+
+def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Complex[Array, ""]:
+    """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
+
+    Parameters
+    ----------
+    stress
+        In Pa over half a cycle, its ends included.
+    phase
+        ωt there, 0 to π, evenly spaced.
+    """
+    # of a periodic function the trapezoidal rule over a period is exact to all orders
+    share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
+    return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
+
+
+def _size(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
+    return jnp.max(jnp.abs(stress), axis=0)
+
+
+def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]:
+    """Return half a cycle, and of each mode the derivative of its end: direction, component."""
+
+    def along(unit):
+        direction = unit[:, None] * jnp.ones(now.stress.shape)
+        of_stress = jax.jvp(
+            lambda stress: half(stress, now.levels, now.felt), (now.stress,), (direction,)
+        )
+        return of_stress[0], of_stress[1].stress
+
+    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(4))
+    return found, jnp.moveaxis(tangents, 2, 0)
+
+
+def _half_cycle(dynamics: Dynamics, wave, width):
+    """Return the function from state and strain amplitude to what half a cycle makes of them."""
+    linear_relaxation, combined = dynamics.linear_relaxation, dynamics.combined
+    weights = step_weights(dynamics.modes.relaxation_time, width[None], linear_relaxation)[0]
+    w = KrogstadWeights(*weights)
+
+    def remainder(stress, rate, slow):
+        change = dynamics.change(stress, rate, slow, None)
+        return change + stress if linear_relaxation else change
+
+    def relaxed(levels, rate, stress, share):
+        pairs = [e.source_and_decay(v, rate, stress) for e, v in dynamics.states.items()]
+        after = [
+            relax(source, decay, level, share * width)
+            for (source, decay), level in zip(pairs, levels, strict=True)
+        ]
+        return after, [jnp.exp(-decay * share * width) for _, decay in pairs]
+
+    def sheared(stress, rate):
+        return dynamics.sheared(stress, rate, None)[0]
+
+    def half(stress, levels, amplitude) -> _Half:
+        rate = amplitude * wave
+
+        def step(carry, rates):
+            stress, levels, left = carry
+            first, middle, last = rates
+            before = combined("modulus_factor", levels) * sheared(stress, middle)
+            halfway, _ = relaxed(levels, middle, before, 0.5)
+            at_end, _ = relaxed(levels, middle, before, 1.0)
+            slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
+            n1 = remainder(stress, first, slow[0])
+            n2 = remainder(w.half * stress + w.a21 * n1, middle, slow[1])
+            n3 = remainder(w.half * stress + w.a31 * n1 + w.a32 * n2, middle, slow[1])
+            n4 = remainder(w.full * stress + w.a41 * n1 + w.a43 * n3, last, slow[2])
+            stress = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
+            after = combined("modulus_factor", at_end) * sheared(stress, middle)
+            levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
+            left = [a * b for a, b in zip(left, kept, strict=True)]
+            return (stress, levels, left), combined("modulus_factor", levels) * sheared(
+                stress, last
+            )
+
+        begun = combined("modulus_factor", levels) * sheared(stress, rate[0])
+        start = (stress, list(levels), [jnp.ones(())] * len(levels))
+        (stress, levels, left), recorded = jax.lax.scan(
+            step, start, (rate[:-2:2], rate[1::2], rate[2::2])
+        )
+        recorded = jnp.concatenate([begun[None], recorded])
+        return _Half(_MIRROR * stress, tuple(levels), tuple(left), recorded)
+
+    return half

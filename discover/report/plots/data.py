@@ -1,0 +1,249 @@
+"""Pictures of a data folder as it was read: every test, and how tests agree with one another."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.ticker import EngFormatter
+
+from discover.dataset.dataset import Dataset
+from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
+from discover.dataset.run import Run
+from discover.dataset.run_table import run_line
+from discover.report.plots.loop import THOUSANDS, shortened
+from discover.report.plots.style import (
+    BEFORE,
+    GREEN,
+    NETWORK,
+    SPARSE,
+    Picture,
+    figure,
+    legend_above,
+    literal,
+    make_logarithmic,
+    picture,
+    runs_through_decades,
+)
+from discover.report.wording import FIGURE_SYMBOLS, percent
+
+_MOST_RUNS = 24
+"""Panels of runs, beyond which a page is too long to look through."""
+
+_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
+_MOST_POINTS = 300
+
+
+def data_pictures(dataset: Dataset, spectrum: RelaxationSpectrum | None) -> list[Picture]:
+    """Return what can be drawn of a data set, the tests that say most of the columns first.
+
+    Parameters
+    ----------
+    dataset
+        The data.
+    spectrum
+        The modes of its linear sweep, if it has one.
+    """
+    drawn = [_runs(dataset.runs)] if len(dataset) else []
+    sweep, tables = dataset.linear_sweep, dataset.material_functions
+    if sweep is not None:
+        drawn.append(_linear_sweep(sweep, spectrum))
+    if "amplitude_sweep" in tables:
+        drawn.append(_amplitude_sweep(tables["amplitude_sweep"], sweep))
+    if "flow_curve" in tables:
+        drawn.append(_flow_curve(tables["flow_curve"], sweep))
+    if over_time := [tables[kind] for kind in ("relaxation", "creep") if kind in tables]:
+        drawn.append(_over_time(over_time))
+    return drawn
+
+
+def _runs(runs: Sequence[Run]) -> Picture:
+    shown = runs[:_MOST_RUNS]
+    columns = min(4, len(shown))
+    rows = -(-len(shown) // columns)
+    with figure(rows, columns, width=10.0, height=2.1) as (drawing, axes):
+        for panel in axes.ravel()[len(shown) :]:
+            panel.set_visible(False)
+        for panel, run in zip(axes.ravel(), shown, strict=False):
+            _draw_run(panel, run)
+        for panel in axes[-1]:
+            panel.set_xlabel("time (s)")
+        for place, (panel, run) in enumerate(zip(axes.ravel(), shown, strict=False)):
+            # once a row, unless something else is recorded
+            if place % columns == 0 or run.quantity != shown[place - 1].quantity:
+                unit = "" if run.quantity == "strain" else " (Pa)"
+                panel.set_ylabel(FIGURE_SYMBOLS[run.quantity] + unit)
+        legend_above(drawing, axes)
+        more = f" The first {len(shown)} of {len(runs)} runs." if len(runs) > len(shown) else ""
+        return picture(
+            drawing,
+            "runs",
+            "Every run: what was recorded (left axes) and what was imposed (right axes, dashed: a "
+            "rate in 1/s, or a stress in Pa)." + more,
+        )
+
+
+def _draw_run(panel, run: Run) -> None:
+    every = slice(None, None, max(1, len(run) // _MOST_POINTS))
+    time = run.time[every]
+    given_stress = run.protocol.control == "stress"
+    panel.plot(time, run.recorded[every], color=NETWORK, lw=1.4, label="recorded")
+    for quantity, colour in zip(run.beside, (SPARSE, GREEN), strict=False):
+        values = run.observing(quantity).recorded[every]
+        panel.plot(time, values, color=colour, lw=1.0, label=FIGURE_SYMBOLS[quantity])
+    other = panel.twinx()
+    imposed = run.stress if given_stress else run.rate
+    other.plot(time, imposed[every], color=BEFORE, lw=1.0, ls="--", label="imposed")
+    other.tick_params(axis="y", labelcolor=BEFORE, labelsize=6.5)
+    other.grid(visible=False)
+    panel.plot([], [], color=BEFORE, lw=1.0, ls="--", label="imposed")
+    low, high = float(np.min(imposed)), float(np.max(imposed))
+    if high - low <= 1e-6 * max(abs(low), abs(high)):
+        size = abs(high) or 1.0
+        # in the middle, so that it hides neither end of what was recorded
+        other.set_ylim(high - size, high + size)
+        other.set_yticks([high], [f"{high:.3g}"])
+    if runs_through_decades(run.time, np.ones(1) if given_stress else run.rate):
+        make_logarithmic(panel.xaxis)
+    if float(np.max(np.abs(run.recorded))) > THOUSANDS:
+        panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
+    panel.tick_params(labelsize=7)
+    panel.set_title(f"{literal(shortened(run.name))}\n{run_line(run)['flow']}", fontsize=8)
+
+
+def _moduli(panel, along, storage, loss, suffix: str = "", **style) -> None:
+    for symbol, values, marker, colour in (
+        ("G′", storage, "o", NETWORK),
+        ("G″", loss, "s", SPARSE),
+    ):
+        panel.plot(along, values, color=colour, marker=marker, label=symbol + suffix, **style)
+
+
+def _linear_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum | None) -> Picture:
+    omega = sweep.angular_frequency
+    with figure(1, 2, width=10.0, height=3.2) as (drawing, axes):
+        panel, modes = axes[0]
+        _moduli(panel, omega, sweep.storage_modulus, sweep.loss_modulus, **_POINTS)
+        panel.set(xscale="log", yscale="log", xlabel="ω (rad/s)", ylabel="G′, G″ (Pa)")
+        caption = "lve.csv: G′ and G″ against frequency."
+        if spectrum is None:
+            modes.set_visible(False)
+        else:
+            dense = np.geomspace(omega[0], omega[-1], 200)
+            for values, colour in zip(spectrum.moduli(dense), (NETWORK, SPARSE), strict=True):
+                panel.plot(dense, values, color=colour, lw=1.0)
+            panel.plot([], [], color=BEFORE, lw=1.0, label="modes")
+            modes.plot(
+                spectrum.relaxation_time, spectrum.modulus, color=GREEN, marker="D", **_POINTS
+            )
+            modes.set(xscale="log", yscale="log", xlabel="λ (s)", ylabel="G of each mode (Pa)")
+            for edge in (1.0 / omega[0], 1.0 / omega[-1]):
+                modes.axvline(edge, color=BEFORE, lw=0.8, ls=":")
+            caption += (
+                f" Lines: the {counted(len(spectrum), 'mode')} found from it, off by "
+                f"{percent(spectrum.relative_error)} (root mean square). Right: modulus and time "
+                "of each; dotted, the ends of the sweep, beyond which it says nothing of them."
+            )
+        legend_above(drawing, axes)
+        return picture(drawing, "linear_sweep", caption)
+
+
+def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> Picture:
+    assert run.strain is not None
+    assert run.storage_modulus is not None
+    assert run.loss_modulus is not None
+    omega = run.angular_frequency
+    with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
+        panel = axes[0, 0]
+        groups = np.unique(np.round(omega, 9))
+        for value in groups:
+            at = np.isclose(omega, value)
+            suffix = f", {value:.3g} rad/s" if len(groups) < 4 else ""
+            style = {**_POINTS, "ls": "-", "lw": 0.6}
+            moduli = run.storage_modulus[at], run.loss_modulus[at]
+            _moduli(panel, run.strain[at], *moduli, suffix, **style)
+        caption = "amplitude_sweep.csv: the moduli of the first harmonic against strain amplitude."
+        if sweep is not None:
+            edges = sweep.angular_frequency
+            inside = groups[(groups >= edges[0]) & (groups <= edges[-1])]
+            for values, colour in (
+                (sweep.storage_modulus, NETWORK),
+                (sweep.loss_modulus, SPARSE),
+            ):
+                levels = np.interp(np.log(inside), np.log(edges), values)
+                for level in levels:
+                    panel.axhline(level, color=colour, lw=0.8, ls=":")
+            caption += " Dotted: lve.csv at these frequencies, which small strains should meet."
+        panel.set(xscale="log", xlabel="strain amplitude γ₀", ylabel="G′, G″ (Pa)")
+        _decades_where_positive(panel, np.concatenate([run.storage_modulus, run.loss_modulus]))
+        legend_above(drawing, axes)
+        return picture(drawing, "amplitude_sweep", caption)
+
+
+def _decades_where_positive(panel, values: Float[np.ndarray, " n"]) -> None:
+    """Make the axis of values logarithmic, unless some have no place on it."""
+    if np.all(values > 0.0):
+        panel.set_yscale("log")
+
+
+def _flow_curve(run: Run, sweep: LinearSweep | None) -> Picture:
+    with figure(1, 2, width=10.0, height=3.2) as (drawing, axes):
+        panel, viscosity = axes[0]
+        panel.plot(run.rate, run.stress, color=NETWORK, marker="o", label="σ₁₂", **_POINTS)
+        for quantity, colour in zip(run.beside, (SPARSE, GREEN), strict=False):
+            values = run.observing(quantity).recorded
+            panel.plot(
+                run.rate,
+                values,
+                color=colour,
+                marker="^",
+                label=FIGURE_SYMBOLS[quantity],
+                **_POINTS,
+            )
+        panel.set(xscale="log", xlabel="shear rate (1/s)", ylabel="stress (Pa)")
+        _decades_where_positive(panel, run.stress)
+        viscosity.plot(
+            run.rate, run.stress / run.rate, color=NETWORK, marker="o", label="η = σ₁₂/γ̇", **_POINTS
+        )
+        caption = "flow_curve.csv: steady stress, and steady viscosity (right)."
+        if sweep is not None:
+            omega = sweep.angular_frequency
+            size = np.hypot(sweep.storage_modulus, sweep.loss_modulus) / omega
+            viscosity.plot(omega, size, color=GREEN, lw=1.2, label="|η*| of lve.csv")
+            caption += (
+                " Right, the complex viscosity at ω equal to the shear rate: most melts and "
+                "solutions follow it (Cox and Merz 1958); a constant factor between the two is a "
+                "unit or a loading, and gels and suspensions need not follow it."
+            )
+        viscosity.set(xscale="log", xlabel="γ̇ (1/s) or ω (rad/s)", ylabel="viscosity (Pa s)")
+        _decades_where_positive(viscosity, run.stress)
+        legend_above(drawing, axes)
+        return picture(drawing, "flow_curve", caption)
+
+
+def linear_function(run: Run) -> tuple[str, Float[np.ndarray, " n"], str]:
+    """Return symbol, values and unit of a linear function in time, as its file holds it."""
+    if run.quantity == "strain":
+        return "J", run.recorded / run.stress, "1/Pa"
+    return "G", run.recorded / np.asarray(run.strain), "Pa"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _over_time(runs: Sequence[Run]) -> Picture:
+    with figure(1, len(runs), width=5.0 * len(runs), height=3.0) as (drawing, axes):
+        for panel, run in zip(axes[0], runs, strict=True):
+            symbol, values, unit = linear_function(run)
+            panel.plot(run.time, values, color=NETWORK, marker="o", **_POINTS)
+            panel.set(
+                xscale="log",
+                yscale="log",
+                xlabel="time (s)",
+                ylabel=f"{symbol} ({unit})",
+                title=literal(run.name),
+            )
+        return picture(
+            drawing, "over_time", "Linear material functions in time, as they were read."
+        )

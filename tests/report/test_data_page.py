@@ -1,0 +1,96 @@
+"""The page on a data folder: every test drawn, what it was taken for, a study that runs."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from independent.folders import maxwell_sweep, write_table
+from typer.testing import CliRunner
+
+from discover.cli.app import app
+from discover.dataset import load_dataset
+from discover.dataset.checking.folder import check_folder
+from discover.report.data_page import data_page, first_study
+from discover.study import parse_study
+from discover.study.build import declared_model, load_study_data
+
+OMEGA = np.geomspace(0.1, 100.0, 12)
+
+
+def sweeps(folder):
+    """Write a linear sweep, an amplitude sweep ten times too large, and a flow curve."""
+    write_table(folder / "lve.csv", maxwell_sweep([100.0], [1.0], OMEGA))
+    strain = np.geomspace(0.01, 1.0, 6)
+    columns = {"strain": strain, "omega_rad_s": np.full(6, 1.0)}
+    columns |= {"Gp_Pa": np.full(6, 500.0), "Gpp_Pa": np.full(6, 500.0)}
+    write_table(folder / "amplitude_sweep.csv", columns)
+    write_table(folder / "flow_curve.csv", {"shear_rate_1_s": OMEGA, "stress_Pa": 10.0 * OMEGA})
+    return folder
+
+
+def runs(folder):
+    """Write three start-ups, one of whose names would be markup."""
+    time = np.geomspace(0.01, 10.0, 30)
+    names = ["slow.csv", "<b>fast.csv", "middle.csv"]
+    for name, rate in zip(names, (0.1, 5.0, 1.0), strict=True):
+        stress = 100.0 * rate * (1.0 - np.exp(-time))
+        write_table(
+            folder / name,
+            {"time_s": time, "shear_rate_1_s": np.full(30, rate), "stress_Pa": stress},
+        )
+    (folder / "runs.csv").write_text("file\n" + "\n".join(names) + "\n")
+    return folder
+
+
+def page_of(folder):
+    return data_page(load_dataset(folder), check_folder(folder), str(folder))
+
+
+def test_every_test_is_drawn_and_named_and_markup_in_a_name_is_text(tmp_path):
+    page = page_of(runs(sweeps(tmp_path)))
+    assert re.findall(r'<figure id="(\w+)"', page) == [
+        "runs", "linear_sweep", "amplitude_sweep", "flow_curve",
+    ]  # fmt: skip
+    for kind in ("start-up", "frequency sweep", "amplitude sweep", "flow curve"):
+        assert f'<td class="text">{kind}</td>' in page
+    assert "<b>fast" not in page
+    assert not re.search(r'(src|href)="(?!#)', page)
+
+
+def test_only_what_is_there_is_drawn(tmp_path):
+    page = page_of(runs(tmp_path))
+    assert re.findall(r'<figure id="(\w+)"', page) == ["runs"]
+
+
+def test_what_the_check_doubts_stands_on_the_page(tmp_path):
+    page = page_of(sweeps(tmp_path))
+    # √2 · 500 Pa where the linear sweep has √2 · 50 Pa
+    assert "is 10 times that of lve.csv" in page
+    assert "nothing doubtful" not in page
+
+
+@pytest.mark.parametrize("write", [sweeps, runs, lambda folder: runs(sweeps(folder))])
+def test_the_study_to_start_from_loads_with_its_model(tmp_path, write):
+    folder = write(tmp_path)
+    text = first_study(load_dataset(folder), str(folder))
+    study = parse_study(tomllib.loads(text))
+    data = load_study_data(study)
+    assert declared_model(study, data.dataset).modulus.size
+    if (folder / "runs.csv").exists():
+        # the fastest is the one that judges
+        assert "<b>fast.csv" in data.held_out.names
+    else:
+        assert len(data.fit) == 3
+
+
+def test_the_command_writes_page_and_study_and_says_where(tmp_path):
+    folder = tmp_path / "melt"
+    folder.mkdir()
+    out = tmp_path / "seen"
+    shown = CliRunner().invoke(app, ["data", "show", str(sweeps(folder)), "--out", str(out)])
+    assert shown.exit_code == 0
+    assert "amplitude sweep" in shown.output
+    assert sorted(path.name for path in out.iterdir()) == ["report.html", "study.toml"]
+    assert str(folder) in (out / "study.toml").read_text()
+    assert not [path for path in folder.iterdir() if path.suffix != ".csv"]
