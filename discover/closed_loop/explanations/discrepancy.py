@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
@@ -93,7 +93,7 @@ def posterior(
         return samples * np.log(noise(narrowness)) + widths
 
     ends = np.log(power[0]) + np.array([-_DECADES, _DECADES]) * np.log(10.0)
-    narrowness = float(np.exp(minimize_scalar(unlikely, bounds=ends, method="bounded").x))
+    narrowness = float(np.exp(fminbound(unlikely, *ends)))
     mean = (np.sqrt(share * power) * seen / (power + narrowness)) @ right
     root = np.sqrt(noise(narrowness) / (power + narrowness))[:, None] * right
     return mean, root
