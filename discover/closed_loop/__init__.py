@@ -2,6 +2,8 @@
 
 from discover.closed_loop.attribution import Attribution, CandidateScore
 from discover.closed_loop.each_run import run_loop_on_each
+from discover.closed_loop.explanation import Explanation, Explanations
+from discover.closed_loop.free_curve import FreeForm
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.result import (
     ConstantByMode,
@@ -21,7 +23,10 @@ __all__ = [
     "ConstantByMode",
     "DeclaredModel",
     "ErrorPair",
+    "Explanation",
+    "Explanations",
     "Fold",
+    "FreeForm",
     "LoopResult",
     "ModeConstant",
     "RunRecord",

@@ -18,6 +18,7 @@ from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations import BEAM_WIDTH, carry, explain, with_band
 from discover.closed_loop.finer_steps import on_finer_steps
+from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.numerical_resolution import NumericalResolution
@@ -216,10 +217,12 @@ def run_loop(
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
-    side_by_side = Explanations()
+    side_by_side, forms = Explanations(), ()
     if carried:
         runs = (fitted_runs, held_runs)
         tried = [effect.name for effect in candidates if search.admitted(effect)]
+        if judgement.structured and judgement.verdict == "unexplained":
+            forms = free_forms(search, fitted_runs, held_batch, held_runs)
         side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
@@ -254,6 +257,7 @@ def run_loop(
         declared_effects=_declared_effects(model, current, bounds, by_mode),
         declared_law=None if differ & {*of_law} else _declared_law(declared, current),
         explanations=side_by_side,
+        free_form=forms,
         fluid=None if differ else _fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )

@@ -17,6 +17,7 @@ from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
 from discover.report.page import made_by, render
 from discover.report.plots.by_mode import by_mode_picture
+from discover.report.plots.free_form import free_form_picture
 from discover.report.plots.loop import (
     ranking_picture,
     reading_picture,
@@ -68,6 +69,7 @@ def write_loop(
         waterfall_picture(result),
         runs_picture(result),
         lissajous_picture(result),
+        free_form_picture(result),
         loop_residual_map(result),
         residual_picture(result),
         reading_picture(result),

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.closed_loop.result import ConstantByMode, LoopResult, Stage, StageParameter
+from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
     effect_title,
     estimate,
@@ -76,6 +77,10 @@ def _loop_found(result: LoopResult) -> str:
             verdict = _UNKNOWN_NOISE
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
+        if result.free_form and result.free_form[0].explains:
+            parts.append(f"but {free_form_sentence(result.free_form[0])}")
+        elif result.free_form:
+            parts.append(f"and {free_form_sentence(result.free_form[0])}")
     return sentence([verdict, *parts])
 
 

@@ -1,0 +1,119 @@
+"""A free function that was found, and the closed form that is nearest to it."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import curve_fit
+
+from discover.closed_loop.error_pair import ErrorPair
+
+Slot = Literal["recorded_stress", "drift", "network", "rate"]
+
+_WITHIN = 2.0
+"""A closed form is the nearest one if it stays within so many standard deviations of the curve in
+the mean square; or within `_CLOSE` of the curve's own size, where the curve is known better."""
+_CLOSE = 0.05
+
+
+@dataclass(frozen=True)
+class FreeForm:
+    """A smooth function that explains what named effects leave.
+
+    Attributes
+    ----------
+    slot
+        Where it acts: ``recorded_stress``, σ + f(σ) is recorded; ``drift``, σ + f(t); ``rate``,
+        σ + f(γ̇); ``network``, σ (1 + f(γ)).
+    variable, unit
+        Of what it is a function, and its unit.
+    beside
+        Effects in the model with it.
+    grid, value, low95, high95
+        The curve, in Pa (``network``: a pure number), with its 95 % band, shape (n,).
+    nearest
+        Name of a closed form that is it within its uncertainty; None if none is.
+    evidence
+        Lowering of the information criterion below that of what the search found.
+    explains
+        Whether nothing but noise is left with it.
+    error
+        Errors with it, on the runs fitted and held out.
+    """
+
+    slot: Slot
+    variable: str
+    unit: str
+    beside: tuple[str, ...]
+    grid: Float[np.ndarray, " n"]
+    value: Float[np.ndarray, " n"]
+    low95: Float[np.ndarray, " n"]
+    high95: Float[np.ndarray, " n"]
+    nearest: str | None
+    evidence: float
+    explains: bool
+    error: ErrorPair
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``loop.json`` holds of it."""
+        return asdict(self)
+
+
+_Form = Callable[..., np.ndarray]
+
+# x is in units of its largest size, so that constants of all are of order one
+_FORMS: dict[str, tuple[_Form, list[list[float]]]] = {
+    "linear": (lambda x, a: a * x, [[0.1]]),
+    "tanh": (lambda x, a: np.tanh(a * x) / a - x, [[0.5], [2.0]]),
+    "power": (lambda x, a, n: a * np.sign(x) * np.abs(x) ** n, [[0.1, 0.5], [0.1, 2.0]]),
+    "exponential": (lambda x, a, b: a * np.expm1(b * x), [[0.1, 1.0], [0.1, -3.0]]),
+    "threshold": (
+        lambda x, a, c: a * np.sign(x) * np.maximum(np.abs(x) - np.abs(c), 0.0),
+        [[-0.5, 0.3], [-0.5, 0.7]],
+    ),
+    "periodic": (
+        lambda x, a, b, c: a * np.sin(b * x) + c * (np.cos(b * x) - 1.0),
+        [[0.1, b, 0.1] for b in (5.0, 15.0, 40.0)],
+    ),
+}
+
+
+def nearest_form(
+    grid: Float[np.ndarray, " n"],
+    value: Float[np.ndarray, " n"],
+    deviation: Float[np.ndarray, " n"],
+    in_stress: bool,
+) -> str | None:
+    """Return the simplest closed form that a curve is within its uncertainty; None if none is.
+
+    A constant beside the form is free, for an offset is no shape.
+
+    Parameters
+    ----------
+    grid, value, deviation
+        The curve and its standard deviation.
+    in_stress
+        Whether the curve and its variable have one unit, which a saturation (tanh) needs.
+    """
+    size = float(np.max(np.abs(grid))) or 1.0
+    scale = size if in_stress else float(np.max(np.abs(value - np.mean(value)))) or 1.0
+    x, y, spread = grid / size, value / scale, np.maximum(deviation / scale, 1e-12)
+    own = float(np.sqrt(np.mean((y - np.mean(y)) ** 2)))
+    for name, (form, starts) in _FORMS.items():
+        if name == "tanh" and not in_stress:
+            continue
+        for start in starts:
+            try:
+                found, _ = curve_fit(
+                    lambda at, offset, *rest, form=form: offset + form(at, *rest),
+                    x, y, [0.0, *start], sigma=spread, maxfev=400,
+                )  # fmt: skip
+            except (RuntimeError, FloatingPointError):
+                continue
+            off = y - found[0] - form(x, *found[1:])
+            near = np.sqrt(np.mean((off / spread) ** 2)) <= _WITHIN
+            if near or np.sqrt(np.mean(off**2)) <= _CLOSE * own:
+                return name
+    return None

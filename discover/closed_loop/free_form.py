@@ -1,0 +1,261 @@
+"""Fit a free function of one variable together with the constants of a law.
+
+Where named effects leave structure, what is missing may be a function that nobody wrote down: of
+the recorded stress (a transducer that saturates), of the time (a drift), of the rate (friction of
+the tool), of the strain (a sample that is lost). It is a cubic spline of few degrees of freedom,
+held against what was found by the criterion of the search.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from sklearn.preprocessing import SplineTransformer
+
+from discover.closed_loop.augment import INDISTINGUISHABLE
+from discover.closed_loop.before_after import strain_of
+from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.explanations.beam import WINDOW
+from discover.closed_loop.free_curve import FreeForm, Slot, nearest_form
+from discover.closed_loop.search import Search
+from discover.dataset import Run
+from discover.forward import Batch
+from discover.forward.least_squares import gauss_newton_step, jacobians
+from discover.statistics import least_squares_covariance
+from discover.statistics.residual import judging, summarise
+
+KNOTS = (6, 14)
+"""Of the spline, which then has two degrees of freedom more; evidence chooses."""
+
+_SLOTS: dict[Slot, tuple[str, str]] = {
+    "recorded_stress": ("stress", "Pa"),
+    "drift": ("instrument_time", "s"),
+    "rate": ("rate", "1/s"),
+    "network": ("strain", ""),
+}
+_STEPS, _HALVINGS, _SETTLED = 12, 4, 1e-4
+_DAMPING = 1e-8
+_DRAWN = 60
+_REFITTED = 8
+
+
+@dataclass
+class _Trial:
+    """A free function beside some effects, fitted."""
+
+    slot: Slot
+    effects: tuple[str, ...]
+    theta: np.ndarray
+    free: tuple[int, ...]
+    splines: SplineTransformer
+    coefficients: np.ndarray
+    residual: np.ndarray
+    design: np.ndarray
+
+    def cost(self, weight: np.ndarray) -> float:
+        return float(np.sum(self.residual[judging(weight)] ** 2))
+
+
+def free_forms(
+    search: Search,
+    runs: Sequence[Run],
+    held_batch: Batch | None,
+    held_runs: Sequence[Run],
+) -> tuple[FreeForm, ...]:
+    """Return the free functions that explain what a search left, the most probable first.
+
+    Each is fitted beside the declared model, beside every stage of what was found, and beside every
+    effect that was tried alone, for what was found may stand for the function. One step of each
+    says which are fitted to the end. Kept are those with strong evidence over what was found
+    (`INDISTINGUISHABLE`) that are within reach of the best.
+
+    Parameters
+    ----------
+    search
+        A search that has ended and left structure.
+    runs
+        The fitted runs; none but starts from rest in shear at a given rate.
+    held_batch, held_runs
+        Runs that judge.
+    """
+    if any(
+        run.flow != "shear" or run.protocol.control != "rate" or run.quantity != "sigma12"
+        for run in [*runs, *held_runs]
+    ):
+        return ()
+    weight = np.asarray(search.batch.weight)
+    starts = {
+        tuple(search.active[:n]): theta
+        for n, theta in enumerate(search.path[: len(search.active) + 1])
+    }
+    for one in search.seen:
+        if len(one.effects) == 1 and not search.refused & set(one.effects):
+            start = search.model.zero()
+            start[list(one.free)] = one.values
+            starts.setdefault(one.effects, start)
+    screened = [
+        trial
+        for effects, theta in starts.items()
+        for slot in _SLOTS
+        if (trial := _fitted(search, runs, slot, effects, theta, KNOTS[0], steps=1)) is not None
+    ]
+    screened.sort(key=lambda trial: trial.cost(weight))
+    trials = [
+        trial
+        for one in screened[:_REFITTED]
+        for knots in KNOTS
+        if (trial := _fitted(search, runs, one.slot, one.effects, one.theta, knots)) is not None
+    ]
+    if not trials:
+        return ()
+    best = min(trials, key=lambda trial: trial.cost(weight))
+    effective = summarise(best.residual, weight).effective_samples
+    choices = search.n_candidates + len(_SLOTS)
+
+    def criterion(cost: float, constants: int, chosen: int) -> float:
+        price = constants * np.log(max(effective, 2.0)) + 2.0 * chosen * np.log(choices)
+        return float(effective * np.log(max(cost, np.finfo(float).tiny)) + price)
+
+    own = float(np.sum(search.fit.residual[judging(weight)] ** 2))
+    before = criterion(own, len(search.fit.free), len(search.active))
+    gains = [
+        before - criterion(t.cost(weight), len(t.free) + t.coefficients.size, len(t.effects) + 1)
+        for t in trials
+    ]
+    least = max(INDISTINGUISHABLE, max(gains) - 2.0 * np.log(WINDOW))
+    ranked = sorted(zip(gains, trials, strict=True), key=lambda pair: -pair[0])
+    out: list[FreeForm] = []
+    for gain, trial in ranked:
+        if gain >= least and trial.slot not in [one.slot for one in out]:
+            held = _held_out_error(search, trial, held_batch, held_runs)
+            out.append(_told(search, runs, trial, gain, held))
+    return tuple(out)
+
+
+def _variable(
+    slot: Slot, runs: Sequence[Run], batch: Batch, predicted: np.ndarray
+) -> Float[np.ndarray, "runs n"]:
+    """Return of what the function is one, at every sample."""
+    if slot == "recorded_stress":
+        return predicted
+    out = np.zeros_like(predicted)
+    for row, run in zip(out, runs, strict=True):
+        of_run = {
+            "drift": run.time / run.clock_factor,
+            "rate": run.rate,
+            "network": np.abs(strain_of(run)),
+        }[slot]
+        row[: len(run)] = of_run
+    return out
+
+
+def _columns(
+    slot: Slot, splines: SplineTransformer, variable: np.ndarray, predicted: np.ndarray
+) -> Float[np.ndarray, "runs n m"]:
+    """Return what the coefficients of the spline change in the record."""
+    basis = splines.transform(variable.reshape(-1, 1)).reshape(*variable.shape, -1)
+    return basis * predicted[..., None] if slot == "network" else basis
+
+
+def _fitted(
+    search: Search, runs, slot: Slot, effects, start: np.ndarray, knots: int, steps: int = _STEPS
+) -> _Trial | None:
+    """Return a free function beside some effects, fitted with them; None where that fails."""
+    model, batch = search.model, search.batch
+    weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
+    seen = weight > 0
+    scale = np.where(seen, weight, 1.0)
+    free = tuple(search.positions(effects))
+    theta, at = start.copy(), list(free)
+    residual = model.residuals([theta], batch)[0]
+    if not np.all(np.isfinite(residual)):
+        return None
+
+    def completed(residual):
+        """Return the best spline at a law, what is then left, and what it changes."""
+        predicted = np.where(seen, residual / scale + recorded, 0.0)
+        variable = _variable(slot, runs, batch, predicted)
+        splines = SplineTransformer(knots, extrapolation="linear")
+        splines.fit(variable[seen].reshape(-1, 1))
+        columns = _columns(slot, splines, variable, predicted) * weight[..., None]
+        coefficients = gauss_newton_step(columns[seen].T, residual[seen], _DAMPING)
+        return (splines, coefficients), residual + columns @ coefficients, columns
+
+    best, left, columns = completed(residual)
+    for _ in range(steps):
+        if not free:
+            break
+        slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
+        if not np.all(np.isfinite(slopes)):
+            return None
+        rows = np.concatenate([slopes, np.moveaxis(columns, -1, 0)])
+        step = gauss_newton_step(rows, left, _DAMPING)[: len(free)]
+        before = float(np.sum(left**2))
+        for halving in range(_HALVINGS):
+            trial = theta.copy()
+            moved = theta[at] + step * 0.5**halving
+            trial[at] = np.clip(moved, model.low[at], model.high[at])
+            tried = model.residuals([trial], batch)[0]
+            if not np.all(np.isfinite(tried)):
+                continue
+            found = completed(tried)
+            if np.sum(found[1] ** 2) < before:
+                theta, residual, (best, left, columns) = trial, tried, found
+                break
+        else:
+            break
+        if 1.0 - float(np.sum(left**2)) / before < _SETTLED:
+            break
+    slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
+    design = np.concatenate([slopes, np.moveaxis(columns, -1, 0)])
+    if not np.all(np.isfinite(design)):
+        return None
+    return _Trial(slot, tuple(effects), theta, free, *best, left, design)
+
+
+def _told(search: Search, runs, trial: _Trial, gain: float, held: float | None) -> FreeForm:
+    """Return a free function as the result holds it."""
+    batch, tolerated = search.batch, search.tolerated
+    seen = np.asarray(batch.weight) > 0
+    rows = np.arange(seen.size).reshape(seen.shape)
+    design = trial.design.reshape(len(trial.design), -1).T
+    sequences = [row[there] for row, there in zip(rows, seen, strict=True)]
+    covariance, _, _ = least_squares_covariance(design, trial.residual.ravel(), sequences)
+    own = covariance[len(trial.free) :, len(trial.free) :]
+    predicted = np.where(seen, search.model.predict(trial.theta, batch), 0.0)
+    span = _variable(trial.slot, runs, batch, predicted)[seen]
+    grid = np.linspace(float(np.min(span)), float(np.max(span)), _DRAWN)
+    basis = trial.splines.transform(grid.reshape(-1, 1))
+    value = basis @ trial.coefficients
+    deviation = np.sqrt(np.clip(np.einsum("im,mk,ik->i", basis, own, basis), 0.0, None))
+    variable, unit = _SLOTS[trial.slot]
+    errors = np.sqrt(np.sum(trial.residual**2, axis=1))
+    return FreeForm(
+        trial.slot,
+        variable,
+        unit,
+        trial.effects,
+        grid,
+        value,
+        value - 1.96 * deviation,
+        value + 1.96 * deviation,
+        nearest_form(grid, value, deviation, trial.slot == "recorded_stress"),
+        gain,
+        tolerated.left(trial.residual).verdict != "unexplained",
+        ErrorPair(float(np.mean(errors)), held),
+    )
+
+
+def _held_out_error(search: Search, trial: _Trial, batch: Batch | None, runs) -> float | None:
+    """Return the mean error of the runs held out, beyond whose ends the curve goes on straight."""
+    if batch is None:
+        return None
+    weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
+    residual = search.model.residuals([trial.theta], batch)[0]
+    seen = weight > 0
+    predicted = np.where(seen, residual / np.where(seen, weight, 1.0) + recorded, 0.0)
+    variable = _variable(trial.slot, runs, batch, predicted)
+    columns = _columns(trial.slot, trial.splines, variable, predicted) * weight[..., None]
+    left = residual + columns @ trial.coefficients
+    return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))

@@ -1,0 +1,19 @@
+"""What is said of a free function."""
+
+from discover.closed_loop import FreeForm
+from discover.report.wording import effect_title
+
+_WHAT = {
+    "recorded_stress": "a function of the recorded stress alone",
+    "drift": "a function of the time alone",
+    "rate": "a function of the shear rate alone",
+    "network": "a factor that depends on the strain alone",
+}
+
+
+def free_form_sentence(found: FreeForm) -> str:
+    """Return what a free function is and where it stands, without a full stop."""
+    beside = " and ".join(map(effect_title, found.beside)) or "the declared model"
+    shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
+    verb = "explains" if found.explains else "takes up most of"
+    return f"{_WHAT[found.slot]}{shape}, beside {beside} {verb} what is left"

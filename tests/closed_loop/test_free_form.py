@@ -1,0 +1,99 @@
+"""What is in no dictionary, found as a curve: on records by scipy with a flaw put in by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from independent.flow import oscillation, start_up
+from independent.folders import write_folder
+from independent.giesekus import Giesekus
+from independent.instruments import Instrument
+
+import discover as dc
+from discover.closed_loop.free_curve import nearest_form
+from discover.report.verdicts import loop_verdict
+
+MODULUS, TIME, NOISE, LIMIT = 100.0, 1.0, 0.01, 60.0
+FLOWS = {
+    "up.csv": (start_up(1.5), 6.0),
+    "swing.csv": (oscillation(2.0, 1.0), 10.0),
+    "wide.csv": (oscillation(4.0, 0.5), 12.0),
+    "judge.csv": (oscillation(3.0, 0.8), 10.0),
+}
+EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_gain", "stress_drift", "transducer_lag"]
+
+
+def loop_with(folder, flaw):
+    """Return the loop on Giesekus records to which a flaw of the instrument was done."""
+    generator, runs = np.random.default_rng(0), {}
+    law = Giesekus(0.3, MODULUS, TIME)
+    for name, (flow, end) in FLOWS.items():
+        run = Instrument().record(law, flow, np.linspace(0.02, end, 120))
+        stress = flaw(run)
+        size = NOISE * np.sqrt(np.mean(stress**2))
+        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
+    data = dc.load_dataset(write_folder(folder, runs))
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    return dc.close_loop(
+        data, base, held_out=["judge.csv"], effects=EFFECTS, max_effects=1, explanations=1
+    )
+
+
+@pytest.fixture(scope="module")
+def saturated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("saturated")
+    return loop_with(folder, lambda run: LIMIT * np.tanh(run.stress / LIMIT))
+
+
+def test_a_saturated_transducer_is_found_as_a_function_of_the_stress(saturated):
+    assert saturated.verdict == "unexplained"
+    found = saturated.free_form[0]
+    # the law beside it is the right one, which the search alone had not found
+    assert (found.slot, found.beside) == ("recorded_stress", ("giesekus_mobility",))
+    assert found.nearest == "tanh"
+    true = LIMIT * np.tanh(found.grid / LIMIT) - found.grid
+    # within 2 % of the limit where most samples are; the ends hang on few
+    middle = np.abs(found.grid) < 0.8 * np.max(np.abs(found.grid))
+    assert np.max(np.abs(found.value - true)[middle]) < 0.02 * LIMIT
+    assert found.error.fit < 1.2 * NOISE
+    assert found.error.held_out < 1.5 * NOISE < saturated.error_after.held_out
+
+
+def test_the_verdict_says_of_what_it_is_a_function(saturated):
+    said = loop_verdict(saturated)[0]
+    assert "a function of the recorded stress alone" in said
+    assert "tanh" in said
+    assert saturated.to_json()["free_form"][0]["nearest"] == "tanh"
+
+
+def test_a_hum_is_found_as_a_function_of_time(tmp_path):
+    loop = loop_with(tmp_path, lambda run: run.stress + 3.0 * np.sin(0.9 * run.time))
+    found = loop.free_form[0]
+    assert (found.slot, found.nearest) == ("drift", "periodic")
+    assert found.explains
+    # 3 Pa, within three times the half-width of the band
+    off = np.abs(found.value - 3.0 * np.sin(0.9 * found.grid))
+    assert np.mean(off < 3.0 * (found.high95 - found.low95) / 2.0) > 0.95
+
+
+def test_no_curve_is_found_in_a_sound_record(tmp_path):
+    loop = loop_with(tmp_path, lambda run: run.stress)
+    assert loop.verdict == "effects_added"
+    assert loop.free_form == ()
+
+
+@pytest.mark.parametrize(
+    ("curve", "name"),
+    [
+        (lambda x: 0.2 * x + 1.0, "linear"),
+        (lambda x: 0.3 * np.sign(x) * x**2, "power"),
+        (lambda x: -0.6 * np.sign(x) * np.maximum(np.abs(x) - 1.0, 0.0), "threshold"),
+        (lambda x: np.sin(4.0 * x), "periodic"),
+        # a hump and a step are no form of the list
+        (lambda x: np.exp(-((x - 1.0) ** 2) / 0.02) + (x > 0.0), None),
+    ],
+)  # fmt: skip
+def test_the_nearest_form_is_the_one_that_drew_the_curve(curve, name):
+    grid = np.linspace(-2.0, 2.0, 60)
+    value = curve(grid)
+    assert nearest_form(grid, value, np.full(60, 0.005), True) == name
