@@ -15,6 +15,7 @@ from discover.closed_loop.before_after import (
     strain_of,
 )
 from discover.closed_loop.by_mode import constants_by_mode
+from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations import BEAM_WIDTH, carry, explain, with_band
 from discover.closed_loop.finer_steps import on_finer_steps
@@ -221,8 +222,10 @@ def run_loop(
     if carried:
         runs = (fitted_runs, held_runs)
         tried = [effect.name for effect in candidates if search.admitted(effect)]
-        if judgement.structured and judgement.verdict == "unexplained":
+        # what explains the fitted runs and not those held out lacks no curve of the fitted ones
+        if judgement.structured and judgement.carries_over:
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
+            forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
         side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
@@ -261,6 +264,11 @@ def run_loop(
         fluid=None if differ else _fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,
     )
+
+
+def _predicts_worse(error: ErrorPair, than: ErrorPair) -> bool:
+    """Return whether runs that no fit saw speak against what explains those that were fitted."""
+    return (error.held_out or 0.0) > (than.held_out or np.inf)
 
 
 def _split(dataset, fit, held_out, strain, most):

@@ -24,7 +24,7 @@ def free_form_picture(result: LoopResult) -> Picture | None:
     forms = result.free_form
     if not forms:
         return None
-    with figure(1, len(forms), width=min(9.0, 5.0 * len(forms)), height=3.0) as (drawing, axes):
+    with figure(1, len(forms), width=9.0, height=2.8) as (drawing, axes):
         for panel, one in zip(axes[0], forms, strict=True):
             panel.fill_between(one.grid, one.low95, one.high95, color=SHADE, label="95 % band")
             panel.plot(one.grid, one.value, color=NETWORK, lw=1.5, label="free function")
