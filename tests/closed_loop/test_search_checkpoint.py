@@ -69,6 +69,7 @@ def test_an_interrupted_loop_ends_where_an_undisturbed_one_does(dataset):
         resumed = loop(dataset, broken, said.append)
         assert resumed.stages == undisturbed.stages
         assert resumed.error_after == undisturbed.error_after
+        assert resumed.explanations == undisturbed.explanations
         assert [[c.effect for c in r] for r in resumed.rankings] == [
             [c.effect for c in r] for r in undisturbed.rankings
         ]

@@ -107,7 +107,7 @@ def carry(
             break
         say(f"following another explanation: {', '.join(ahead[0].effects) or 'no effect'}")
         followed.append(ahead[0])
-        spent += _follow(search, ahead[0], max_effects)
+        spent += _follow(search, ahead[0], max_effects, width - spent)
     found = _fitted(search, _in_window(search, criterion)[: 2 * width], criterion)[:width]
     return sorted(found, key=lambda one: one.criterion)
 
@@ -157,10 +157,10 @@ def _twin(one: SeenSet, followed: Sequence[SeenSet]) -> bool:
     )
 
 
-def _follow(search: Search, one: SeenSet, max_effects: int) -> int:
+def _follow(search: Search, one: SeenSet, max_effects: int, most: int) -> int:
     """Fit the neighbours of a set: an effect more, or another in the place of each.
 
-    Returns how many stages that took.
+    Returns how many stages that took, of `most` at most.
     """
     fit = _fits(search, [one])[0]
     if not fit.usable:
@@ -176,7 +176,7 @@ def _follow(search: Search, one: SeenSet, max_effects: int) -> int:
         stages += 1
     for name in one.effects:
         others = tuple(other for other in one.effects if other != name)
-        if others in explored:
+        if others in explored or stages >= most:
             continue
         theta, free = taken_out(search.model, fit, name)
         without = fit_batch(search.model, search.batch, [theta], [free], prior=search.prior)[0]
