@@ -1,12 +1,13 @@
 """A free function that was found, and the closed form that is nearest to it."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import curve_fit
+from scipy.optimize import OptimizeWarning, curve_fit
 
 from discover.closed_loop.error_pair import ErrorPair
 
@@ -106,10 +107,13 @@ def nearest_form(
             continue
         for start in starts:
             try:
-                found, _ = curve_fit(
-                    lambda at, offset, *rest, form=form: offset + form(at, *rest),
-                    x, y, [0.0, *start], sigma=spread, maxfev=400,
-                )  # fmt: skip
+                with warnings.catch_warnings():
+                    # the values count, not their covariance
+                    warnings.simplefilter("ignore", OptimizeWarning)
+                    found, _ = curve_fit(
+                        lambda at, offset, *rest, form=form: offset + form(at, *rest),
+                        x, y, [0.0, *start], sigma=spread, maxfev=400,
+                    )  # fmt: skip
             except (RuntimeError, FloatingPointError):
                 continue
             off = y - found[0] - form(x, *found[1:])

@@ -38,6 +38,7 @@ _STEPS, _HALVINGS, _SETTLED = 12, 4, 1e-4
 _DAMPING = 1e-8
 _DRAWN = 60
 _REFITTED = 8
+_VALUES = 2  # of the variable, for each degree of freedom
 
 
 @dataclass
@@ -170,6 +171,10 @@ def _fitted(
     theta, at = start.copy(), list(free)
     residual = model.residuals([theta], batch)[0]
     if not np.all(np.isfinite(residual)):
+        return None
+    # of a few rates any function is one, and says nothing between them
+    values = _variable(slot, runs, batch, recorded)[seen]
+    if np.unique(values).size < _VALUES * (knots + 2):
         return None
 
     def completed(residual):

@@ -82,6 +82,21 @@ def test_no_curve_is_found_in_a_sound_record(tmp_path):
     assert loop.free_form == ()
 
 
+def test_start_ups_at_a_few_rates_hold_no_function_of_the_rate(tmp_path):
+    generator, runs = np.random.default_rng(0), {}
+    for rate in (0.5, 1.0, 2.0):
+        run = Instrument().record(
+            Giesekus(0.4, MODULUS, TIME), start_up(rate), np.linspace(0.02, 5.0, 80)
+        )
+        noise = NOISE * np.max(run.stress) * generator.standard_normal(80)
+        runs[f"up_{rate:g}.csv"] = replace(run, stress=run.stress + noise)
+    data = dc.load_dataset(write_folder(tmp_path, runs))
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    loop = dc.close_loop(data, base, effects=["stress_drift"], max_effects=1, explanations=1)
+    assert loop.verdict == "unexplained"
+    assert "rate" not in {one.slot for one in loop.free_form}
+
+
 @pytest.mark.parametrize(
     ("curve", "name"),
     [
