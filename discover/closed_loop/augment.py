@@ -15,7 +15,7 @@ from discover.closed_loop.left_out import (
 )
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, intervals
-from discover.statistics.residual import judging, summarise
+from discover.statistics.residual import judged_cost, summarise
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""
@@ -91,15 +91,45 @@ def evidence(
         How many were chosen among them.
     """
     added = len(after.free) - len(before.free)
-    rows = judging(weight)
-    cost, lowered = (float(np.sum(fit.residual[rows] ** 2)) for fit in (before, after))
+    cost, lowered = (judged_cost(fit.residual, weight) for fit in (before, after))
     if lowered <= 0.0:
         return float("inf") if cost > 0.0 else -float("inf")
     gain = effective_samples * np.log(cost / lowered) if cost > 0.0 else -np.inf
-    price = added * np.log(max(effective_samples, 2.0)) + 2.0 * n_effects * np.log(
-        max(n_candidates, 1)
-    )
-    return float(gain - price)
+    return float(gain - price(added, n_effects, effective_samples, n_candidates))
+
+
+def price(constants: int, n_effects: int, effective_samples: float, n_candidates: int) -> float:
+    """Return what constants, and having chosen effects among candidates, cost in the criterion.
+
+    Parameters
+    ----------
+    constants, n_effects
+        How many are added.
+    effective_samples, n_candidates
+        As in `evidence`.
+    """
+    chosen = 2.0 * n_effects * np.log(max(n_candidates, 1))
+    return float(constants * np.log(max(effective_samples, 2.0)) + chosen)
+
+
+def criterion(
+    cost: float, constants: int, n_effects: int, effective_samples: float, n_candidates: int
+) -> float:
+    """Return the information criterion of a whole set of effects: small for a probable one.
+
+    Of two sets the difference is the `evidence` for one over the other.
+
+    Parameters
+    ----------
+    cost
+        Sum over the runs that judge of the squared relative errors (`judged_cost`).
+    constants, n_effects
+        How many are in it.
+    effective_samples, n_candidates
+        As in `evidence`.
+    """
+    misfit = effective_samples * np.log(max(cost, np.finfo(float).tiny))
+    return float(misfit + price(constants, n_effects, effective_samples, n_candidates))
 
 
 def refit(

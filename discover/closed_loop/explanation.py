@@ -1,6 +1,6 @@
 """What a closed loop says of several explanations."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -57,11 +57,11 @@ class Explanations:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     inclusion_by_kind: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def leading_share(self) -> float:
-        """Probability of the likeliest explanation, given that it is one of them."""
-        known = sum(one.probability for one in self.likeliest_first)
-        return self.likeliest_first[0].probability / known if known > 0.0 else 0.0
+    def holding(self, effects: Collection[str]) -> Explanation | None:
+        """Return the explanation of which these effects, in any order, are a member."""
+        asked = set(effects)
+        found = (e for e in self.likeliest_first if any(set(m) == asked for m in e.members))
+        return next(found, None)
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``loop.json`` holds of them."""

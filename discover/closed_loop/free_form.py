@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.preprocessing import SplineTransformer
 
-from discover.closed_loop.augment import INDISTINGUISHABLE
+from discover.closed_loop.augment import INDISTINGUISHABLE, criterion
 from discover.closed_loop.before_after import strain_of
 from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.explanations.beam import WINDOW
@@ -21,9 +21,8 @@ from discover.closed_loop.free_curve import FreeForm, Slot, nearest_form
 from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.forward import Batch
-from discover.forward.least_squares import gauss_newton_step, jacobians
-from discover.statistics import least_squares_covariance
-from discover.statistics.residual import judging, summarise
+from discover.forward.least_squares import covariance_and_noise, gauss_newton_step, jacobians
+from discover.statistics.residual import judged_cost, summarise
 
 KNOTS = (6, 14)
 """Of the spline, which then has two degrees of freedom more; evidence chooses."""
@@ -55,7 +54,7 @@ class _Trial:
     design: np.ndarray
 
     def cost(self, weight: np.ndarray) -> float:
-        return float(np.sum(self.residual[judging(weight)] ** 2))
+        return judged_cost(self.residual, weight)
 
 
 def free_forms(
@@ -92,9 +91,7 @@ def free_forms(
     }
     for one in search.seen:
         if len(one.effects) == 1 and not search.refused & set(one.effects):
-            start = search.model.zero()
-            start[list(one.free)] = one.values
-            starts.setdefault(one.effects, start)
+            starts.setdefault(one.effects, one.theta(search.model))
     screened = [
         trial
         for effects, theta in starts.items()
@@ -113,15 +110,10 @@ def free_forms(
     best = min(trials, key=lambda trial: trial.cost(weight))
     effective = summarise(best.residual, weight).effective_samples
     choices = search.n_candidates + len(_SLOTS)
-
-    def criterion(cost: float, constants: int, chosen: int) -> float:
-        price = constants * np.log(max(effective, 2.0)) + 2.0 * chosen * np.log(choices)
-        return float(effective * np.log(max(cost, np.finfo(float).tiny)) + price)
-
-    own = float(np.sum(search.fit.residual[judging(weight)] ** 2))
-    before = criterion(own, len(search.fit.free), len(search.active))
+    own = judged_cost(search.fit.residual, weight)
+    before = criterion(own, len(search.fit.free), len(search.active), effective, choices)
     gains = [
-        before - criterion(t.cost(weight), len(t.free) + t.coefficients.size, len(t.effects) + 1)
+        before - criterion(t.cost(weight), len(t.design), len(t.effects) + 1, effective, choices)
         for t in trials
     ]
     least = max(INDISTINGUISHABLE, max(gains) - 2.0 * np.log(WINDOW))
@@ -223,10 +215,7 @@ def _told(search: Search, runs, trial: _Trial, gain: float, held: float | None) 
     """Return a free function as the result holds it."""
     batch, tolerated = search.batch, search.tolerated
     seen = np.asarray(batch.weight) > 0
-    rows = np.arange(seen.size).reshape(seen.shape)
-    design = trial.design.reshape(len(trial.design), -1).T
-    sequences = [row[there] for row, there in zip(rows, seen, strict=True)]
-    covariance, _, _ = least_squares_covariance(design, trial.residual.ravel(), sequences)
+    covariance, _ = covariance_and_noise(batch, trial.residual, trial.design)
     own = covariance[len(trial.free) :, len(trial.free) :]
     predicted = np.where(seen, search.model.predict(trial.theta, batch), 0.0)
     span = _variable(trial.slot, runs, batch, predicted)[seen]

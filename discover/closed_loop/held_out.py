@@ -7,8 +7,7 @@ from jaxtyping import Float
 
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel, Batch, even
-from discover.forward.least_squares import Fit, jacobians
-from discover.statistics import least_squares_covariance
+from discover.forward.least_squares import Fit, covariance_and_noise, jacobians
 from discover.statistics.unseen import Unseen
 
 
@@ -59,7 +58,7 @@ def held_out(
     root, correlation = np.zeros((0, 0)), np.ones(1)
     if fit.free:
         derivative = jacobians(model, resolution.batch, [theta], residual, [fit.free])[0]
-        root, correlation = uncertainty(batch, fit)
+        root, correlation = root_of_covariance(batch, fit)
     columns = np.tensordot(root, derivative, axes=(0, 0))
     weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.recorded)
     kept = [w > 0 for w in weight]
@@ -73,16 +72,12 @@ def held_out(
     return HeldOut(residual[0], resolution, unseen)
 
 
-def uncertainty(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def root_of_covariance(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Return a root of the constants' covariance, shape (free, free), and the noise's correlation.
 
     A column is a combination of the constants that varies by one standard deviation.
     """
-    n_runs, n = fit.residual.shape
-    rows = np.arange(n_runs * n).reshape(n_runs, n)
-    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
-    design = fit.jacobian.reshape(len(fit.free), -1).T
-    covariance, _, noise = least_squares_covariance(design, fit.residual.ravel(), sequences)
+    covariance, noise = covariance_and_noise(batch, fit.residual, fit.jacobian)
     if not np.all(np.isfinite(covariance)):
         return np.zeros_like(covariance), noise.correlation
     values, vectors = np.linalg.eigh(covariance)

@@ -4,7 +4,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore, attribute, with_other_inner
+from discover.closed_loop.attribution import (
+    Attribution,
+    CandidateScore,
+    attribute,
+    with_other_inner,
+)
 from discover.closed_loop.augment import (
     BARE_MENTION,
     IMPROVEMENT,
@@ -346,9 +351,7 @@ class Search(SearchState):
         before, left_out, active = self.fit, self.left_out, list(self.active)
         fit, kept = before, list(active)
         while len(kept) < max_effects:
-            leading = attribute(self.model, self.batch, fit, kept, LEADERS, self.candidate).leading
-            choices = refit(self.model, self.batch, fit, leading, self.n_candidates, self.prior)
-            choices = self.possible(choices, kept)
+            _, choices = self.choices_beside(fit, kept)
             if not choices:
                 break
             best = max(choices, key=lambda choice: choice.candidate.evidence or -np.inf)
@@ -472,15 +475,17 @@ class Search(SearchState):
             jacobians(self.model, self.batch, [theta], residual, [free])[0],
         )
 
+    def choices_beside(self, fit: Fit, others: Sequence[str]) -> tuple[Attribution, list[Choice]]:
+        """Return what may be added to a fit with other effects: all as scored, and the refitted."""
+        attribution = attribute(self.model, self.batch, fit, others, LEADERS, self.candidate)
+        choices = refit(
+            self.model, self.batch, fit, attribution.leading, self.n_candidates, self.prior
+        )
+        return attribution, self.possible(choices, others)
+
     def advance(self) -> str | None:
         """Add the effect that earns its place, and return its name, or None."""
-        attribution = attribute(
-            self.model, self.batch, self.fit, self.active, LEADERS, self.candidate
-        )
-        choices = refit(
-            self.model, self.batch, self.fit, attribution.leading, self.n_candidates, self.prior
-        )
-        choices = self.possible(choices, self.active)
+        attribution, choices = self.choices_beside(self.fit, self.active)
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
         # what cannot be told from noise gives no reason to add anything

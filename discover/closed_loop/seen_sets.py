@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
-from discover.statistics.residual import judging
+from discover.statistics.residual import judged_cost
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,12 @@ class SeenSet:
     free: tuple[int, ...]
     values: tuple[float, ...]
     cost: float
+
+    def theta(self, model: AugmentedModel) -> Float[np.ndarray, " p"]:
+        """Return the parameter vector of the fit."""
+        theta = model.zero()
+        theta[list(self.free)] = self.values
+        return theta
 
 
 class SeenSets:
@@ -52,9 +59,6 @@ class SeenSets:
     def __iter__(self) -> Iterator[SeenSet]:
         return iter(self._sets.values())
 
-    def __contains__(self, effects: Sequence[str]) -> bool:
-        return tuple(sorted(effects)) in self._sets
-
     def note(
         self,
         effects: Sequence[str],
@@ -71,7 +75,7 @@ class SeenSets:
             Weights of the runs.
         """
         name = tuple(sorted(effects))
-        cost = float(np.sum(fit.residual[judging(weight)] ** 2))
+        cost = judged_cost(fit.residual, weight)
         if not np.isfinite(cost) or (name in self._sets and self._sets[name].cost <= cost):
             return
         values = tuple(float(fit.theta[at]) for at in fit.free)

@@ -12,7 +12,7 @@ from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics import holds_signal
 from discover.statistics.dead_records import CHANCE
-from discover.statistics.residual import judging, summarise
+from discover.statistics.residual import judged_cost, judging, summarise
 
 _OFF = 1e-30  # factor on the moduli of a fluid that is switched off
 _ALIKE = 1.1
@@ -57,7 +57,7 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
     without = AugmentedModel(off, model.effects).residuals([theta], batch)[0]
     weight = np.asarray(batch.weight)
     rows = judging(weight)
-    lost, left = (float(np.sum(r[rows] ** 2)) for r in (without, fit.residual))
+    lost, left = (judged_cost(r, weight) for r in (without, fit.residual))
     if not np.isfinite(lost) or left <= 0.0 or lost > _ALIKE**2 * left:
         return False
     samples = summarise(fit.residual[rows], weight[rows]).effective_samples

@@ -82,10 +82,10 @@ def strain_at_stress(
             return rate, dynamics.change(state, rate, slow, flow) + kept * state
 
         r1, n1 = stage(stress)
-        r2, n2 = stage(w.half * stress + w.a21 * n1)
-        r3, n3 = stage(w.half * stress + w.a31 * n1 + w.a32 * n2)
-        r4, n4 = stage(w.full * stress + w.a41 * n1 + w.a43 * n3)
-        after = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
+        r2, n2 = stage(w.second(stress, n1))
+        r3, n3 = stage(w.third(stress, n1, n2))
+        r4, n4 = stage(w.fourth(stress, n1, n3))
+        after = w.end(stress, n1, n2, n3, n4)
         mean = (r1 + 2.0 * (r2 + r3) + r4) / 6.0
         sheared_after, felt = dynamics.sheared(after, mean, flow)
         levels = _after(dynamics, levels, felt, 0.5 * (sheared + scale * sheared_after), h)

@@ -88,10 +88,10 @@ def integrate(
                 first_rate, last_rate, h, times[-1],
             )  # fmt: skip
         middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
-        n2 = remainder(w.half * stress + w.a21 * n1, middle_rate, slow_middle)
-        n3 = remainder(w.half * stress + w.a31 * n1 + w.a32 * n2, middle_rate, slow_middle)
-        n4 = remainder(w.full * stress + w.a41 * n1 + w.a43 * n3, last_rate, slow_last)
-        after = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
+        n2 = remainder(w.second(stress, n1), middle_rate, slow_middle)
+        n3 = remainder(w.third(stress, n1, n2), middle_rate, slow_middle)
+        n4 = remainder(w.fourth(stress, n1, n3), last_rate, slow_last)
+        after = w.end(stress, n1, n2, n3, n4)
 
         # the states once more, now with the mean of the stress at both ends
         shear_after, felt_rate = dynamics.sheared(after, middle_rate, flow)

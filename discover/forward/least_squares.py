@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.run_batch import Batch
-from discover.statistics import least_squares_covariance
+from discover.statistics import NoiseModel, least_squares_covariance
 
 _LARGEST_DAMPING = 1e7
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
@@ -274,10 +274,21 @@ def uncertainty(
     residual, jacobian
         Weighted residuals of the fit, and their derivatives in the parameters.
     """
+    covariance, noise = covariance_and_noise(batch, residual, jacobian)
+    independent = max(noise.effective_samples - len(jacobian), 1.0)
+    return covariance, float(student.ppf(0.975, independent))
+
+
+def covariance_and_noise(
+    batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
+) -> tuple[Float[np.ndarray, "free free"], NoiseModel]:
+    """Return the covariance of fitted parameters, and the noise that it rests on.
+
+    Parameters as in `uncertainty`.
+    """
     n_runs, n = residual.shape
     design = jacobian.reshape(len(jacobian), -1).T
     rows = np.arange(n_runs * n).reshape(n_runs, n)
     sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
     covariance, _, noise = least_squares_covariance(design, residual.ravel(), sequences)
-    independent = max(noise.effective_samples - len(jacobian), 1.0)
-    return covariance, float(student.ppf(0.975, independent))
+    return covariance, noise

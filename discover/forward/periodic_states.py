@@ -247,10 +247,10 @@ def _half_cycle(dynamics: Dynamics, wave, width):
             at_end, _ = relaxed(levels, middle, before, 1.0)
             slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
             n1 = remainder(stress, first, slow[0])
-            n2 = remainder(w.half * stress + w.a21 * n1, middle, slow[1])
-            n3 = remainder(w.half * stress + w.a31 * n1 + w.a32 * n2, middle, slow[1])
-            n4 = remainder(w.full * stress + w.a41 * n1 + w.a43 * n3, last, slow[2])
-            stress = w.full * stress + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
+            n2 = remainder(w.second(stress, n1), middle, slow[1])
+            n3 = remainder(w.third(stress, n1, n2), middle, slow[1])
+            n4 = remainder(w.fourth(stress, n1, n3), last, slow[2])
+            stress = w.end(stress, n1, n2, n3, n4)
             after = combined("modulus_factor", at_end) * sheared(stress, middle)
             levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
             left = [a * b for a, b in zip(left, kept, strict=True)]

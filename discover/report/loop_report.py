@@ -238,14 +238,14 @@ def _explanations(result: LoopResult) -> list[dict[str, Any]]:
     def named(effects: Sequence[str]) -> str:
         return " + ".join(map(effect_title, effects)) or "the declared model alone"
 
-    chosen = {stage.effect for stage in result.stages}
+    chosen = result.explanations.holding([stage.effect for stage in result.stages])
     return [
         {
             "effects": named(one.effects),
             "twins": "; ".join(map(named, one.twins)),
             "probability": one.probability,
             "error": one.error,
-            "chosen": any(set(member) == chosen for member in one.members),
+            "chosen": one is chosen,
         }
         for one in result.explanations.likeliest_first
     ]

@@ -97,8 +97,8 @@ def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
     if len(record.predicted) > 1:
         sources["augmented"] = record.predicted[-1]
     for source, predicted in sources.items():
-        found = source == [*sources][-1] and record.band is not None
-        low, high = record.band if found and record.band is not None else (np.nan, np.nan)
+        band = record.band if source == [*sources][-1] else None
+        low, high = (np.nan, np.nan) if band is None else band
         yield _lines(
             run=record.name,
             role="held_out" if record.held_out else "fit",

@@ -134,9 +134,8 @@ def _loop_sure(result: LoopResult) -> str:
 
 def _alternatives(result: LoopResult) -> str:
     """Return what is likelier than what was found, or nearly as likely; empty if nothing is."""
-    chosen = {stage.effect for stage in result.stages}
     found = result.explanations.likeliest_first
-    own = next((e for e in found if any(set(m) == chosen for m in e.members)), None)
+    own = result.explanations.holding([stage.effect for stage in result.stages])
     others = [e for e in found if e is not own]
     if own is None or not others:
         return ""

@@ -58,6 +58,22 @@ class KrogstadWeights(NamedTuple):
     b23: Float[Array, " ..."]
     b4: Float[Array, " ..."]
 
+    def second(self, y, n1):
+        """Return Y2, of the state and the remainder there; shapes that broadcast, as below."""
+        return self.half * y + self.a21 * n1
+
+    def third(self, y, n1, n2):
+        """Return Y3."""
+        return self.half * y + self.a31 * n1 + self.a32 * n2
+
+    def fourth(self, y, n1, n3):
+        """Return Y4."""
+        return self.full * y + self.a41 * n1 + self.a43 * n3
+
+    def end(self, y, n1, n2, n3, n4):
+        """Return the state after the step."""
+        return self.full * y + self.b1 * n1 + self.b23 * (n2 + n3) + self.b4 * n4
+
 
 def krogstad_weights(
     z: Float[Array, " ..."], step: Float[Array, " ..."] | Float[Array, ""]
@@ -164,7 +180,7 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
 
         start = jnp.zeros((4, *y0.shape), y0.dtype)
         (n1, n2, n3, n4), _ = jax.lax.scan(stage, start, (jnp.arange(4), decayed, tableau, times))
-        y1 = w.full * y0 + w.b1 * n1 + w.b23 * (n2 + n3) + w.b4 * n4
+        y1 = w.end(y0, n1, n2, n3, n4)
         slope = n1 - self.decay * y0
         slope_after = terms.vf(t1, y1, args)
         error = w.b4 * (slope_after + self.decay * y1 - n4)

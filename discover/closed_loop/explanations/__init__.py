@@ -1,11 +1,10 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
-from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, carry
+from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry
 from discover.closed_loop.explanations.report import explain, with_band
 
 __all__ = [
     "BEAM_WIDTH",
-    "Carried",
     "carry",
     "explain",
     "with_band",

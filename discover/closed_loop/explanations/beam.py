@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore, attribute
-from discover.closed_loop.augment import refit, taken_out
+from discover.closed_loop.augment import criterion, taken_out
 from discover.closed_loop.search import Search
-from discover.closed_loop.seen_sets import SeenSet, SeenSets
+from discover.closed_loop.seen_sets import SeenSet
 from discover.forward.least_squares import Fit, fit_batch
-from discover.statistics.residual import summarise
+from discover.statistics.residual import judged_cost, summarise
 
 BEAM_WIDTH = 8
 """Explanations that are carried side by side, by default."""
@@ -25,7 +24,6 @@ WINDOW = 20.0
 [Madigan & Raftery 1994, J. Am. Stat. Assoc. 89, 1535]."""
 
 _SLACK = 2.0  # of the criterion, for fits that only ranked
-_LEADERS = 8
 _TWIN = 1e-3
 """Relative difference of costs up to which two sets may be twins: what a ranking fit leaves open
 (`RANKING`)."""
@@ -48,28 +46,6 @@ class Carried:
     effects: tuple[str, ...]
     fit: Fit
     criterion: float
-
-
-@dataclass(frozen=True)
-class Criterion:
-    """The information criterion by which the search chose, of whole sets; see `augment.evidence`.
-
-    Attributes
-    ----------
-    effective_samples
-        Number of independent samples of what the search left.
-    n_candidates
-        Candidates among which each effect was chosen.
-    """
-
-    effective_samples: float
-    n_candidates: int
-
-    def of(self, one: SeenSet) -> float:
-        """Return the criterion of a set of effects: small for a probable one."""
-        price = len(one.free) * np.log(max(self.effective_samples, 2.0))
-        price += 2.0 * len(one.effects) * np.log(max(self.n_candidates, 1))
-        return float(self.effective_samples * np.log(max(one.cost, np.finfo(float).tiny)) + price)
 
 
 def carry(
@@ -97,19 +73,17 @@ def carry(
     own = tuple(search.active)
     search.seen.note(own, search.fit, weight)
     effective = summarise(search.fit.residual, weight).effective_samples
-    criterion = Criterion(effective, search.n_candidates)
     # twins of one that was followed lead nowhere else
     followed = [one for one in search.seen if one.effects == tuple(sorted(own))]
     spent = 0
     while spent < width and width > 1:
-        ahead = [one for one in _in_window(search, criterion) if not _twin(one, followed)]
+        ahead = [one for one in _in_window(search, effective) if not _twin(one, followed)]
         if not ahead:
             break
         say(f"following another explanation: {', '.join(ahead[0].effects) or 'no effect'}")
         followed.append(ahead[0])
         spent += _follow(search, ahead[0], max_effects, width - spent)
-    found = _fitted(search, _in_window(search, criterion)[: 2 * width], criterion)[:width]
-    return sorted(found, key=lambda one: one.criterion)
+    return _fitted(search, _in_window(search, effective)[: 2 * width], effective, width)
 
 
 def _note_shorter(search: Search) -> None:
@@ -135,10 +109,15 @@ def _note_shorter(search: Search) -> None:
             search.seen.note(effects, fit, weight)
 
 
-def _in_window(search: Search, criterion: Criterion) -> list[SeenSet]:
+def _in_window(search: Search, effective: float) -> list[SeenSet]:
     """Return the sets that are within reach of the best, the best first."""
     sets = [one for one in search.seen if not search.refused & set(one.effects)]
-    worth = {one.effects: criterion.of(one) for one in sets}
+    worth = {
+        one.effects: criterion(
+            one.cost, len(one.free), len(one.effects), effective, search.n_candidates
+        )
+        for one in sets
+    }
     limit = min(worth.values()) + 2.0 * np.log(WINDOW) + _SLACK
     return sorted(
         (one for one in sets if worth[one.effects] <= limit), key=lambda one: worth[one.effects]
@@ -172,7 +151,7 @@ def _follow(search: Search, one: SeenSet, max_effects: int, most: int) -> int:
         and one.effects not in explored
         and not search.tolerated.random(fit, one.effects)
     ):
-        _refit_leading(search, fit, list(one.effects))
+        search.choices_beside(fit, one.effects)  # which notes them
         stages += 1
     for name in one.effects:
         others = tuple(other for other in one.effects if other != name)
@@ -181,46 +160,33 @@ def _follow(search: Search, one: SeenSet, max_effects: int, most: int) -> int:
         theta, free = taken_out(search.model, fit, name)
         without = fit_batch(search.model, search.batch, [theta], [free], prior=search.prior)[0]
         if without.usable:
-            _refit_leading(search, without, list(others))
+            search.choices_beside(without, others)
             stages += 1
     return stages
 
 
-def _refit_leading(search: Search, fit: Fit, others: list[str]) -> None:
-    leading: list[CandidateScore] = attribute(
-        search.model, search.batch, fit, others, _LEADERS, search.candidate
-    ).leading
-    choices = refit(search.model, search.batch, fit, leading, search.n_candidates, search.prior)
-    search.possible(choices, others)  # which notes them
-
-
 def _fits(search: Search, sets: Sequence[SeenSet]) -> list[Fit]:
     """Return seen sets, fitted to the end."""
-    starts = []
-    for one in sets:
-        start = search.model.zero()
-        start[list(one.free)] = one.values
-        starts.append(start)
-    free = [one.free for one in sets]
+    starts, free = [one.theta(search.model) for one in sets], [one.free for one in sets]
     return fit_batch(search.model, search.batch, starts, free, prior=search.prior)
 
 
-def _fitted(search: Search, sets: Sequence[SeenSet], criterion: Criterion) -> list[Carried]:
-    own, weight = tuple(search.active), np.asarray(search.batch.weight)
-    others = [one for one in sets if one.effects != tuple(sorted(own))]
-    found = [(own, search.fit)]
-    if others:
-        found += [
-            (one.effects, fit)
-            for one, fit in zip(others, _fits(search, others), strict=True)
-            if fit.usable
-        ]
-    again = SeenSets()
-    for effects, fit in found:
-        again.note(effects, fit, weight)
-    worth = {one.effects: criterion.of(one) for one in again}
-    carried = [Carried(effects, fit, worth[tuple(sorted(effects))]) for effects, fit in found]
-    limit = min(one.criterion for one in carried) + 2.0 * np.log(WINDOW)
-    # what the search chose is among them, whatever its weight
-    kept = [one for one in carried if one.criterion <= limit or one.effects == own]
-    return sorted(kept, key=lambda one: (one.effects != own, one.criterion))
+def _fitted(search: Search, sets: Sequence[SeenSet], effective: float, width: int) -> list[Carried]:
+    """Return sets fitted to the end that are within reach, what the search chose always among them.
+
+    The most probable first.
+    """
+    weight = np.asarray(search.batch.weight)
+
+    def carried(effects: tuple[str, ...], fit: Fit) -> Carried:
+        cost = judged_cost(fit.residual, weight)
+        own = criterion(cost, len(fit.free), len(effects), effective, search.n_candidates)
+        return Carried(effects, fit, own)
+
+    chosen = carried(tuple(search.active), search.fit)
+    others = [one for one in sets if one.effects != tuple(sorted(search.active))]
+    fits = _fits(search, others) if others else []
+    found = [carried(one.effects, fit) for one, fit in zip(others, fits, strict=True) if fit.usable]
+    limit = min(one.criterion for one in [chosen, *found]) + 2.0 * np.log(WINDOW)
+    near = sorted((one for one in found if one.criterion <= limit), key=lambda one: one.criterion)
+    return sorted([chosen, *near[: width - 1]], key=lambda one: one.criterion)

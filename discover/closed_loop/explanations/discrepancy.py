@@ -19,8 +19,8 @@ def discrepancy(
     fitted: Batch,
     fit: Fit,
     effects: Sequence[str],
-    batch: Batch,
-) -> Float[np.ndarray, "runs n"]:
+    batches: Sequence[Batch],
+) -> list[Float[np.ndarray, "runs n"]]:
     """Return the mean square of what small amounts of every other candidate would change.
 
     A law that holds all candidates beside the explanation, each in an amount with a Gaussian prior
@@ -34,24 +34,37 @@ def discrepancy(
         The model, the runs that were fitted, and the fit of the explanation.
     effects
         Candidates that are not in it.
-    batch
-        The runs to predict.
+    batches
+        Runs to predict; what was fitted may be one of them.
 
     Returns
     -------
-    In squared weighted residuals of `batch`; zero at padding.
+    For each of `batches`, in its squared weighted residuals; zero at padding.
     """
-    weight = np.asarray(batch.weight)
     if not effects:
-        return np.zeros_like(weight)
+        return [np.zeros_like(np.asarray(batch.weight)) for batch in batches]
     at = [model.positions(name)[0] for name in effects]
     own = _signatures(model, fitted, fit.theta, at)
-    other = own if batch is fitted else _signatures(model, batch, fit.theta, at)
+    out = []
+    for batch in batches:
+        other = own if batch is fitted else _signatures(model, batch, fit.theta, at)
+        changed = _changed(fitted, fit, own, other)
+        out.append(changed.reshape(np.asarray(batch.weight).shape))
+    return out
+
+
+def _changed(
+    fitted: Batch,
+    fit: Fit,
+    own: Float[np.ndarray, "effects samples"],
+    other: Float[np.ndarray, "effects others"],
+) -> Float[np.ndarray, " others"]:
+    """Return the mean square change, from what each candidate does in the fitted and other runs."""
     size = np.linalg.norm(own, axis=1)
     # what does nothing here, or cannot be followed, says nothing there
     usable = (size > 0.0) & np.isfinite(size) & np.all(np.isfinite(other), axis=1)
     if not np.any(usable):
-        return np.zeros_like(weight)
+        return np.zeros(other.shape[1])
     seen = np.asarray(fitted.weight).ravel() > 0
     free = fit.jacobian.reshape(len(fit.free), seen.size)[:, seen]
     residual = fit.residual.ravel()[seen]
@@ -64,7 +77,7 @@ def discrepancy(
     effective = summarise(fit.residual, np.asarray(fitted.weight)).effective_samples
     mean, root = posterior(design, -residual, min(effective, float(len(residual))))
     shift, spread = mean @ change, np.sum((root @ change) ** 2, axis=0)
-    return (shift**2 + spread).reshape(weight.shape)
+    return shift**2 + spread
 
 
 def posterior(

@@ -9,24 +9,24 @@ from scipy.stats import t as student
 
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.discrepancy import discrepancy
-from discover.closed_loop.held_out import uncertainty
+from discover.closed_loop.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import jacobians
+from discover.forward.least_squares import Fit, jacobians
 
 _HALVINGS = 40
 _TAILS = (0.025, 0.975)
 
 
-def mixed_band(
+def mixed_bands(
     model: AugmentedModel,
     fitted: Batch,
     carried: Sequence[Carried],
     probabilities: Sequence[float],
-    batch: Batch,
+    batches: Sequence[Batch],
     noise: float,
     structured: bool,
     candidates: Sequence[str],
-) -> Float[np.ndarray, "2 runs n"]:
+) -> list[Float[np.ndarray, "2 runs n"]]:
     """Return where 95 % of the measurements should lie, were it one of the explanations.
 
     Each explanation gives a normal distribution about its prediction, as wide as its constants are
@@ -38,8 +38,8 @@ def mixed_band(
         The model, and the runs that were fitted.
     carried, probabilities
         The explanations, and how probable each is.
-    batch
-        The runs to predict.
+    batches
+        Runs to predict; what was fitted may be one of them.
     noise
         Relative noise of a measurement.
     structured
@@ -50,37 +50,53 @@ def mixed_band(
 
     Returns
     -------
-    The lower and the upper limit, in the unit of the record; zero at padding.
+    For each of `batches` the lower and the upper limit, in the unit of the record; zero at padding.
     """
+    tails = student.ppf(_TAILS[1], len(fitted.weight)) / ndtri(_TAILS[1]) if structured else 1.0
+    parts: list[list[tuple[np.ndarray, np.ndarray, float]]] = [[] for _ in batches]
+    for one, probability in zip(carried, probabilities, strict=True):
+        others = [name for name in candidates if name not in one.effects]
+        lacking = discrepancy(model, fitted, one.fit, others, batches)
+        root = root_of_covariance(fitted, one.fit)[0] if one.fit.free else None
+        left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
+        for part, batch, square in zip(parts, batches, lacking, strict=True):
+            found = _distribution(model, one.fit, root, square, left, batch)
+            if found is not None:
+                part.append((*found, probability))
+    return [_limits(part, batch) for part, batch in zip(parts, batches, strict=True)]
+
+
+def _distribution(
+    model: AugmentedModel, fit: Fit, root: np.ndarray | None, square: np.ndarray, left: float,
+    batch: Batch,
+) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
+    """Return mean and standard deviation of what an explanation predicts; None if it runs away."""
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     seen = weight > 0
     scale = np.where(seen, weight, 1.0)
-    share = np.asarray(probabilities) / np.sum(probabilities)
+    residual = model.residuals([fit.theta], batch)
+    if not np.all(np.isfinite(residual)):
+        return None
+    variance = square / scale**2
+    if root is not None:
+        slope = jacobians(model, batch, [fit.theta], residual, [fit.free])[0] / scale
+        columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
+        variance = variance + np.sum(columns**2, axis=0)
     samples = np.maximum(np.count_nonzero(seen, axis=1), 1)
     size = np.sqrt(np.sum(np.where(seen, recorded, 0.0) ** 2, axis=1) / samples)[:, None]
-    tails = student.ppf(_TAILS[1], len(fitted.weight)) / ndtri(_TAILS[1]) if structured else 1.0
-    means, deviations, shares = [], [], []
-    for one, part in zip(carried, share, strict=True):
-        residual = model.residuals([one.fit.theta], batch)
-        if not np.all(np.isfinite(residual)):
-            continue
-        variance = np.zeros_like(weight)
-        if one.fit.free:
-            slope = jacobians(model, batch, [one.fit.theta], residual, [one.fit.free])[0] / scale
-            root, _ = uncertainty(fitted, one.fit)
-            columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
-            variance = np.sum(columns**2, axis=0)
-        others = [name for name in candidates if name not in one.effects]
-        variance += discrepancy(model, fitted, one.fit, others, batch) / scale**2
-        left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
-        means.append(np.where(seen, residual[0] / scale + recorded, 0.0))
-        deviations.append(np.sqrt(variance + (left * size) ** 2))
-        shares.append(part)
-    if not means:
-        return np.full((2, *weight.shape), np.nan)
-    mean, deviation = np.array(means), np.maximum(np.array(deviations), np.finfo(float).tiny)
-    part = np.array(shares)[:, None, None] / np.sum(shares)
-    return np.where(seen, np.array([quantile(mean, deviation, part, p) for p in _TAILS]), 0.0)
+    mean = np.where(seen, residual[0] / scale + recorded, 0.0)
+    return mean, np.sqrt(variance + (left * size) ** 2)
+
+
+def _limits(part: list[tuple[np.ndarray, np.ndarray, float]], batch: Batch) -> np.ndarray:
+    """Return the limits of mixed distributions; not a number where there is none."""
+    seen = np.asarray(batch.weight) > 0
+    if not part:
+        return np.full((2, *seen.shape), np.nan)
+    mean, deviation, share = map(np.array, zip(*part, strict=True))
+    deviation = np.maximum(deviation, np.finfo(float).tiny)
+    share = share[:, None, None] / np.sum(share)
+    return np.where(seen, np.array([quantile(mean, deviation, share, p) for p in _TAILS]), 0.0)
 
 
 def quantile(mean, deviation, share, level: float) -> Float[np.ndarray, "runs n"]:

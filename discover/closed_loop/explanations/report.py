@@ -8,7 +8,7 @@ import numpy as np
 from discover.closed_loop.before_after import errors_of, record_runs
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.mixture import mixed_band
+from discover.closed_loop.explanations.mixture import mixed_bands
 from discover.closed_loop.explanations.weighing import explanations_of
 from discover.closed_loop.judgement import Judgement
 from discover.closed_loop.run_record import RunRecord
@@ -77,15 +77,15 @@ def with_band(
     """
     of = {one.effects: one.probability for one in explanations.likeliest_first}
     mixed = [one for one in carried if one.effects in of]
-    out = []
-    for held, records in parts:
-        if held is None or not mixed:
-            out += records
-            continue
-        shares = [of[one.effects] for one in mixed]
-        noise, structured = judgement.left.noise, judgement.structured
-        band = mixed_band(model, batch, mixed, shares, held, noise, structured, candidates)
-        out += [
-            replace(record, band=band[:, i, : len(record.time)]) for i, record in enumerate(records)
-        ]
-    return out
+    if not mixed:
+        return [record for _, records in parts for record in records]
+    told = [(held, records) for held, records in parts if held is not None]
+    bands = mixed_bands(
+        model, batch, mixed, [of[one.effects] for one in mixed], [held for held, _ in told],
+        judgement.left.noise, judgement.structured, candidates,
+    )  # fmt: skip
+    return [
+        replace(record, band=band[:, i, : len(record.time)])
+        for (_, records), band in zip(told, bands, strict=True)
+        for i, record in enumerate(records)
+    ]
