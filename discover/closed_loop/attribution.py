@@ -12,6 +12,9 @@ from discover.forward.least_squares import Fit
 ALIAS_COSINE = 0.99
 """Signatures that agree to this cosine are the same to first order."""
 
+_RUNAWAY = 1e9
+"""Weighted residual from which on a trial says nothing but that its stress runs away."""
+
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
 _FINITE = 4.0
@@ -111,10 +114,11 @@ def attribute(
     residual = fit.residual.ravel()
     total = float(residual @ residual)
     changes = model.residuals(probes, batch).reshape(len(probes), -1) - residual
-    basis, upper = np.linalg.qr(fit.jacobian.reshape(len(fit.free), residual.size).T)
+    known = fit.jacobian.reshape(len(fit.free), residual.size).T
+    basis, upper = np.linalg.qr(np.where(_is_tame(known), known, 0.0))
     tried, sides, yields = [], [], []
     for effect, position, change in zip(owners, at, changes, strict=True):
-        signature = np.where(np.isfinite(change), change, 0.0) / (0.1 * model.first_trial[position])
+        signature = np.where(_is_tame(change), change, 0.0) / (0.1 * model.first_trial[position])
         length = np.linalg.norm(signature)
         shared = basis.T @ signature
         beyond = signature - basis @ shared
@@ -166,6 +170,11 @@ def attribute(
             leading.append(i)
     rest = [i for i in order if i not in leading]
     return Attribution([candidates[i] for i in leading], [candidates[i] for i in rest])
+
+
+def _is_tame(values: np.ndarray) -> np.ndarray:
+    """Return where a trial did not run away: its square must be a number too."""
+    return np.abs(values) < _RUNAWAY  # false for what is not a number
 
 
 def _bases(model: AugmentedModel, fit: Fit, effect: AbstractEffect) -> list[np.ndarray]:

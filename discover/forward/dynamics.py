@@ -8,6 +8,11 @@ from jaxtyping import Array, Float
 
 from discover.effects import StateEffect
 from discover.protocols.kinematics import Kinematics
+from discover.simulate.exponential_runge_kutta import (
+    KrogstadWeights,
+    StressWeights,
+    krogstad_weights,
+)
 
 
 class Modes(NamedTuple):
@@ -43,6 +48,9 @@ class Dynamics(NamedTuple):
         Elements in series with the fluid; None where there can be none.
     viscosity
         Recorded stress beside the modes at unit rate, in Pa s.
+    trace_relaxation
+        Rate at which a small trace of each mode relaxes beside −σ, over 1/λ, shape (k,); that too
+        is integrated exactly. None where chains do not retract.
     """
 
     slope: Callable
@@ -52,6 +60,7 @@ class Dynamics(NamedTuple):
     states: dict[StateEffect, Float[Array, " p"]]
     series: Series | None
     viscosity: Float[Array, ""]
+    trace_relaxation: Float[Array, " k"] | None = None
 
     @property
     def modes(self) -> Modes:
@@ -61,6 +70,37 @@ class Dynamics(NamedTuple):
         return Modes(
             *(jnp.concatenate(pair) for pair in zip(self.declared, self.extra, strict=True))
         )
+
+    @property
+    def decay(self) -> float:
+        """Rate over 1/λ of the relaxation that is integrated exactly."""
+        return 1.0 if self.linear_relaxation else 0.0
+
+    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 10 _"], ...]:
+        """Return what `weights_of_step` wants of steps of these widths in s.
+
+        Apart for the declared modes and those of effects; of each the weights of its stress and,
+        where that relaxes faster, of its trace.
+        """
+        pieces, first = [], 0
+        for modes in [self.declared] if self.extra is None else [self.declared, self.extra]:
+            h, last = width[:, None] / modes.relaxation_time, first + len(modes.relaxation_time)
+            kinds = [krogstad_weights(-self.decay * h, h)]
+            if self.trace_relaxation is not None:
+                kinds.append(
+                    krogstad_weights(-(self.decay + self.trace_relaxation[first:last]) * h, h)
+                )
+            pieces.append(jnp.stack([jnp.stack(kind, axis=1) for kind in kinds], axis=1))
+            first = last
+        return tuple(pieces)
+
+    def weights_of_step(self, pieces: tuple[Float[Array, "kinds 10 _"], ...]) -> StressWeights:
+        """Return the weights of one step, by its pieces of `weights`."""
+        joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
+        whole = KrogstadWeights(*joined[0])
+        if self.trace_relaxation is None:
+            return StressWeights(whole)
+        return StressWeights(whole, KrogstadWeights(*joined[1]), self.trace_relaxation)
 
     def rest(self) -> tuple[Float[Array, "4 k"], tuple[Float[Array, ""], ...]]:
         """Return modes and states at rest."""

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import KrogstadWeights, krogstad_weights, relax
+from discover.simulate.exponential_runge_kutta import relax
 
 # The rate enters a law linearly but for terms that name it, for which one more step is enough
 _NEWTON_STEPS = 2
@@ -44,14 +44,11 @@ def strain_at_stress(
     """
     width = jnp.diff(times)
     modes = dynamics.modes
-    h = width[:, None] / modes.relaxation_time
-    z = -h if dynamics.linear_relaxation else jnp.zeros_like(h)
-    weights = KrogstadWeights(*krogstad_weights(z, h))
-    kept = 1.0 if dynamics.linear_relaxation else 0.0
 
     def step(carry, inputs):
         stress, levels, before, strain = carry
-        (from_, target), h, w = inputs
+        (from_, target), h, weights = inputs
+        w = dynamics.weights_of_step(weights)
         sheared, felt = dynamics.sheared(stress, before, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         ahead = _after(dynamics, levels, felt, sheared, h)
@@ -79,7 +76,8 @@ def strain_at_stress(
             for _ in range(_NEWTON_STEPS):
                 value, slope = jax.jvp(missing, (rate,), (jnp.ones_like(rate),))
                 rate = rate - value / slope
-            return rate, dynamics.change(state, rate, slow, flow) + kept * state
+            change = dynamics.change(state, rate, slow, flow)
+            return rate, w.remainder(state, change, dynamics.decay)
 
         r1, n1 = stage(stress)
         r2, n2 = stage(w.second(stress, n1))
@@ -96,7 +94,9 @@ def strain_at_stress(
     stress, levels = dynamics.rest()
     zero = jnp.zeros((), dtype=stress.dtype)
     start = (stress, levels, zero, zero)
-    _, strain = jax.lax.scan(step, start, ((imposed[:-1], imposed[1:]), width, weights))
+    _, strain = jax.lax.scan(
+        step, start, ((imposed[:-1], imposed[1:]), width, dynamics.weights(width))
+    )
     strain = jnp.concatenate([jnp.zeros(1), strain])
     if dynamics.series is None:
         return strain

@@ -12,21 +12,10 @@ from jaxtyping import Array, Float
 from discover.effects import StateEffect
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import (
-    KrogstadWeights,
-    krogstad_weights,
-    relax,
-)
+from discover.simulate.exponential_runge_kutta import relax
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
-
-
-def step_weights(relaxation_time, width, linear_relaxation) -> Float[Array, "steps 10 k"]:
-    """Return the weights of every step, in the dimensionless time of each mode."""
-    h = width[:, None] / relaxation_time
-    z = -h if linear_relaxation else jnp.zeros_like(h)
-    return jnp.stack(krogstad_weights(z, h), axis=1)
 
 
 def _relax(effect: StateEffect, values, state, rate, stress, width):
@@ -53,22 +42,18 @@ def integrate(
     """
     width = jnp.diff(times)
     states, series = dynamics.states, dynamics.series
-    linear_relaxation = dynamics.linear_relaxation
-    weights = [step_weights(dynamics.declared.relaxation_time, width, linear_relaxation)]
-    if dynamics.extra is not None:
-        weights.append(step_weights(dynamics.extra.relaxation_time, width, linear_relaxation))
     # so that it is traced once, and not at each of the four stages
     slope = jax.jit(lambda stress, rate, slow: dynamics.change(stress, rate, slow, flow))
     combined = dynamics.combined
 
-    def remainder(stress, rate, slow):
-        change = slope(stress, rate, slow)
-        return change + stress if linear_relaxation else change
-
     def step(carry, inputs):
         stress, levels, missing, compliance_rate = carry
-        (first_rate, middle_rate, last_rate), h, parts = inputs
-        w = KrogstadWeights(*(parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)))
+        (first_rate, middle_rate, last_rate), h, weights = inputs
+        w = dynamics.weights_of_step(weights)
+
+        def remainder(stress, rate, slow):
+            return w.remainder(stress, slope(stress, rate, slow), dynamics.decay)
+
         scale = combined("modulus_factor", levels)
         shear_before, felt_rate = dynamics.sheared(stress, middle_rate, flow)
         shear_before = scale * shear_before
@@ -84,7 +69,7 @@ def integrate(
         if series is not None:
             scale_last = combined("modulus_factor", [p[1] for p in predicted])
             n1, compliance_rate = _compliance_rate(
-                dynamics, scale_last, stress, shear_before, missing, compliance_rate, n1, w,
+                dynamics, scale_last, stress, shear_before, missing, compliance_rate, n1, w.whole,
                 first_rate, last_rate, h, times[-1],
             )  # fmt: skip
         middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
@@ -116,7 +101,9 @@ def integrate(
     zero = jnp.zeros(())
     start = (*dynamics.rest(), zero, zero)
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
-    _, (stress, compliance_rate) = jax.lax.scan(step, start, (rates, width, tuple(weights)))
+    _, (stress, compliance_rate) = jax.lax.scan(
+        step, start, (rates, width, dynamics.weights(width))
+    )
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides

@@ -8,8 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.integrator import step_weights
-from discover.simulate.exponential_runge_kutta import KrogstadWeights, relax
+from discover.simulate.exponential_runge_kutta import relax
 
 # Half cycles from rest before Newton's steps, most iterations in all, and the relative step below
 # which the next one would change nothing that is seen: Newton's error goes as its square
@@ -217,13 +216,11 @@ def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]
 
 def _half_cycle(dynamics: Dynamics, wave, width):
     """Return the function from state and strain amplitude to what half a cycle makes of them."""
-    linear_relaxation, combined = dynamics.linear_relaxation, dynamics.combined
-    weights = step_weights(dynamics.modes.relaxation_time, width[None], linear_relaxation)[0]
-    w = KrogstadWeights(*weights)
+    combined = dynamics.combined
+    w = dynamics.weights_of_step(tuple(piece[0] for piece in dynamics.weights(width[None])))
 
     def remainder(stress, rate, slow):
-        change = dynamics.change(stress, rate, slow, None)
-        return change + stress if linear_relaxation else change
+        return w.remainder(stress, dynamics.change(stress, rate, slow, None), dynamics.decay)
 
     def relaxed(levels, rate, stress, share):
         pairs = [e.source_and_decay(v, rate, stress) for e, v in dynamics.states.items()]

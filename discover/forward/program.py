@@ -353,7 +353,14 @@ class Program:
             {effect: self._values(theta, effect) for effect in self._states},
             series,
             self._beside(numbers, theta, jnp.ones(1), flow)[0],
+            self._trace_relaxation(law, modulus, extra) if law.retracts else None,
         )
+
+    def _trace_relaxation(self, law: AbstractConstitutiveLaw, modulus, extra: Modes | None):
+        """Return that of each mode; a choice of method, through which no gradient passes."""
+        rest = jnp.zeros((4, len(modulus) + (0 if extra is None else len(extra.modulus))))
+        of_law = self._over_modes(lambda law, stress, _: law.trace_relaxation(stress))
+        return jax.lax.stop_gradient(of_law(law, rest, rest))
 
 
 def _where_in_shear(flow: Kinematics | None, changed, unchanged):

@@ -1,13 +1,15 @@
 """The interface of every constitutive law."""
 
 from abc import abstractmethod
+from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
-from tensor_library.algebra import Symmetric
+from tensor_library.algebra import Symmetric, identity_like, trace
 from tensor_library.kinematics import (
     VelocityGradient,
     rate_of_deformation,
@@ -26,9 +28,13 @@ class AbstractConstitutiveLaw(eqx.Module):
     ----------
     linear_relaxation
         Whether the −σ is part of the known law. False where it too is left to a learner.
+    retracts
+        Whether chains retract faster than they turn, so that h makes the trace of σ relax faster
+        than its deviator.
     """
 
     linear_relaxation: eqx.AbstractVar[bool]
+    retracts: ClassVar[bool] = False
 
     @abstractmethod
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
@@ -45,6 +51,17 @@ class AbstractConstitutiveLaw(eqx.Module):
             If it is none, and there is more to say of that.
         """
         return None
+
+    def trace_relaxation(self, stress: Symmetric) -> Float[Array, ""]:
+        """Return the rate, over 1/λ, at which h lets the trace of this stress relax beside −σ.
+
+        The derivative of tr h along I, over 3, without flow. Where `retracts`, integrators treat
+        that at rest as they do −σ, so that fast modes need no small steps. It decides how they
+        step, and not what law they solve.
+        """
+        still = jnp.zeros_like(stress)
+        along = jax.jvp(lambda s: self.extra_term(s, still), (stress,), (identity_like(stress),))[1]
+        return trace(along) / 3.0
 
     def stress_rate(self, stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
         """Return dσ/dt.

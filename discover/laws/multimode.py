@@ -104,10 +104,17 @@ class Fluid(eqx.Module):
         """Return the state at rest."""
         return jnp.zeros((self.n_modes, 4))
 
-    def decay_rate(self) -> Float[Array, " k"]:
-        """Return the rate of linear relaxation of each mode, in 1/s."""
-        rate = 1.0 / self.relaxation_time
-        return rate if self.law.linear_relaxation else jnp.zeros_like(rate)
+    def decay_rate(self) -> Float[Array, "k _"]:
+        """Return the rate of linear relaxation of each mode in 1/s, (k, 1).
+
+        Where chains retract that of each component, (k, 4): of normal stresses the mean of those of
+        deviator and trace, from which neither is so far off that fast modes run away.
+        """
+        rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
+        if not self.law.retracts:
+            return rate
+        faster = 0.5 * self.law.trace_relaxation(jnp.zeros(4)) * jnp.array([1.0, 1.0, 1.0, 0.0])
+        return rate + faster / self.relaxation_time[:, None]
 
     def state_rate(
         self, state: Float[Array, "k 4"], velocity_gradient: VelocityGradient

@@ -75,6 +75,60 @@ class KrogstadWeights(NamedTuple):
         return self.full * y + self.b1 * n1 + self.b23 * (n2 + n3) + self.b4 * n4
 
 
+class StressWeights(NamedTuple):
+    """The same for stresses of modes, (4, k), whose trace may relax faster than the rest.
+
+    Attributes
+    ----------
+    whole
+        Weights of each mode.
+    trace
+        Those of its trace; None where it relaxes as the rest does.
+    faster
+        By how much the trace relaxes faster, over 1/λ, shape (k,).
+    """
+
+    whole: KrogstadWeights
+    trace: KrogstadWeights | None = None
+    faster: Float[Array, " k"] | float = 0.0
+
+    def remainder(self, stress, change, decay: float):
+        """Return what of a change is not relaxation at the rates of these weights."""
+        if decay:
+            change = change + decay * stress
+        if self.trace is None:
+            return change
+        return change.at[:3].add(self.faster * _mean_normal(stress))
+
+    def second(self, y, n1):
+        """Return Y2, as `KrogstadWeights` does."""
+        return self._applied("second", y, n1)
+
+    def third(self, y, n1, n2):
+        """Return Y3."""
+        return self._applied("third", y, n1, n2)
+
+    def fourth(self, y, n1, n3):
+        """Return Y4."""
+        return self._applied("fourth", y, n1, n3)
+
+    def end(self, y, n1, n2, n3, n4):
+        """Return the state after the step."""
+        return self._applied("end", y, n1, n2, n3, n4)
+
+    def _applied(self, stage: str, *parts):
+        found = getattr(self.whole, stage)(*parts)
+        if self.trace is None:
+            return found
+        means = [_mean_normal(part) for part in parts]
+        apart = getattr(self.trace, stage)(*means) - getattr(self.whole, stage)(*means)
+        return found.at[:3].add(apart)
+
+
+def _mean_normal(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
+    return jnp.sum(stress[:3], axis=0) / 3.0
+
+
 def krogstad_weights(
     z: Float[Array, " ..."], step: Float[Array, " ..."] | Float[Array, ""]
 ) -> KrogstadWeights:

@@ -67,9 +67,9 @@ def _observe(t, state, args):
     return fluid.stress(state, protocol.velocity_gradient(t))
 
 
-def _decay(fluid: Fluid) -> Float[Array, "k 1"]:
+def _decay(fluid: Fluid) -> Float[Array, "k _"]:
     # where the split lies is a choice of method, not of model: no gradient through it
-    return jax.lax.stop_gradient(fluid.decay_rate())[:, None]
+    return jax.lax.stop_gradient(fluid.decay_rate())
 
 
 @compiled

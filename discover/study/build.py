@@ -1,5 +1,6 @@
 """From a study to its data, its split and its declared fluid."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -369,7 +370,10 @@ def _start(law: str, parameter: str) -> float:
     if parameter not in LAWS[law].parameters:
         return 0.1  # make_law says what is wrong
     low, high = LAWS[law].parameters[parameter]
-    return 100.0 if high > 1e3 else min(max(0.1, low), high)
+    if high > 1e3:
+        return 100.0
+    # a range that leaves out zero spans orders of magnitude
+    return math.sqrt(low * high) if low > 0.0 else min(0.1, high)
 
 
 def _linear_start(dataset: Dataset) -> dict[str, float]:

@@ -10,6 +10,7 @@ from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.left_out import FEWEST_FOLDS, left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
+from discover.effects.base import EffectParameter, SignalEffect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus
@@ -129,3 +130,27 @@ def test_finer_steps_leave_other_effects_alone():
     batch = make_batch(runs(2))
     fit = fitted(model, batch, "giesekus_mobility")
     assert on_finer_steps(model, batch, runs(2), fit, ["giesekus_mobility"]) is fit
+
+
+class Runaway(SignalEffect):
+    """A trial of it is a number, and its square is none."""
+
+    def recorded_stress(self, values, record):
+        return record.stress + 1e200 * values[0]
+
+
+def test_a_trial_that_runs_away_scores_nothing_and_spoils_no_other():
+    def ranked(*effects):
+        model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0, fit_modulus=True), effects)
+        batch = make_batch(runs(2))
+        fit = fit_batch(model, batch, [model.zero()], [model.declared.free_positions])[0]
+        return {c.effect: c.reduction for c in attribute(model, batch, fit, [], leaders=9).leading}
+
+    amplitude = EffectParameter("size", "s", range_source="a test")
+    runaway = Runaway("runaway", (amplitude,), "", "", "")
+    alone, beside = (
+        ranked(make_effect("giesekus_mobility")),
+        ranked(make_effect("giesekus_mobility"), runaway),
+    )
+    assert alone["giesekus_mobility"] > 0.1
+    assert beside == {**alone, "runaway": 0.0}

@@ -81,7 +81,7 @@ def states_and_jacobian(
         runs = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, first, count), runs)
     modulus, relaxation_time = problem.modulus, problem.relaxation_time
     fluid = problem.fluid(rebuild(weights))
-    decay = jax.lax.stop_gradient(fluid.decay_rate())[:, None, None]
+    decay = jax.lax.stop_gradient(fluid.decay_rate())[..., None]
     n_weights = weights.shape[0]
 
     def one_mode(state, sensitivity, time_scale, gradient):

@@ -1,0 +1,57 @@
+"""Extended pom-pom law of branched melts."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
+from discover.laws.rolie_poly import stretch_of
+from tensor_library.algebra import Symmetric, identity_like, inner, square
+
+
+class ExtendedPomPom(AbstractConstitutiveLaw):
+    """XPP law in its single-equation form   [Verbeeten, Peters & Baaijens 2001, J. Rheol. 45, 823].
+
+    With the stretch of the backbone Λ = √(1 + tr σ/3),
+
+        h = α σ·σ + (f − 1)(σ + I),
+        f = 2 (λ/λ_s) e^{2(Λ − 1)/q} (1 − 1/Λ) + (1 − α tr(σ·σ)/3)/Λ²:
+
+    λ is the time in which the backbone turns, λ_s that in which it retracts, and q the number of
+    arms at each of its ends, which hold it the less the further it is drawn.
+    """
+
+    arms: Float[Array, ""] = eqx.field(converter=as_parameter)  # q
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # λ_s/λ
+    anisotropy: Float[Array, ""] = eqx.field(converter=as_parameter)  # α
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+    retracts = True
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ) as above."""
+        del rate
+        stretch = stretch_of(stress)
+        withdrawn = jnp.exp(2.0 / self.arms * (stretch - 1.0))
+        retraction = 2.0 / self.stretch_time_ratio * withdrawn * (1.0 - 1.0 / stretch)
+        turning = (1.0 - self.anisotropy * inner(stress, stress) / 3.0) / stretch**2
+        excess = retraction + turning - 1.0
+        return self.anisotropy * square(stress) + excess * (stress + identity_like(stress))
+
+
+NAMED = {
+    "xpp": NamedLaw(
+        "extended pom-pom",
+        ExtendedPomPom,
+        {"q": (1.0, 100.0), "stretch_time_ratio": (0.01, 1.0), "alpha": (0.0, 1.0)},
+        {
+            "q": "McLeish & Larson 1998: whole arms of one molecule, from the end of a linear "
+            "chain on; fits of polyethylene give up to some thirty",
+            "stretch_time_ratio": "Inkson et al. 1999, J. Rheol. 43, 873: a backbone retracts "
+            "before it turns; fits of polyethylene give 1/10 to 1",
+            "alpha": "Giesekus 1982: a mobility that no stress can make negative; Verbeeten, "
+            "Peters & Baaijens 2001 have up to 0.3",
+        },
+        source="Verbeeten, Peters & Baaijens 2001, J. Rheol. 45, 823",
+    )
+}

@@ -1,0 +1,55 @@
+"""Giesekus and PTT laws whose chains slip, as Johnson & Segalman's do."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.giesekus import NAMED as GIESEKUS
+from discover.laws.johnson_segalman import NAMED as JOHNSON_SEGALMAN
+from discover.laws.named import NamedLaw
+from discover.laws.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
+from tensor_library.algebra import Symmetric, anticommutator
+from tensor_library.terms import TermShare
+
+
+class NonAffine(AbstractConstitutiveLaw):
+    """A law with (ξ/2)(σ·γ̇ + γ̇·σ) added to its h   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    affine: AbstractConstitutiveLaw
+    slip_parameter: Float[Array, ""] = eqx.field(converter=as_parameter)  # ξ, 0 to 2
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return the h of the affine law and the slip."""
+        slip = 0.5 * self.slip_parameter * anticommutator(stress, rate)
+        return self.affine.extra_term(stress, rate) + slip
+
+    def as_terms(self) -> tuple[TermShare, ...] | None:
+        """Return both as a sum of library terms."""
+        slip = TermShare("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
+        affine = self.affine.as_terms()
+        return None if affine is None else (*affine, slip)
+
+
+def _with_slip(named: NamedLaw) -> NamedLaw:
+    (ranges,) = (law.parameters for law in JOHNSON_SEGALMAN.values())
+    (slip,) = JOHNSON_SEGALMAN.values()
+
+    def build(constant, xi) -> NonAffine:
+        return NonAffine(affine=named.build(constant), slip_parameter=xi)
+
+    made: Callable[..., AbstractConstitutiveLaw] = build
+    return NamedLaw(
+        f"{named.title} with slip",
+        made,
+        {**named.parameters, **ranges},
+        {**named.range_sources, **slip.range_sources},
+        source=f"{named.source}; {slip.source}",
+    )
+
+
+NAMED = {
+    f"{name}_non_affine": _with_slip(law) for name, law in (GIESEKUS | PHAN_THIEN_TANNER).items()
+}

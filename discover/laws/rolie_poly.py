@@ -1,0 +1,126 @@
+"""Rolie–Poly law of entangled linear chains, with stretch, without end or with one."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
+from tensor_library.algebra import Symmetric, identity_like, inner, trace
+
+_EXPONENT = -0.5  # δ of Likhtman & Graham
+
+
+class RoliePoly(AbstractConstitutiveLaw):
+    """Rolie–Poly law   [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11].
+
+    In the conformation A = I + σ, of stretch Λ = √(tr A/3),
+
+        h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ),    δ = −1/2:
+
+    beside reptation, with λ, a stretched chain retracts within its Rouse time τ_R and releases
+    constraints of others.
+    """
+
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
+    constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+    retracts = True
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ) as above."""
+        del rate
+        stretch = stretch_of(stress)
+        retraction = 2.0 / self.stretch_time_ratio * (1.0 - 1.0 / stretch)
+        released = self.constraint_release * stretch ** (2.0 * _EXPONENT)
+        return retraction * (identity_like(stress) + (1.0 + released) * stress)
+
+
+class FiniteRoliePoly(AbstractConstitutiveLaw):
+    """Rolie–Poly law of chains that end   [Kabanemi & Hétu 2009, JNNFM 160, 113].
+
+    Springs are k(Λ) times as stiff as Hooke's, both in the stress and in the retraction; k is
+    Cohen's function, one at rest and without bound at Λ_m:
+
+        σ = k (A − I),    A▽ = −(A − I) − r (A + β Λ^{2δ} (A − I)),    r = 2 (λ/τ_R) k (1 − 1/Λ),
+        k = (3 − Λ²/m)(1 − 1/m) / [(1 − Λ²/m)(3 − 1/m)],    m = Λ_m².
+
+    Λ² follows from tr σ by a quadratic equation. Λ_m → ∞ is `RoliePoly`.
+    """
+
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
+    constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
+    maximum_stretch: Float[Array, ""] = eqx.field(converter=as_parameter)  # Λ_m
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+    retracts = True
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = (1 − k) γ̇ + k r (A + β Λ^{2δ} (A − I)) − (k̇/k) σ."""
+        limit = self.maximum_stretch**2
+        third = jnp.maximum(trace(stress) / 3.0, -1.0 + 1e-12)
+        squared = self._squared_stretch(third, limit)
+        stretch = jnp.sqrt(squared)
+        factor = _stiffening(squared, limit)
+        conformation = identity_like(stress) + stress / factor
+        retraction = 2.0 / self.stretch_time_ratio * factor * (1.0 - 1.0 / stretch)
+        released = self.constraint_release * stretch ** (2.0 * _EXPONENT)
+        retracting = retraction * (conformation + released * stress / factor)
+        growth = inner(conformation, rate) - trace(stress) / factor - trace(retracting)
+        stiffening = _logarithmic_slope(squared, limit) * growth / 3.0
+        return (1.0 - factor) * rate + factor * retracting - stiffening * stress
+
+    def _squared_stretch(self, third, limit):
+        """Return Λ² from tr σ/3 = k (Λ² − 1), the root between 0 and m."""
+        share = (1.0 - 1.0 / limit) / (3.0 - 1.0 / limit)
+        linear = share * (3.0 + 1.0 / limit) + third / limit
+        constant = 3.0 * share + third
+        # of the two roots the smaller, in the form that loses no digits
+        return 2.0 * constant / (linear + jnp.sqrt(linear**2 - 4.0 * share / limit * constant))
+
+
+def _stiffening(squared, limit):
+    share = (1.0 - 1.0 / limit) / (3.0 - 1.0 / limit)
+    return share * (3.0 - squared / limit) / (1.0 - squared / limit)
+
+
+def _logarithmic_slope(squared, limit):
+    """Return d ln k/d Λ²."""
+    return 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
+
+
+def stretch_of(stress: Symmetric) -> Float[Array, ""]:
+    """Return Λ = √(tr A/3) of the conformation A = I + σ, as a chain that is never shorter than 0.
+
+    Only trial steps of an integrator come near that bound.
+    """
+    return jnp.sqrt(jnp.maximum(1.0 + trace(stress) / 3.0, 1e-12))
+
+
+_RANGES = {"stretch_time_ratio": (1e-3, 1.0), "beta": (0.0, 1.0)}
+_RANGE_SOURCES = {
+    "stretch_time_ratio": "Likhtman & Graham 2003: τ_R/τ_d is 1/(3Z) of a chain with Z "
+    "entanglements, from one chain that hardly is entangled to some three hundred",
+    "beta": "Likhtman & Graham 2003: the share of released constraints that counts, from none to "
+    "all",
+}
+
+NAMED = {
+    "rolie_poly": NamedLaw(
+        "Rolie–Poly",
+        RoliePoly,
+        _RANGES,
+        _RANGE_SOURCES,
+        source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
+    ),
+    "rolie_poly_fene": NamedLaw(
+        "Rolie–Poly with finite extensibility",
+        FiniteRoliePoly,
+        _RANGES | {"maximum_stretch": (1.5, 100.0)},
+        _RANGE_SOURCES
+        | {
+            "maximum_stretch": "Fang, Kröger & Öttinger 2000, J. Rheol. 44, 1293: the root of the "
+            "number of Kuhn steps between entanglements; at 100 springs are Hooke's"
+        },
+        source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
+    ),
+}

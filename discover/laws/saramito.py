@@ -1,0 +1,44 @@
+"""Saramito law: an elastic solid that flows beyond a yield stress."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.named import NamedLaw
+from tensor_library.algebra import Symmetric, identity_like, inner, trace
+
+
+class Saramito(AbstractConstitutiveLaw):
+    """Elastoviscoplastic law   [Saramito 2007, JNNFM 145, 1].
+
+    h = −min(1, Y/|σ_d|) σ with the deviator σ_d, |σ_d|² = ½ σ_d:σ_d, and the yield stress over the
+    modulus Y: below it nothing relaxes, far beyond it the fluid is Maxwell's.
+    """
+
+    yield_strain: Float[Array, ""] = eqx.field(converter=as_parameter)  # Y
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ) as above."""
+        del rate
+        deviator = stress - trace(stress) / 3.0 * identity_like(stress)
+        squared = 0.5 * inner(deviator, deviator)
+        yielded = squared > self.yield_strain**2
+        # so that the derivative is finite where nothing flows
+        size = jnp.sqrt(jnp.where(yielded, squared, 1.0))
+        return -jnp.where(yielded, self.yield_strain / size, 1.0) * stress
+
+
+NAMED = {
+    "saramito": NamedLaw(
+        "Saramito",
+        Saramito,
+        {"yield_strain": (0.0, 10.0)},
+        {
+            "yield_strain": "Saramito 2007: the strain at which the solid yields; gels and foams "
+            "yield at a tenth to a few"
+        },
+        source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
+    )
+}
