@@ -157,6 +157,7 @@ def run_close_loop(
         "noise": study.loop.noise,
         "most_samples": study.loop.most_samples,
         "explanations": study.loop.explanations,
+        "laws": model.choice,
         "progress": say,
         "store": folder,
     }
@@ -175,7 +176,7 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {_described(model)}, {modes}{_beside(model)}. "
+        f"Declared model: {_chosen(result) or _described(model)}, {modes}{_beside(model)}. "
         f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
@@ -191,6 +192,11 @@ def _described(model) -> str:
 
     named = LAWS.get(model.law_name)
     return model.law_name if named is None else named.described(model.parameters)
+
+
+def _chosen(result) -> str:
+    """Return the law that the runs asked for, of several."""
+    return f"{result.laws[0].title}, chosen of {len(result.laws)} laws" if result.laws else ""
 
 
 def _beside(model) -> str:

@@ -26,6 +26,7 @@ def run_loop_on_each(
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
     explanations: int = BEAM_WIDTH,
+    laws: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     store: Store | None = None,
 ) -> LoopResult:
@@ -38,8 +39,8 @@ def run_loop_on_each(
 
     Parameters
     ----------
-    dataset, declared, effects, max_effects, strain, noise, most_samples, explanations, progress,
-    store
+    dataset, declared, effects, max_effects, strain, noise, most_samples, explanations, laws,
+    progress, store
         As in `run_loop`.
     fit
         Names of the runs; by default all.
@@ -70,6 +71,7 @@ def run_loop_on_each(
             most_samples=most_samples,
             # a loop that leaves a run out only judges what it found itself
             explanations=1 if held_out else explanations,
+            laws=laws,
             progress=lambda line: say(f"{prefix}: {line}"),
             store=store,
             # the number of the run and not its name, which may hold anything

@@ -15,7 +15,7 @@ from discover.study.build import DeclaredModel as DeclaredFluid
 from discover.study.build import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 
-_OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations"}
+_OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws"}
 
 
 def close_loop(
@@ -54,7 +54,7 @@ def close_loop(
     progress
         Called with a line of text now and then.
     **options
-        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations` of
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` of
         `discover.closed_loop.run_loop`.
 
     Returns

@@ -22,6 +22,7 @@ from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
+from discover.closed_loop.law_choice import LawFit, choose_law
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import (
     ConstantByMode,
@@ -94,6 +95,7 @@ def run_loop(
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
     explanations: int = BEAM_WIDTH,
+    laws: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     store: Store | None = None,
     name: str = "search",
@@ -133,6 +135,9 @@ def run_loop(
         one with little noise fewer, but no fewer than 150.
     explanations
         How many sets of effects are carried side by side, at most.
+    laws
+        Named laws to choose the declared one from, by the fitted runs alone; see `choose_law`. By
+        default it is as it was declared.
     progress
         Called with a line of text now and then.
     store
@@ -156,6 +161,9 @@ def run_loop(
     _require_present(declared, {*known, *(effect.name for effect in candidates)})
     candidates = [effect for effect in candidates if effect.name not in known]
     _require_possible(declared, [*fitted_runs, *held_runs])
+    tried_laws: tuple[LawFit, ...] = ()
+    if laws and not records_are_silent(fitted_runs):
+        declared, tried_laws = choose_law(declared, laws, fitted_runs, held_runs, say)
     # of one mode nothing can differ from another's
     asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
     model = AugmentedModel(declared, asked, data_scales(fitted_runs))
@@ -260,6 +268,7 @@ def run_loop(
         declared_effects=_declared_effects(model, current, bounds, by_mode),
         declared_law=None if differ & {*of_law} else _declared_law(declared, current),
         explanations=side_by_side,
+        laws=tried_laws,
         free_form=forms,
         fluid=None if differ else _fluid(model, current, [*active, *known]),
         seconds=time.perf_counter() - started,

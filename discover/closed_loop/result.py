@@ -15,6 +15,7 @@ from discover.closed_loop.attribution import CandidateScore
 from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.free_curve import FreeForm
+from discover.closed_loop.law_choice import LawFit
 from discover.closed_loop.reading import Reading, read_residual
 from discover.closed_loop.run_record import RunRecord
 from discover.equations import Equation, HasEquation, Tested, equation_to_json, law_terms
@@ -194,6 +195,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
         no law of stress and rate can carry.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
+    laws
+        The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
         Free functions of one variable that explain what named effects leave, the likeliest first.
     folds
@@ -218,6 +221,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
     explanations: Explanations = field(default_factory=Explanations)
+    laws: tuple[LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
@@ -408,6 +412,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             },
             **self.explanations.to_json(),
             "held_out_in_band": self.held_in_band,
+            "laws": [one.to_json() for one in self.laws],
             "free_form": [one.to_json() for one in self.free_form],
             "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,

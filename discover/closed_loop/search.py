@@ -8,7 +8,6 @@ from discover.closed_loop.attribution import (
     Attribution,
     CandidateScore,
     attribute,
-    with_other_inner,
 )
 from discover.closed_loop.augment import (
     BARE_MENTION,
@@ -24,6 +23,7 @@ from discover.closed_loop.augment import (
     taken_out,
 )
 from discover.closed_loop.degrees import choose_degrees, positions_of
+from discover.closed_loop.first_starts import first_starts
 from discover.closed_loop.left_out import left_out_errors
 from discover.closed_loop.mode_dependence import names_not_needed
 from discover.closed_loop.numerical_resolution import NumericalResolution
@@ -46,10 +46,6 @@ from discover.forward.least_squares import (
 from discover.statistics.residual import summarise
 
 _ROUNDS, _POLISHES = 3, 5
-
-# A relaxation time to be fitted starts at these multiples of its first guess too: from far off its
-# effect on the stress is flat
-_TIME_STARTS = (1e-3, 1e-2, 0.1, 0.3, 3.0, 10.0)
 
 LEADERS = 8
 """Candidates with signatures of their own that are refitted at each stage."""
@@ -158,7 +154,7 @@ class Search(SearchState):
         return [*fitted, *positions_of(self.model, present)]
 
     def start(self, by_mode: bool = True) -> None:
-        """Fit the declared model; an unknown relaxation time from several starts.
+        """Fit the declared model, from several starts where its misfit may have several minima.
 
         Parameters
         ----------
@@ -171,14 +167,7 @@ class Search(SearchState):
             If it cannot be integrated through the runs.
         """
         free = self.model.free_positions
-        starts = [self.model.zero()]
-        if self.model.declared.fit_relaxation_time:
-            starts += [self.model.zero() for _ in _TIME_STARTS]
-            for start, factor in zip(starts[1:], _TIME_STARTS, strict=True):
-                start[1] = np.log(factor)
-                if self.model.declared.fit_modulus:
-                    start[0] = -start[1]  # the viscosity is known better than either
-        starts += self._starts_of_known()
+        starts = first_starts(self.model)
         fits = fit_batch(self.model, self.batch, starts, [free] * len(starts))
         usable = [fit for fit in fits if fit.usable]
         self.fit = min(usable, key=lambda fit: fit.cost, default=fits[0])
@@ -214,24 +203,6 @@ class Search(SearchState):
         chosen = (f"{name} of degree {found.degree}" for name, found in self.degrees.items())
         say(f"constants by mode: {', '.join(chosen)}")
         return True
-
-    def _starts_of_known(self) -> list[np.ndarray]:
-        """Return starts from other inner times and exponents of known effects to be fitted."""
-        starts = []
-        for known in self.model.declared.effects:
-            if not set(known.free) & {p.name for p in known.effect.parameters[1:]}:
-                continue
-            fixed = [
-                position
-                for position, value in zip(
-                    self.model.positions(known.name), known.values, strict=True
-                )
-                if value is not None
-            ]
-            for other in with_other_inner(self.model, self.model.zero(), known.effect):
-                other[fixed] = self.model.zero()[fixed]
-                starts.append(other)
-        return starts
 
     def run(self, max_effects: int, say: Callable[[str], None], look_ahead: bool = True) -> None:
         """Add effects until none earns its place, and see that each still deserves its own.

@@ -98,6 +98,11 @@ def compare(
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
+    if declared.choice:
+        raise InputError(
+            "[model] law names several laws to choose from, which is for close-loop: a comparison "
+            "learns what one known law lacks. Name one law, or ucm."
+        )
     if declared.by_mode:
         raise InputError(
             "[model] by_mode is for close-loop: a comparison has one set of constants for all "

@@ -42,7 +42,10 @@ def _named_laws() -> dict[str, NamedLaw]:
 LAWS: Registry[NamedLaw] = Registry("law", "discover.laws", _named_laws)
 """Named laws by the name in study files; a package's own by entry points of this group."""
 
-RESERVED = ("learned",)
+ANY = "any"
+"""What a study file writes to choose from all laws."""
+
+RESERVED = ("learned", ANY)
 """What a study file may write in place of the name of a law."""
 
 
@@ -157,6 +160,25 @@ def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) ->
                 f"The extra term of the law {name!r} must have the shape {shape} of the stress; "
                 f"got {jnp.shape(extra)}. Write it with tensor_library.algebra."
             )
+
+
+def starting_value(law: str, parameter: str) -> float:
+    """Return a value from which a fit of a law's parameter may start.
+
+    Of a law or a parameter that is none any: `make_law` says what is wrong.
+    """
+    if law not in LAWS or parameter not in LAWS[law].parameters:
+        return 0.1
+    low, high = LAWS[law].parameters[parameter]
+    if high > 1e3:
+        return 100.0
+    # a range that leaves out zero spans orders of magnitude
+    return math.sqrt(low * high) if low > 0.0 else min(0.1, high)
+
+
+def starting_values(law: str) -> dict[str, float]:
+    """Return such a value of each parameter of a law."""
+    return {parameter: starting_value(law, parameter) for parameter in LAWS[law].parameters}
 
 
 def make_law(name: str, parameters: Mapping[str, float] | None = None) -> AbstractConstitutiveLaw:

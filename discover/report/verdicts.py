@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discover.closed_loop.law_choice import LawFit
 from discover.closed_loop.result import ConstantByMode, LoopResult, Stage, StageParameter
+from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
     effect_title,
@@ -81,7 +83,18 @@ def _loop_found(result: LoopResult) -> str:
             parts.append(f"but {free_form_sentence(result.free_form[0])}")
         elif result.free_form:
             parts.append(f"and {free_form_sentence(result.free_form[0])}")
+    if result.laws:
+        parts.append(_law_chosen(result.laws))
     return sentence([verdict, *parts])
+
+
+def _law_chosen(laws: Sequence[LawFit]) -> str:
+    """Return which law was taken of several, and from which these runs do not tell it."""
+    best, *others = laws
+    alike = [LAWS[one.law].title for one in others if not one.is_told_apart]
+    told = f"; these runs do not tell it from {_several(alike, 'and')}" if alike else ""
+    ends = f" ({_several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
+    return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
 
 
 def named(name: str, parameter: StageParameter) -> str:

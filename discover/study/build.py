@@ -1,6 +1,5 @@
 """From a study to its data, its split and its declared fluid."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,7 +16,7 @@ from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, make_law
+from discover.laws.registry import LAWS, make_law, starting_value
 from discover.protocols.kinematics import MODULI
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.from_result import EarlierResult, read_earlier
@@ -76,6 +75,8 @@ class DeclaredModel:
         What was taken from an earlier result, in words; empty where nothing was.
     by_mode
         Parameters of the law, and effects, that may differ from mode to mode.
+    choice
+        Named laws to choose the law from; none where it is declared.
     """
 
     law: AbstractConstitutiveLaw
@@ -89,6 +90,7 @@ class DeclaredModel:
     effects: tuple[KnownEffect, ...] = ()
     source: str = ""
     by_mode: tuple[str, ...] = ()
+    choice: tuple[str, ...] = ()
 
     @property
     def free_constants(self) -> tuple[str, ...]:
@@ -257,10 +259,10 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     effects = known_effects(model.effects, "[model] effects")
     if model.from_ is not None:
         return _from_earlier(read_earlier(model.from_, study.path), effects)
-    name = "ucm" if model.law == "learned" else model.law
+    name = model.law if isinstance(model.law, str) and model.law in LAWS else "ucm"
     free = [key for key, value in model.parameters.items() if value == "fit"]
     parameters = {
-        key: _start(name, key) if value == "fit" else float(value)
+        key: starting_value(name, key) if value == "fit" else float(value)
         for key, value in model.parameters.items()
     }
     if not model.known_relaxation and name != "ucm":
@@ -302,6 +304,7 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         model.solvent_viscosity_Pa_s,
         effects,
         by_mode=model.by_mode,
+        choice=model.choice,
     )
 
 
@@ -364,16 +367,6 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
             f"{omega.max():g}. Widen [model] sweep_rad_s."
         )
     return LinearSweep(omega[keep], sweep.storage_modulus[keep], sweep.loss_modulus[keep])
-
-
-def _start(law: str, parameter: str) -> float:
-    if parameter not in LAWS[law].parameters:
-        return 0.1  # make_law says what is wrong
-    low, high = LAWS[law].parameters[parameter]
-    if high > 1e3:
-        return 100.0
-    # a range that leaves out zero spans orders of magnitude
-    return math.sqrt(low * high) if low > 0.0 else min(0.1, high)
 
 
 def _linear_start(dataset: Dataset) -> dict[str, float]:

@@ -1,11 +1,11 @@
 """The study file: what may be written in it, and nothing else."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
-from discover.laws.registry import LAWS
+from discover.laws.registry import ANY, LAWS
 from discover.learners.registry import learner_names
 from discover.validation import Section
 from tensor_library.closed_forms import CLOSED_FORMS
@@ -19,6 +19,14 @@ def _known_law(name: str) -> str:
 
 def _known_or_learned(name: str) -> str:
     return name if name == "learned" else _known_law(name)
+
+
+def _known_law_or_several(given: Any) -> Any:
+    if isinstance(given, list | tuple):
+        if len(set(given)) < 2:
+            raise ValueError("law as a list names two laws or more to choose from, each once")
+        return tuple(_known_law(str(name)) for name in given)
+    return given if given == ANY else _known_or_learned(str(given))
 
 
 def _known_learner(name: str) -> str:
@@ -40,7 +48,7 @@ def _known_form(name: str) -> str:
 ClosedFormName = Annotated[str, AfterValidator(_known_form)]
 LearnerName = Annotated[str, AfterValidator(_known_learner)]
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
-LawName = Annotated[str, AfterValidator(_known_or_learned)]
+LawNames = Annotated[str | tuple[str, ...], BeforeValidator(_known_law_or_several)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
 # wider than any instrument, and narrow enough that squares and ratios compute
 _LEAST, _MOST = 1e-15, 1e15
@@ -120,7 +128,7 @@ class Data(Section):
 class Model(Section):
     """The declared law: the known part of what is to be found."""
 
-    law: LawName = "ucm"
+    law: LawNames = "ucm"
     modulus_Pa: Positive | Literal["fit"] = 1.0
     relaxation_time_s: Positive | Literal["fit"] = 1.0
     modes: Literal["lve"] | None = None
@@ -145,11 +153,23 @@ class Model(Section):
                 f"from takes law, modes and constants from a result, and {beside[0]} is given too; "
                 "leave one of them out"
             )
+        if self.choice and (self.parameters or self.by_mode or not self.known_relaxation):
+            raise ValueError(
+                "law names several laws, all of whose constants are fitted; leave out parameters, "
+                "by_mode and known_relaxation, or name one law"
+            )
         if self.sweep_rad_s is not None and self.modes is None:
             raise ValueError('sweep_rad_s limits the sweep of modes = "lve"; write that too')
         if self.sweep_rad_s is not None and not self.sweep_rad_s[0] < self.sweep_rad_s[1]:
             raise ValueError(f"sweep_rad_s must be [low, high]; got {list(self.sweep_rad_s)}")
         return self
+
+    @property
+    def choice(self) -> tuple[str, ...]:
+        """Laws to choose from; none where one is declared."""
+        if self.law == ANY:
+            return tuple(LAWS)
+        return () if isinstance(self.law, str) else self.law
 
 
 class Loop(Section):

@@ -1,0 +1,183 @@
+"""Which of several named laws the fitted runs ask for, before any effect is added."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from discover.closed_loop.augment import BARE_MENTION, criterion
+from discover.closed_loop.before_after import errors_of, record_runs
+from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.first_starts import first_starts
+from discover.dataset import Run
+from discover.errors import InputError
+from discover.forward import (
+    MODULUS,
+    RELAXATION_TIME,
+    AugmentedModel,
+    DeclaredModel,
+    data_scales,
+    make_batch,
+)
+from discover.forward.least_squares import Fit, fit_batch
+from discover.laws import LAWS
+from discover.laws.registry import starting_values
+from discover.statistics.residual import judged_cost, summarise
+
+_AT_END = 1e-3
+"""Share of its range within which a constant stands at an end."""
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A named law fitted to the runs, with the modes and the instrument of the declared model.
+
+    Attributes
+    ----------
+    law
+        Key of `LAWS`.
+    parameters
+        Its constants.
+    at_end
+        Those of them that a fit drove to an end of their range, where they are no finding.
+    error
+        Mean relative errors of the runs fitted and held out; None where it cannot be integrated
+        through the fitted ones.
+    behind
+        By how much its information criterion is above that of the best law; None likewise.
+    is_told_apart
+        Whether the runs tell it from the best law: whether it fits them worse. One that fits as
+        well and is passed over for its further constants is not told apart.
+    """
+
+    law: str
+    parameters: Mapping[str, float]
+    at_end: tuple[str, ...] = ()
+    error: ErrorPair | None = None
+    behind: float | None = None
+    is_told_apart: bool = True
+
+    @property
+    def title(self) -> str:
+        """Name as a rheologist writes it, with the constants."""
+        return LAWS[self.law].described(self.parameters)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fit as ``loop.json`` holds it."""
+        return {**asdict(self), "title": LAWS[self.law].title}
+
+
+def choose_law(
+    declared: DeclaredModel,
+    names: Sequence[str],
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    say: Callable[[str], None],
+) -> tuple[DeclaredModel, tuple[LawFit, ...]]:
+    """Return the declared model with the law that the fitted runs ask for, and all that were tried.
+
+    Every law has all its constants fitted, beside what else of the declared model is. The chosen
+    one has the lowest information criterion; runs held out have no part in it.
+
+    Parameters
+    ----------
+    declared
+        Modes, solvent and known effects, which every law shares.
+    names
+        Of the laws, keys of `LAWS`.
+    fitted, held_out
+        The runs.
+    say
+        Called with a line of text for each law.
+
+    Raises
+    ------
+    InputError
+        If a name is none, or no law can be integrated through the fitted runs.
+    """
+    unknown = [name for name in names if name not in LAWS]
+    if unknown or not names:
+        raise InputError(
+            f"Unknown law {unknown[0]!r}; write some of {', '.join(LAWS)}."
+            if unknown
+            else f"No law is named to choose from; write some of {', '.join(LAWS)}."
+        )
+    batch, scales = make_batch(fitted), data_scales(fitted)
+    tried: list[tuple[AugmentedModel, Fit]] = []
+    for name in dict.fromkeys(names):
+        say(f"law {len(tried) + 1} of {len(names)}: {LAWS[name].title}")
+        model = AugmentedModel(_with_law(declared, name), [], scales)
+        starts = first_starts(model)
+        free = [model.free_positions] * len(starts)
+        fits = fit_batch(model, batch, starts, free)
+        usable = [fit for fit in fits if fit.usable]
+        tried.append((model, min(usable, key=lambda fit: fit.cost, default=fits[0])))
+    usable = [fit for _, fit in tried if fit.usable]
+    if not usable:
+        raise InputError(
+            f"None of the laws {', '.join(names)} can be integrated through the fitted runs: their "
+            "stress runs away. Check modes and units."
+        )
+    weight = np.asarray(batch.weight)
+    best = min(usable, key=lambda fit: fit.cost)
+    effective = summarise(best.residual, weight).effective_samples
+    costs = [judged_cost(fit.residual, weight) if fit.usable else np.inf for _, fit in tried]
+    criteria = [
+        criterion(cost, len(fit.free), 0, effective, 1) if fit.usable else np.inf
+        for cost, (_, fit) in zip(costs, tried, strict=True)
+    ]
+    order = np.argsort(criteria, kind="stable")
+    first, lines = order[0], []
+    for i in order:
+        model, fit = tried[i]
+        found = _found(model, fit)
+        if fit.usable:
+            found = replace(
+                found,
+                error=_errors(model, fit, fitted, held_out),
+                behind=float(criteria[i] - criteria[first]),
+                is_told_apart=bool(effective * np.log(costs[i] / costs[first]) > BARE_MENTION),
+            )
+        lines.append(found)
+    say(f"of {len(lines)} laws the runs ask for {lines[0].title}")
+    return _with_law(declared, lines[0].law, lines[0].parameters), tuple(lines)
+
+
+def _with_law(
+    declared: DeclaredModel, name: str, values: Mapping[str, float] | None = None
+) -> DeclaredModel:
+    """Return the declared model with another law, all of whose constants are fitted."""
+    factors = {MODULUS: declared.fit_modulus, RELAXATION_TIME: declared.fit_relaxation_time}
+    return DeclaredModel.named(
+        name,
+        starting_values(name) if values is None else values,
+        declared.modulus,
+        declared.relaxation_time,
+        free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
+        solvent_viscosity=declared.solvent_viscosity,
+        linear_error=declared.linear_error,
+        effects=declared.effects,
+    )
+
+
+def _found(model: AugmentedModel, fit: Fit) -> LawFit:
+    declared, values, ends = model.declared, {}, []
+    for i, parameter in enumerate(declared.free_parameters):
+        value = values[parameter.name] = float(
+            np.clip(fit.theta[2 + i], parameter.low, parameter.high)
+        )
+        room = _AT_END * (parameter.high - parameter.low)
+        if min(value - parameter.low, parameter.high - value) < room:
+            ends.append(parameter.name)
+    return LawFit(declared.law_name, values, tuple(ends))
+
+
+def _errors(model, fit: Fit, fitted: Sequence[Run], held_out: Sequence[Run]) -> ErrorPair:
+    records = []
+    # a law may run away in a held-out flow; its error is then none
+    with np.errstate(over="ignore", invalid="ignore"):
+        for runs, held in ((fitted, False), (held_out, True)):
+            if runs:
+                records += record_runs(model, make_batch(runs), runs, [fit.theta], held_out=held)
+        return errors_of(records, 0)
