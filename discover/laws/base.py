@@ -1,7 +1,6 @@
 """The interface of every constitutive law."""
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -28,13 +27,14 @@ class AbstractConstitutiveLaw(eqx.Module):
     ----------
     linear_relaxation
         Whether the −σ is part of the known law. False where it too is left to a learner.
-    retracts
-        Whether chains retract faster than they turn, so that h makes the trace of σ relax faster
-        than its deviator.
     """
 
     linear_relaxation: eqx.AbstractVar[bool]
-    retracts: ClassVar[bool] = False
+
+    @property
+    def retracts(self) -> bool:
+        """Whether chains retract faster than they turn, so that h relaxes the trace of σ first."""
+        return False
 
     @abstractmethod
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:

@@ -33,6 +33,11 @@ class LibraryExpansion(AbstractConstitutiveLaw):
     linear_relaxation: bool = eqx.field(static=True, default=True)
     base: AbstractConstitutiveLaw | None = None
 
+    @property
+    def retracts(self) -> bool:
+        """Whether the chains of the base law retract."""
+        return self.base is not None and self.base.retracts
+
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""
         terms = self.library.evaluate(stress, rate, self.inner)

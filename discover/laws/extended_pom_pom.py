@@ -26,7 +26,11 @@ class ExtendedPomPom(AbstractConstitutiveLaw):
     stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # λ_s/λ
     anisotropy: Float[Array, ""] = eqx.field(converter=as_parameter)  # α
     linear_relaxation: bool = eqx.field(static=True, default=True)
-    retracts = True
+
+    @property
+    def retracts(self) -> bool:
+        """Whether chains retract."""
+        return True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h(σ) as above."""

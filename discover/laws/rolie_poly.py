@@ -25,7 +25,11 @@ class RoliePoly(AbstractConstitutiveLaw):
     stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
     constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
     linear_relaxation: bool = eqx.field(static=True, default=True)
-    retracts = True
+
+    @property
+    def retracts(self) -> bool:
+        """Whether chains retract."""
+        return True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h(σ) as above."""
@@ -52,7 +56,11 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
     constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
     maximum_stretch: Float[Array, ""] = eqx.field(converter=as_parameter)  # Λ_m
     linear_relaxation: bool = eqx.field(static=True, default=True)
-    retracts = True
+
+    @property
+    def retracts(self) -> bool:
+        """Whether chains retract."""
+        return True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = (1 − k) γ̇ + k r (A + β Λ^{2δ} (A − I)) − (k̇/k) σ."""

@@ -76,6 +76,11 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
             invariants = jnp.arcsinh(invariants / self.invariant_scale)
         return self.constants + self.network_mask * self.network(invariants)
 
+    @property
+    def retracts(self) -> bool:
+        """Whether the chains of the base law retract."""
+        return self.base is not None and self.base.retracts
+
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = Σ gₙ Tₙ, plus the base law's."""
         extra = jnp.tensordot(
