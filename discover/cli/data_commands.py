@@ -142,7 +142,7 @@ def check(
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Text exports, one or more runs in each.")
+        list[Path] | None, typer.Argument(help="Exports, one or more tests in each.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     mapping: Annotated[
@@ -168,6 +168,18 @@ def import_data(
     block: Annotated[
         list[int] | None, typer.Option("--block", min=1, help="Only these blocks of a file.")
     ] = None,
+    test: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--test",
+            help="What a block is, if it is taken for something else: melt.txt:2=creep; "
+            "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none.",
+        ),
+    ] = None,
+    temperature: Annotated[
+        float | None,
+        typer.Option("--temperature", help="In °C, of several the one that is imported."),
+    ] = None,
     start_time: Annotated[
         float | None,
         typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
@@ -187,10 +199,12 @@ def import_data(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Make a data folder from exports of a rheometer: CSV, TRIOS, RheoCompass, or your own."""
+    """Make a data folder from exports of a rheometer: tables, spreadsheets, RepTate, your own."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
+    from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.importing import import_files
+    from discover.dataset.load import DATA_FILES
 
     if out is None:
         raise InputError("Say where the data folder goes: --out FOLDER.")
@@ -201,6 +215,8 @@ def import_data(
         geometry=geometry,
         blocks=block,
         start_time_s=start_time,
+        tests=test,
+        temperature_C=temperature,
         layout={
             "format": form,
             "delimiter": delimiter,
@@ -212,7 +228,9 @@ def import_data(
     paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
     write_folder(imported, out, overwrite)
-    findings = check_folder(out)
+    # a folder of several temperatures is for one to be chosen from
+    whole = any(name in imported.files for name in DATA_FILES)
+    findings = check_folder(out) if whole else Findings()
     errors = findings.of("error")
     said = [*changed, *imported.said]
     if as_json:
@@ -230,6 +248,7 @@ def import_data(
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         say(f"{out}: {len(imported.files) + 1} files written.")
-        say(f"To see every test drawn: discover data show {out} --out DIR")
+        if whole:
+            say(f"To see every test drawn: discover data show {out} --out DIR")
     if errors:
         raise typer.Exit(2)
