@@ -275,6 +275,30 @@ def test_tables_of_mitlaos_and_spp_need_no_names(tmp_path, with_rate):
     assert "without names" in result.stdout
 
 
+def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_path):
+    time = np.linspace(0.0, 12.0, 300)
+    stress = (np.cos(time) + np.sin(time) - np.exp(-time)) * G / 2  # from rest, Maxwell, De = 1
+    rows = ["time_s,shear_rate_1_s,stress_Pa", *lines(time, np.cos(time), stress, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    (test,) = load_dataset(out)
+    np.testing.assert_allclose(test.rate, np.cos(time), rtol=EXACT)
+    assert "start" not in test.metadata
+
+
+def test_a_clock_that_goes_on_from_interval_to_interval_starts_anew_with_each(tmp_path):
+    head = "Interval data:\tPoint No.\tTime\tShear Rate\tShear Stress", "\t\t[s]\t[1/s]\t[Pa]"
+    start = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
+    still = np.full(30, 0.5)
+    rows = []
+    for begin in (0.0, 10.0):
+        rows += ["", *head, *(f"\t{i}\t{row}" for i, row in enumerate(
+            lines(begin + TIMES, still * (1 + begin), start), start=1))]  # fmt: skip
+    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
+    for test in load_dataset(out):
+        np.testing.assert_allclose(test.time, TIMES, rtol=1e-12, atol=1e-14)
+    assert "time counts from the last sample before it, at 10 s" in result.stdout
+
+
 def test_a_table_without_names_that_is_no_oscillation_is_refused(tmp_path):
     _, result = imported(tmp_path, "a.txt", lines(TIMES, TIMES, TIMES), code=2)
     assert "add a line such as time_s" in result.stderr

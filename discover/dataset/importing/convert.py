@@ -12,9 +12,9 @@ from discover.dataset.importing.folder_files import NamedRecord, files_of
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
-from discover.dataset.importing.records import Record, joined, record
+from discover.dataset.importing.records import Record, clock_before, joined, record
 from discover.dataset.importing.registry import blocks_of_importer
-from discover.dataset.importing.text_export import Block, read_blocks
+from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.importing.waveforms import waves_of, without_names
 from discover.dataset.table import read_bytes, shown
@@ -114,6 +114,7 @@ def _read(path: Path, state: _Import) -> None:
     """Add the tests of a file."""
     blocks = _blocks(path, state.mapping)
     before: Record | None = None
+    clock = 0.0
     reasons = []
     used = 0
     columns: list[str] = []
@@ -122,6 +123,7 @@ def _read(path: Path, state: _Import) -> None:
         where = f"{path.name}, block {number} {block.name}".strip()
         stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
         readings = Readings.of(block, state.mapping, path.name)
+        readings.begins, clock = clock_before(readings, clock)
         chosen = state.mapping.test_of(path.name, number)
         state.tests[key] = chosen or "none"
         recovered = None
@@ -190,11 +192,12 @@ def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     layout = mapping.layout
     found = blocks_of_importer(path, layout.format)
     if found is None:
-        how = layout.delimiter, layout.decimal
-        wave = None
-        if layout.header_row is None:
-            wave = without_names(read_rows(path, *how, layout.encoding))
-        found = [wave] if wave else read_blocks(path, *how, layout.header_row, layout.encoding)
+        rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
+        found = blocks_of_rows(rows, layout.header_row)
+        if not any(Readings.of(block, mapping, path.name).columns for block in found):
+            wave = without_names(rows)
+            found = found if wave is None else [wave]
+        require_blocks(found, path.name)
     blocks = list(enumerate(found, start=1))
     if mapping.blocks is None:
         return blocks
@@ -262,11 +265,12 @@ def _summary(
 def _is_part(key: str, made: Record) -> bool:
     """Return whether a quantity that was read went into the table, by itself or through another."""
     sources = {INSTRUMENT.get(name, name) for name in made.table} | set(made.table)
+    # these are read only where they have to stand for another
     through = {"viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor"}
     through |= {"strain_amplitude", "stress_amplitude", "temperature"}
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
-    return key in sources or (key in through and not (key == "viscosity" and made.kind != "run"))
+    return key in sources or (key in through)
 
 
 def _left_out(where: str, block: Block, reason: str) -> str:

@@ -48,6 +48,8 @@ class Readings:
         Of the file, for messages.
     geometry
         Of the tool, from the mapping or the header; None where neither has it.
+    begins
+        Reading of a clock of the whole measurement, in s, when the block before ended; else 0.
     used
         In words, where each quantity that was asked for comes from.
     """
@@ -57,6 +59,7 @@ class Readings:
     mapping: Mapping
     name: str
     geometry: Geometry | None = None
+    begins: float = 0.0
     used: dict[str, str] = field(default_factory=dict)
 
     @classmethod

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.mapping import TestName
+from discover.dataset.importing.names import plain
 from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.importing.readings import Readings
@@ -163,7 +164,9 @@ def _flow_curve(readings: Readings, found: Recognised) -> Record:
 
 def _begin(made: Record, readings: Readings) -> None:
     """Count time from the start of the flow, and leave out times that do not go on."""
-    made.table["time"] = made.table["time"] - readings.mapping.start_time_s
+    made.table["time"] = made.table["time"] - readings.mapping.start_time_s - readings.begins
+    if readings.begins:
+        made.notes.append(f"time counts from the last sample before it, at {readings.begins:.4g} s")
     time = made.table["time"]
     later = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     if 0 < np.sum(~later) <= max(2, 0.1 * len(time)):
@@ -276,6 +279,38 @@ def _after(made: Record, before: Record) -> Record:
     return made
 
 
+_WHOLE = {
+    "time", "t", "test time", "run time", "time (sequence)", "zeit", "messzeit", "temps", "durée",
+}  # fmt: skip
+"""Names of clocks that may go on from block to block."""
+
+
+def clock_before(readings: Readings, last: float) -> tuple[float, float]:
+    """Return when a block began, if its clock goes on from the block before, and when it ended.
+
+    Parameters
+    ----------
+    readings
+        The block.
+    last
+        Of the clock in the block before, in s.
+    """
+    at = readings.columns.get("time")
+    if at is None or readings.mapping.start_time_s:
+        return 0.0, last
+    try:
+        time = readings.get("time")
+    except InputError:  # said where the block is read, if it is
+        return 0.0, last
+    assert time is not None
+    time = time[np.isfinite(time)]
+    if not len(time):
+        return 0.0, last
+    whole_clock = plain(readings.block.columns[at][0]) in _WHOLE
+    goes_on_from = last if whole_clock and 0.0 < last <= time[0] else 0.0
+    return goes_on_from, float(time[-1])
+
+
 def joined(creep: Record, recovery: Readings) -> Record | None:
     """Return creep and the recovery after it as one test; None if a block is no such recovery.
 
@@ -292,6 +327,7 @@ def joined(creep: Record, recovery: Readings) -> Record | None:
     if not rows.any():
         return None
     time, stress, strain = (recovery.get(key)[rows] for key in ("time", "stress", "strain"))  # type: ignore[index]
+    time = time - recovery.begins
     level = float(np.median(np.abs(creep.table["stress"])))
     if np.percentile(np.abs(stress), 90.0) > _AT_REST * level:
         return None

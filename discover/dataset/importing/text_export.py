@@ -119,10 +119,27 @@ def read_blocks(
         from its thousands separator.
     """
     rows = read_rows(path, delimiter, decimal, encoding)
-    blocks = blocks_of_rows(rows, header_row)
+    return require_blocks(blocks_of_rows(rows, header_row), path.name)
+
+
+def require_blocks(blocks: list[Block], name: str) -> list[Block]:
+    """Return the blocks of a file.
+
+    Parameters
+    ----------
+    blocks
+        What was found.
+    name
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
     if not blocks:
         raise InputError(
-            f"{path.name} holds no lines of numbers under a line of names. If it has no names, add "
+            f"{name} holds no lines of numbers under a line of names. If it has no names, add "
             "a line such as time_s,shear_rate_1_s,stress_Pa; else say where they are with "
             "--header-row, and check --delimiter."
         )
