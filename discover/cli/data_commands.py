@@ -1,4 +1,4 @@
-"""Commands on data folders: list, show, check, import."""
+"""Commands on data folders: list, show, check, shift, import."""
 
 import json
 import os
@@ -136,6 +136,66 @@ def check(
         say(f"{folder}: {findings.counts}." if findings else f"{folder}: nothing wrong was found.")
     if findings.of("error"):
         raise typer.Exit(2)
+
+
+@data_app.command("shift")
+@guarded
+def shift(
+    folder: FolderArgument,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    reference: Annotated[
+        float | None, typer.Option("--reference", help="In °C; by default the middle one.")
+    ] = None,
+    vertical: Annotated[
+        bool, typer.Option("--vertical", help="Shift moduli too, not only frequencies.")
+    ] = False,
+    between: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--between", help="Only temperatures from one to the other, in °C."),
+    ] = None,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
+    from discover.dataset.superposition import read_temperatures, shift_table, superpose
+    from discover.report.superposition_page import superposition_page, superposition_words
+    from discover.study.atomic import make_folder, write_text
+
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    places = [Path(folder), *(root / folder for root in folder_roots())]
+    root = next((place for place in places if (place / TESTS_FILE).is_file()), None)
+    if root is None:
+        raise InputError(
+            f"{folder} holds no {TESTS_FILE}, which lists sweeps at several temperatures. Import "
+            f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
+        )
+    sweeps = read_temperatures(root)
+    if between is not None:
+        low, high = min(between), max(between)
+        sweeps = {degrees: one for degrees, one in sweeps.items() if low <= degrees <= high}
+    found = superpose(sweeps, reference, vertical)
+    if out.resolve() == root.resolve():
+        raise InputError("--out names the folder itself. Name a new one.")
+    make_folder(out)
+    if not overwrite and os.path.lexists(out / SWEEP_FILE):
+        raise InputError(f"{out} holds a {SWEEP_FILE} already. Use --overwrite, or another --out.")
+    write_text(out / "shift_factors.csv", shift_table(found))
+    page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
+    whole = found.verdict != "not_superposed"
+    if whole:
+        write_text(out / SWEEP_FILE, found.master.to_dataframe().to_csv(index=False))
+    else:
+        (out / SWEEP_FILE).unlink(missing_ok=True)
+    words = superposition_words(found)
+    if as_json:
+        laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
+        typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))
+        return
+    for sentence in words:
+        say(sentence)
+    say(f"{out}: {'' if whole else f'no {SWEEP_FILE}; '}shift_factors.csv and {page} written.")
 
 
 @data_app.command("import")

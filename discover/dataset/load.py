@@ -75,8 +75,8 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
             if os.path.isfile(os.path.join(candidate, TESTS_FILE)):
                 raise InputError(
                     f"The folder {str(folder)!r} holds tests at several temperatures "
-                    f"({TESTS_FILE}), and a fit takes one. Copy the table of one temperature to "
-                    f"{SWEEP_FILE}, or import again with --temperature."
+                    f"({TESTS_FILE}), and a fit takes one. Make one sweep of all with discover "
+                    f"data shift, or copy the table of one temperature to {SWEEP_FILE}."
                 )
             raise InputError(
                 f"The folder {str(folder)!r} has no {INDEX_FILE}. A data folder needs one, with a "

@@ -123,6 +123,8 @@ def _tables(
             text += f"; {table}.csv is that at the temperature of the runs"
         else:
             text += f"; a fit takes one of them: import again with --temperature {first}"
+            if table == "lve":
+                text += ", or make one of all with discover data shift"
         notes.append(text + ".")
 
 

@@ -217,4 +217,4 @@ def _rougher(time, answer, imposed) -> bool:
         middle = np.interp(time[1:-1], time[::2], values[::2])
         return np.median(np.abs(values[1:-1] - middle)) / (np.ptp(values) or 1.0)
 
-    return roughness(answer) > 10.0 * roughness(imposed)
+    return bool(roughness(answer) > 10.0 * roughness(imposed))
