@@ -157,9 +157,14 @@ def shift(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    from discover.dataset.linear_agreement import linear_agreements
     from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.dataset.superposition import read_temperatures, shift_table, superpose
-    from discover.report.superposition_page import superposition_page, superposition_words
+    from discover.report.superposition_page import (
+        agreement_words,
+        superposition_page,
+        superposition_words,
+    )
     from discover.study.atomic import make_folder, write_text
 
     if out is None:
@@ -182,13 +187,15 @@ def shift(
     if not overwrite and os.path.lexists(out / SWEEP_FILE):
         raise InputError(f"{out} holds a {SWEEP_FILE} already. Use --overwrite, or another --out.")
     write_text(out / "shift_factors.csv", shift_table(found))
-    page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
+    agreements = linear_agreements(root, sweeps)
+    text = superposition_page(found, root.resolve().name, agreements)
+    page = write_text(out / "report.html", text)
     whole = found.verdict != "not_superposed"
     if whole:
         write_text(out / SWEEP_FILE, found.master.to_dataframe().to_csv(index=False))
     else:
         (out / SWEEP_FILE).unlink(missing_ok=True)
-    words = superposition_words(found)
+    words = [*superposition_words(found), *agreement_words(agreements)]
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
         typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))

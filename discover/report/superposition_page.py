@@ -1,5 +1,8 @@
 """The page on time–temperature superposition: whether sweeps became one, and by which shifts."""
 
+from collections.abc import Sequence
+
+from discover.dataset.linear_agreement import Agreement
 from discover.dataset.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
 from discover.report.page import render
 from discover.report.parts import attempt
@@ -53,7 +56,34 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
     ).replace("95 %: not", "not")
 
 
-def superposition_page(found: Superposition, name: str) -> str:
+def agreement_words(agreements: Sequence[Agreement]) -> list[str]:
+    """Return whether sweeps predict relaxation and creep, a sentence each.
+
+    Parameters
+    ----------
+    agreements
+        One for each test.
+    """
+    said = []
+    for one in agreements:
+        where = f"{one.times[0]:.3g} to {one.times[1]:.3g} s"
+        what = "the relaxation modulus" if one.test == "relaxation" else "the creep compliance"
+        if one.agrees:
+            text = f"the sweep predicts {what} to {percent(one.error)} (root mean square, {where})."
+        else:
+            side = "above" if one.bias > 0.0 else "below"
+            text = (
+                f"the sweep does not predict {what}: it lies {percent(abs(one.bias))} {side} what "
+                f"was measured, on average over {where}; divided by one factor "
+                f"{percent(one.left)} would be left."
+            )
+        said.append(f"At {one.celsius:g} °C {text}")
+    return said
+
+
+def superposition_page(
+    found: Superposition, name: str, agreements: Sequence[Agreement] = ()
+) -> str:
     """Return the page.
 
     Parameters
@@ -62,12 +92,15 @@ def superposition_page(found: Superposition, name: str) -> str:
         Sweeps and shifts.
     name
         Of the data.
+    agreements
+        Of the sweeps with other linear tests.
     """
     pictures = attempt("The pictures", lambda: superposition_pictures(found))
     return render(
         "superposition.html",
         name=name,
         words=superposition_words(found),
+        agreements=agreement_words(agreements),
         doubtful=found.verdict != "superposed",
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
