@@ -299,6 +299,29 @@ def test_a_clock_that_goes_on_from_interval_to_interval_starts_anew_with_each(tm
     assert "time counts from the last sample before it, at 10 s" in result.stdout
 
 
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_a_sine_of_stress_is_imposed_and_its_start_is_seen_in_the_strain(tmp_path, at_rest):
+    time = np.linspace(0.0, 18.0, 400)
+    strain = 0.1 * np.sin(time) - 0.3 * np.cos(time) + 0.03 * np.sin(3 * time)
+    if at_rest:
+        strain += 0.3 * np.exp(-time / 5.0)  # what starts from zero and fades
+    rows = ["time_s,stress_Pa,strain", *lines(time, np.sin(time), strain, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    (test,) = load_dataset(out)
+    assert test.protocol.control == "stress"
+    assert ("start" in test.metadata) is not at_rest
+
+
+def test_an_amplitude_sweep_without_a_frequency_says_where_to_write_it(tmp_path):
+    rows = ["strain_percent,Gp_Pa,Gpp_Pa", *lines(100 * STRAINS, *softening(STRAINS), mark=",")]
+    out, result = imported(tmp_path, "a.csv", rows)
+    assert "amplitude_sweep_rad_s" in result.stdout
+    np.testing.assert_allclose(table(out / "amplitude_sweep.csv")["strain"], STRAINS, rtol=EXACT)
+    rows.insert(0, "Frequency [rad/s]: 10")
+    out, _ = imported(tmp_path, "a.csv", rows, "--overwrite")
+    assert_softening(out / "amplitude_sweep.csv")
+
+
 def test_a_table_without_names_that_is_no_oscillation_is_refused(tmp_path):
     _, result = imported(tmp_path, "a.txt", lines(TIMES, TIMES, TIMES), code=2)
     assert "add a line such as time_s" in result.stderr
@@ -349,6 +372,12 @@ def test_creep_and_the_recovery_after_it_are_one_run(tmp_path):
     np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
     np.testing.assert_allclose(test.time[30:], 10.0 + TIMES, rtol=EXACT)
     assert np.all(test.stress[30:] == 0.0)
+
+
+def test_a_run_in_a_file_that_is_called_as_a_table_is_still_a_run(tmp_path):
+    columns = {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": 20 + 10 * TIMES}
+    out, _ = imported(tmp_path, "creep.txt", steps(("Creep", columns)))
+    assert load_dataset(out).names == ("creep-run.csv",)
 
 
 def test_the_rise_of_a_step_of_strain_is_told_from_what_follows(tmp_path):

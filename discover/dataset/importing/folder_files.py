@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ TABLES = {
     "creep": "creep",
 }
 """The table of each kind of test, without its ending."""
+
+_TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values()))
 
 _SAME = 1.5
 """Difference in °C up to which two temperatures are one."""
@@ -64,10 +66,15 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     """
     files: dict[str, str] = {}
     notes: list[str] = []
-    runs = [one for one in found if one.record.is_run]
+    # a file called creep.txt is no table of compliances
+    runs = [
+        replace(one, name=f"{one.name}-run") if f"{one.name}.csv" in _TAKEN else one
+        for one in found
+        if one.record.is_run
+    ]
     for one in runs:
         name = f"{one.name}.csv"
-        if name in files or name in (INDEX_FILE, *(f"{table}.csv" for table in TABLES.values())):
+        if name in files:
             raise InputError(f"Two runs would be named {name}; rename one of the files.")
         files[name] = _csv(one.record)
     by_temperature: list[tuple[str, str, str]] = []
@@ -136,7 +143,8 @@ def _merged(records: list[NamedRecord], kind: str) -> list[NamedRecord]:
     for one in records:
         for into in kept:
             table, more = into.record.table, one.record.table
-            if _alike(into, one) and not _shared(table["omega"], more["omega"]):
+            known = "omega" in table and "omega" in more
+            if known and _alike(into, one) and not _shared(table["omega"], more["omega"]):
                 for key in table:
                     table[key] = np.concatenate([table[key], more[key]])
                 break

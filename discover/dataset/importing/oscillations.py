@@ -12,6 +12,11 @@ _SINE = 0.005
 _AS_BEFORE = 0.05
 """Difference over the amplitude, up to which one cycle repeats another."""
 
+_AT_ONCE = 0.02
+"""Share of a period within which a fluid from rest has no stress yet, unless it answers at once."""
+
+_FAR = 0.3
+
 Values = Float[np.ndarray, " n"]
 
 
@@ -85,25 +90,28 @@ def purer(time: Values, stress: Values, strain: Values) -> bool:
     return impure[0] < _SINE and impure[1] > 4.0 * impure[0] and impure[1] > 2.0 * _SINE
 
 
-def goes_on(time: Values, strain: Values, stress: Values) -> bool:
+def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
     """Return whether a record begins as it goes on, in steady alternation, and not from rest.
+
+    Its first cycle repeats in the next, or its first sample is far from rest.
 
     Parameters
     ----------
     time
         In s.
-    strain, stress
-        The records.
+    imposed, answer
+        What was imposed, and what the fluid answered: strain and stress, or stress and strain.
     """
-    omega = frequency_of(time, strain)
-    period = 2.0 * np.pi / omega
-    size = float(np.max(np.abs(stress)))
+    period = 2.0 * np.pi / frequency_of(time, imposed)
+    size = float(np.max(np.abs(answer)))
     if time[-1] - time[0] < period * (1.0 - 1e-3) or size == 0.0:
         return False
+    if time[0] < _AT_ONCE * period and abs(answer[0]) > _FAR * size:
+        return True
     first = time - time[0] < 0.2 * period
     later = time[first] + period
     inside = later <= time[-1]
     if not inside.any():  # one cycle alone: its ends meet
-        return bool(abs(stress[0] - stress[-1]) < _AS_BEFORE * size)
-    again = np.interp(later[inside], time, stress)
-    return bool(np.max(np.abs(stress[first][inside] - again)) < _AS_BEFORE * size)
+        return bool(abs(answer[0] - answer[-1]) < _AS_BEFORE * size)
+    again = np.interp(later[inside], time, answer)
+    return bool(np.max(np.abs(answer[first][inside] - again)) < _AS_BEFORE * size)

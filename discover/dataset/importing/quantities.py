@@ -8,7 +8,7 @@ from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.table import shown
-from discover.dataset.unit_text import read_unit
+from discover.dataset.unit_text import read_heading, read_unit
 from discover.dataset.units import Quantity
 from discover.errors import InputError
 
@@ -86,10 +86,20 @@ def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
                 for i, name in enumerate(names)
                 if name == wanted and fits(key, name, block.columns[i][1])
             ]
+            # a column of this project's own may carry another unit in its name
+            at += [i for i, (name, _) in enumerate(block.columns) if _is_own(name, key)]
         at = [i for i in at if filled[i]]
         if at:
             found[key] = at[0]
     return found
+
+
+def _is_own(name: str, key: str) -> bool:
+    quantity = QUANTITIES[key]
+    if not name.startswith(f"{quantity.stem}_"):
+        return False
+    unit = read_heading(name.removeprefix(f"{quantity.stem}_"))
+    return unit is not None and units.factor_to(unit, quantity) is not None
 
 
 def fits(key: str, name: str, unit: str) -> bool:

@@ -68,6 +68,8 @@ def recognise(readings: Readings) -> list[Recognised]:
         return list(_oscillatory(readings))
     if readings.has("time", "tensile_stress"):
         return [Recognised("run", rows, "an extension: it has a tensile stress over time")]
+    if readings.has("Gp", "Gpp") and not readings.has("omega") and readings.alone("strain"):
+        return [Recognised("amplitude_sweep", rows, "moduli against strain, without a frequency")]
     in_flow = readings.has("stress") and (readings.has("shear_rate") or readings.has("strain"))
     if readings.has("time") and in_flow:
         # rows that lack a number are counted when the rest is taken
@@ -175,7 +177,7 @@ def _in_time(readings: Readings) -> Recognised:
         moved = np.gradient(strain, time) if np.all(np.diff(time) > 0.0) else np.diff(strain)
     else:
         moved = rate
-    if alternates(strain if strain is not None else moved):
+    if alternates(strain if strain is not None else moved) or alternates(stress):
         if strain is not None and purer(time, stress, strain):
             return Recognised("creep", kept, "the stress is a sine and the strain is not")
         return Recognised("run", kept, "an oscillation, sample by sample")

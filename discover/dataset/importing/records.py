@@ -137,10 +137,20 @@ def _frequency_sweep(readings: Readings, found: Recognised) -> Record:
 
 
 def _amplitude_sweep(readings: Readings, found: Recognised) -> Record:
-    made = _table(readings, found, ("strain_amplitude", "omega", "Gp", "Gpp"))
+    known = readings.has("omega")
+    needed = ("strain_amplitude", "omega", "Gp", "Gpp") if known else _WITHOUT_FREQUENCY
+    made = _table(readings, found, needed)
     made.table = {"strain": made.table.pop("strain_amplitude"), **made.table}
-    _keep(made, (made.table["strain"] > 0.0) & (made.table["omega"] > 0.0), "no strain")
+    _keep(made, made.table["strain"] > 0.0, "no strain")
+    if not known:
+        made.notes.append(
+            "nothing says at which frequency: write amplitude_sweep_rad_s in the study, or a line "
+            "such as Frequency: 1 Hz above the numbers"
+        )
     return made
+
+
+_WITHOUT_FREQUENCY = ("strain_amplitude", "Gp", "Gpp")
 
 
 def _flow_curve(readings: Readings, found: Recognised) -> Record:
@@ -197,9 +207,10 @@ def _start(made: Record) -> None:
     """Note whether an oscillation had gone on before the record."""
     time, stress = made.table["time"], made.table["stress"]
     moved = made.table.get("strain", made.table.get("shear_rate"))
-    if moved is None or not alternates(moved) or np.any(np.diff(time) <= 0.0):
+    imposed = stress if made.kind == "creep" else moved
+    if moved is None or imposed is None or not alternates(imposed) or np.any(np.diff(time) <= 0):
         return
-    if goes_on(time, moved, stress):
+    if goes_on(time, imposed, moved if made.kind == "creep" else stress):
         made.conditions["start"] = "periodic"
         made.notes.append("its cycles repeat from the first sample on: it had gone on before")
     else:
