@@ -1,4 +1,4 @@
-"""Commands on data folders: list, show, check, import."""
+"""Commands on data folders: list, show, check, shift, import."""
 
 import json
 import os
@@ -138,11 +138,78 @@ def check(
         raise typer.Exit(2)
 
 
+@data_app.command("shift")
+@guarded
+def shift(
+    folder: FolderArgument,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    reference: Annotated[
+        float | None, typer.Option("--reference", help="In °C; by default the middle one.")
+    ] = None,
+    vertical: Annotated[
+        bool, typer.Option("--vertical", help="Shift moduli too, not only frequencies.")
+    ] = False,
+    between: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--between", help="Only temperatures from one to the other, in °C."),
+    ] = None,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    from discover.dataset.linear_agreement import linear_agreements
+    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
+    from discover.dataset.superposition import read_temperatures, shift_table, superpose
+    from discover.report.superposition_page import (
+        agreement_words,
+        superposition_page,
+        superposition_words,
+    )
+    from discover.study.atomic import make_folder, write_text
+
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    places = [Path(folder), *(root / folder for root in folder_roots())]
+    root = next((place for place in places if (place / TESTS_FILE).is_file()), None)
+    if root is None:
+        raise InputError(
+            f"{folder} holds no {TESTS_FILE}, which lists sweeps at several temperatures. Import "
+            f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
+        )
+    sweeps = read_temperatures(root)
+    if between is not None:
+        low, high = min(between), max(between)
+        sweeps = {degrees: one for degrees, one in sweeps.items() if low <= degrees <= high}
+    found = superpose(sweeps, reference, vertical)
+    if out.resolve() == root.resolve():
+        raise InputError("--out names the folder itself. Name a new one.")
+    make_folder(out)
+    if not overwrite and os.path.lexists(out / SWEEP_FILE):
+        raise InputError(f"{out} holds a {SWEEP_FILE} already. Use --overwrite, or another --out.")
+    write_text(out / "shift_factors.csv", shift_table(found))
+    agreements = linear_agreements(root, sweeps)
+    text = superposition_page(found, root.resolve().name, agreements)
+    page = write_text(out / "report.html", text)
+    whole = found.verdict != "not_superposed"
+    if whole:
+        write_text(out / SWEEP_FILE, found.master.to_dataframe().to_csv(index=False))
+    else:
+        (out / SWEEP_FILE).unlink(missing_ok=True)
+    words = [*superposition_words(found), *agreement_words(agreements)]
+    if as_json:
+        laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
+        typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))
+        return
+    for sentence in words:
+        say(sentence)
+    say(f"{out}: {'' if whole else f'no {SWEEP_FILE}; '}shift_factors.csv and {page} written.")
+
+
 @data_app.command("import")
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Text exports, one or more runs in each.")
+        list[Path] | None, typer.Argument(help="Exports, one or more tests in each.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     mapping: Annotated[
@@ -168,6 +235,18 @@ def import_data(
     block: Annotated[
         list[int] | None, typer.Option("--block", min=1, help="Only these blocks of a file.")
     ] = None,
+    test: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--test",
+            help="What a block is, if it is taken for something else: melt.txt:2=creep; "
+            "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none.",
+        ),
+    ] = None,
+    temperature: Annotated[
+        float | None,
+        typer.Option("--temperature", help="In °C, of several the one that is imported."),
+    ] = None,
     start_time: Annotated[
         float | None,
         typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
@@ -187,10 +266,12 @@ def import_data(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Make a data folder from exports of a rheometer: CSV, TRIOS, RheoCompass, or your own."""
+    """Make a data folder from exports of a rheometer: tables, spreadsheets, RepTate, your own."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
+    from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.importing import import_files
+    from discover.dataset.load import DATA_FILES
 
     if out is None:
         raise InputError("Say where the data folder goes: --out FOLDER.")
@@ -201,6 +282,8 @@ def import_data(
         geometry=geometry,
         blocks=block,
         start_time_s=start_time,
+        tests=test,
+        temperature_C=temperature,
         layout={
             "format": form,
             "delimiter": delimiter,
@@ -212,7 +295,9 @@ def import_data(
     paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
     write_folder(imported, out, overwrite)
-    findings = check_folder(out)
+    # a folder of several temperatures is for one to be chosen from
+    whole = any(name in imported.files for name in DATA_FILES)
+    findings = check_folder(out) if whole else Findings()
     errors = findings.of("error")
     said = [*changed, *imported.said]
     if as_json:
@@ -230,6 +315,7 @@ def import_data(
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         say(f"{out}: {len(imported.files) + 1} files written.")
-        say(f"To see every test drawn: discover data show {out} --out DIR")
+        if whole:
+            say(f"To see every test drawn: discover data show {out} --out DIR")
     if errors:
         raise typer.Exit(2)

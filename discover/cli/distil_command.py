@@ -70,7 +70,7 @@ def distil(
 
 
 def _parse_law(text: str) -> tuple[str, dict[str, float]]:
-    from discover.dataset.importing.text_export import is_number
+    from discover.dataset.importing.text_rows import is_number
 
     name, _, rest = text.partition(":")
     parameters = {}

@@ -8,14 +8,15 @@ from pathlib import Path
 
 from discover.dataset.importing.convert import ImportedFolder
 from discover.dataset.importing.mapping import (
+    EVERY_BLOCK,
     MAPPING_FILE,
     Mapping,
     make_mapping,
     read_mapping,
     write_mapping,
 )
-from discover.dataset.importing.text_export import is_number
-from discover.dataset.load import INDEX_FILE
+from discover.dataset.importing.text_rows import is_number
+from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
 from discover.dataset.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import make_folder, write_text
@@ -29,6 +30,8 @@ def merge_mapping(
     blocks: Sequence[int] | None = None,
     start_time_s: float | None = None,
     layout: AnyMapping[str, object] | None = None,
+    tests: Sequence[str] | None = None,
+    temperature_C: float | None = None,
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
@@ -40,7 +43,9 @@ def merge_mapping(
         Options of the form ``stress=Shear stress``.
     geometry
         Such as ``cone_plate:radius_mm=25,angle_deg=1``.
-    blocks, start_time_s, layout
+    tests
+        Of the form ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``.
+    blocks, start_time_s, layout, temperature_C
         As in `discover.dataset.importing.Mapping`.
 
     Raises
@@ -65,6 +70,13 @@ def merge_mapping(
         content["blocks"] = list(blocks)
     if start_time_s is not None:
         content["start_time_s"] = start_time_s
+    if temperature_C is not None:
+        content["temperature_C"] = temperature_C
+    spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in tests or ()]
+    content["tests"] = {**content.get("tests", {}), **_pairs(spelled, "melt.txt:2=creep")}
+    if any(one.startswith(f"{EVERY_BLOCK}=") for one in spelled):
+        # what was said of every block now goes before what was found of each
+        content["tests"] = dict(_pairs(spelled, "melt.txt:2=creep"))
     known = {key: value for key, value in (layout or {}).items() if value is not None}
     content["layout"] = {**content.get("layout", {}), **known}
     return make_mapping(content, "the options" if path is None else f"{path.name} and the options")
@@ -120,7 +132,7 @@ def write_folder(imported: ImportedFolder, out: Path, overwrite: bool) -> None:
         If the folder holds data already and `overwrite` is not set, or cannot be written to.
     """
     make_folder(out)
-    if not overwrite and os.path.lexists(out / INDEX_FILE):
+    if not overwrite and any(os.path.lexists(out / name) for name in (*DATA_FILES, TESTS_FILE)):
         raise InputError(
             f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
             "another --out."

@@ -23,6 +23,8 @@ DATA_VARIABLE = "DISCOVER_DATA"
 
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
+TESTS_FILE = "tests.csv"
+"""Lists tables of one kind at several temperatures, of which no fit takes more than one."""
 
 DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
 """Files of which a folder needs one to be a data set."""
@@ -69,6 +71,12 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
             if not os.access(candidate, os.R_OK | os.X_OK):
                 raise InputError(
                     f"The folder {str(folder)!r} may not be read. Ask for the right to read it."
+                )
+            if os.path.isfile(os.path.join(candidate, TESTS_FILE)):
+                raise InputError(
+                    f"The folder {str(folder)!r} holds tests at several temperatures "
+                    f"({TESTS_FILE}), and a fit takes one. Make one sweep of all with discover "
+                    f"data shift, or copy the table of one temperature to {SWEEP_FILE}."
                 )
             raise InputError(
                 f"The folder {str(folder)!r} has no {INDEX_FILE}. A data folder needs one, with a "

@@ -14,6 +14,11 @@ _LONGEST = 40  # characters
 _SPELLINGS = {"%": "percent", "pct": "percent", "°": "degree", "rev": "turn"}
 """What pint does not know under this name."""
 
+_JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
+"""Products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms."""
+
+_NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev)/min\b")
+
 _DIMENSIONS = ("[mass]", "[length]", "[time]")
 
 _NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
@@ -86,6 +91,7 @@ def read_unit(text: str) -> Unit | None:
         return None
     plain = {"·": "*", "⋅": "*", "⁻": "-", "¹": "1", "²": "2", "³": "3", "μ": "µ"}
     text = "".join(plain.get(c, c) for c in text).replace("**", "^")
+    text = _JOINED.sub(r"\1*\2", _NUMBERS_PER_MINUTE.sub("turn/min", text))
     tokens = re.findall(r"[A-Za-zµ°%]++(?:\^?-?[0-9]++)?|[0-9]++|[()/*.]|\S", text)
     found, rest = _product(tokens)
     return None if rest else found

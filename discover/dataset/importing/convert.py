@@ -1,21 +1,22 @@
-"""Turn blocks of a text export into the files of a data folder."""
+"""Turn the blocks of exports into the files of a data folder."""
 
-import csv
 import hashlib
-import io
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
-from discover.dataset.importing.mapping import Geometry, Mapping, Source
-from discover.dataset.importing.quantities import QUANTITIES, factor_to_si, guess_columns
+from discover.dataset.importing.folder_files import NamedRecord, files_of
+from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
+from discover.dataset.importing.readings import INSTRUMENT, Readings
+from discover.dataset.importing.recognition import Recognised, recognise
+from discover.dataset.importing.records import Record, clock_before, joined, record
 from discover.dataset.importing.registry import blocks_of_importer
-from discover.dataset.importing.text_export import Block, is_number, read_blocks
-from discover.dataset.load import INDEX_FILE, SWEEP_FILE
+from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
+from discover.dataset.importing.text_rows import read_rows
+from discover.dataset.importing.waveforms import waves_of, without_names
 from discover.dataset.table import read_bytes, shown
 from discover.errors import InputError
 
@@ -39,93 +40,164 @@ class ImportedFolder:
     said: list[str] = field(default_factory=list)
 
 
+@dataclass
+class _Import:
+    """What has been found so far, over all files."""
+
+    mapping: Mapping
+    found: list[NamedRecord] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+    seen: dict[str, set[str]] = field(default_factory=dict)
+    tests: dict[str, TestName] = field(default_factory=dict)
+
+
 def import_files(
     paths: Sequence[Path], mapping: Mapping, sweep: Path | None = None
 ) -> ImportedFolder:
-    """Return the data folder that text exports hold.
+    """Return the data folder that exports hold.
 
-    Every block of numbers that has what a run needs becomes a run. Values are converted to SI units
-    and written with all their digits. Rows in which a needed cell is empty or no number are
-    dropped, and counted in `said`.
+    Every block of numbers is taken for the test that its quantities and their course make it:
+    records in time become runs, sweeps and flow curves the tables beside them. Values are converted
+    to SI units and written with all their digits. Rows in which a needed cell is empty or no number
+    are dropped, and counted in `said`.
 
     Parameters
     ----------
     paths
-        Files of runs.
+        Files of tests.
     mapping
-        What is known about them; what it leaves open is guessed from names and units.
+        What is known about them; what it leaves open is found from names, units and numbers.
     sweep
-        File of a linear frequency sweep, if any.
+        File of which the first frequency sweep becomes ``lve.csv``, if any.
 
     Raises
     ------
     InputError
         If a file cannot be understood; says which columns it has.
     """
-    folder = ImportedFolder()
-    given = {str(key): name for key, name in mapping.columns.items()}
-    seen: dict[str, set[str]] = {}
-    sources: list[Source] = []
-    index: list[tuple[str, str, str]] = []
+    state = _Import(mapping)
+    sources = []
     for path in paths:
-        blocks = _blocks(path, mapping)
-        used = 0
-        for number, block in blocks:
-            name = f"{_plain(path.stem)}{f'-{number}' if len(blocks) > 1 else ''}.csv"
-            found = _needed(guess_columns(block, given, sweep=False), block, mapping.geometry)
-            if _lacking(found, mapping.geometry):
-                folder.said.append(
-                    f"{path.name}, block {number} {block.name}: not a run (columns "
-                    f"{', '.join(shown(n) for n, _ in block.columns[:15] if n)}); left out."
-                )
-                continue
-            values, factors, dropped = _values(block, found, mapping, path.name)
-            run = _run(values, mapping)
-            if name in folder.files or name in (INDEX_FILE, SWEEP_FILE):
-                raise InputError(f"Two runs would be named {name}; rename one of the files.")
-            folder.files[name] = _csv(run)
-            index.append((name, path.name, block.name))
-            _note_names(seen, block, found)
-            used += 1
-            folder.said.append(_summary(name, path.name, block, found, factors, run, dropped))
-        if not used:
-            raise InputError(_no_run(path, blocks, given, mapping.geometry))
+        _read(path, state)
         sources.append(_source(path, False))
     if sweep is not None:
-        folder.files[SWEEP_FILE] = _sweep(sweep, mapping, folder.said, seen)
+        _read_sweep(sweep, state)
         sources.append(_source(sweep, True))
-    if not index:
+    if not state.found:
         raise InputError(
-            "No run to import was given. Name one or more exports, or list them under [[source]] "
+            "No test to import was given. Name one or more exports, or list them under [[source]] "
             "in the mapping file."
         )
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerows([("file", "source_file", "source_block"), *index])
-    folder.files[INDEX_FILE] = text.getvalue()
-    unmatched = set(given) - set(seen) - (set() if sweep else set(_SWEEP))
+    given = {str(key): name for key, name in mapping.columns.items()}
+    unmatched = sorted(set(given) - set(state.seen))
     if unmatched:
-        key = sorted(unmatched)[0]
+        key = unmatched[0]
         raise InputError(
-            f"No run in these files has a column {given[key]!r} for {key}, or needs it (torque, "
+            f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
+    files, notes = files_of(state.found)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
-    same = {key: next(iter(names)) for key, names in seen.items() if len(names) == 1}
-    folder.mapping = mapping.model_copy(
-        update={"columns": {**same, **given}, "source": tuple(sources)}
+    same = {key: next(iter(names)) for key, names in state.seen.items() if len(names) == 1}
+    used = mapping.model_copy(
+        update={
+            "columns": {**same, **given},
+            "source": tuple(sources),
+            "tests": {**state.tests, **mapping.tests},
+        }
     )
-    return folder
+    return ImportedFolder(files, used, [*state.said, *notes])
+
+
+def _read(path: Path, state: _Import) -> None:
+    """Add the tests of a file."""
+    blocks = _blocks(path, state.mapping)
+    before: Record | None = None
+    clock = 0.0
+    reasons = []
+    used = 0
+    columns: list[str] = []
+    for number, block in blocks:
+        key = f"{key_of(path.name)}:{number}"
+        where = f"{path.name}, block {number} {block.name}".strip()
+        stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
+        readings = Readings.of(block, state.mapping, path.name)
+        readings.begins, clock = clock_before(readings, clock)
+        chosen = state.mapping.test_of(path.name, number)
+        state.tests[key] = chosen or "none"
+        recovered = None
+        if before is not None and chosen in (None, "creep"):
+            recovered = joined(before, readings)
+        if recovered is not None:
+            state.found[-1] = replace(state.found[-1], record=recovered)
+            state.tests[key] = "creep"
+            state.said.append(
+                f"{where}: the recovery after the creep before it, added to that run."
+            )
+            before = None
+            continue
+        taken = _taken(readings, chosen)
+        previous, before = before, None
+        for part, one in enumerate(taken, start=1):
+            made = None if one.kind == "none" else record(readings, one, previous)
+            if made is not None and not _at_temperature(made, state.mapping):
+                one = replace(one, why=f"at {made.temperature} °C, not the temperature asked for")
+                made = None
+            if made is None or made.kind == "none":
+                reason = one.why if made is None else made.notes[0]
+                reasons.append(f"block {number} is {reason}" if reason else "")
+                state.said.append(_left_out(where, block, reason))
+                continue
+            name = stem + (f"-{part}" if len(taken) > 1 else "")
+            state.found.append(NamedRecord(name, made, path.name, block.name))
+            state.tests[key] = made.kind
+            for quantity, at in readings.columns.items():
+                if quantity in readings.used:
+                    state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+            state.said.append(_summary(where, readings, one, made, columns))
+            before, used = made, used + 1
+        if chosen != "none":
+            for wave in waves_of(block, state.mapping, path.name):
+                used += 1
+                point = wave.name.rpartition(" ")[2]
+                # in SI units already, whatever the user says of the file's
+                readings = Readings.of(wave, Mapping(), path.name)
+                one = recognise(readings)[0]
+                made = record(readings, one, None)
+                found = NamedRecord(f"{stem}-point-{point}", made, path.name, wave.name)
+                state.found.append(found)
+                state.said.append(_summary(f"{path.name}, {wave.name}", readings, one, made))
+    if not used:
+        raise InputError(_nothing(path, blocks, [reason for reason in reasons if reason], state))
+
+
+def _at_temperature(made: Record, mapping: Mapping) -> bool:
+    wanted, has = mapping.temperature_C, made.temperature
+    return wanted is None or has is None or abs(has - wanted) <= 1.0
+
+
+def _taken(readings: Readings, chosen: TestName | None) -> list[Recognised]:
+    """Return what a block is taken for: what the user says, or else what it looks like."""
+    if chosen is None:
+        return recognise(readings)
+    every = np.ones(len(readings), bool)
+    if chosen == "none":
+        return [Recognised("none", every, "left out as asked")]
+    alike = [one for one in recognise(readings) if one.kind == chosen]
+    return alike or [Recognised(chosen, every, "as asked")]
 
 
 def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     layout = mapping.layout
     found = blocks_of_importer(path, layout.format)
     if found is None:
-        found = read_blocks(
-            path, layout.delimiter, layout.decimal, layout.header_row, layout.encoding
-        )
+        rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
+        found = blocks_of_rows(rows, layout.header_row)
+        if not any(Readings.of(block, mapping, path.name).columns for block in found):
+            wave = without_names(rows)
+            found = found if wave is None else [wave]
+        require_blocks(found, path.name)
     blocks = list(enumerate(found, start=1))
     if mapping.blocks is None:
         return blocks
@@ -138,165 +210,117 @@ def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     return chosen
 
 
-_SWEEP = ("omega", "Gp", "Gpp")
-_INSTRUMENT = {
-    "torque": "stress",
-    "angular_velocity": "shear_rate",
-    "angle": "strain",
-    "normal_force": "N1",
-}
-
-
-def _needed(found: dict[str, int], block: Block, geometry: Geometry | None) -> dict[str, int]:
-    """Leave out columns without a single number, and raw signals that nothing is made of."""
-    filled = {
-        key: at for key, at in found.items() if any(is_number(row[at]) for row in block.cells)
-    }
-    return {
-        key: at
-        for key, at in filled.items()
-        if key not in _INSTRUMENT or (geometry is not None and _INSTRUMENT[key] not in filled)
-    }
-
-
-def _lacking(found: dict[str, int], geometry: Geometry | None) -> list[tuple[str, ...]]:
-    """Return what a block lacks to be a run, each as the quantities of which one would do."""
-    wanted = [("time",), ("shear_rate", "strain"), ("stress",)]
-    if geometry is not None:
-        wanted[1:] = [("shear_rate", "strain", "angular_velocity", "angle"), ("stress", "torque")]
-    return [names for names in wanted if not set(names) & set(found)]
-
-
-def _or(names: tuple[str, ...]) -> str:
-    return " or ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)
-
-
-def _values(
-    block: Block, found: dict[str, int], mapping: Mapping, name: str
-) -> tuple[dict[str, np.ndarray], dict[str, float], int]:
-    """Return the found columns in SI units, their factors, and how many rows were dropped."""
-    whole = [
-        all(row[at] != "" and is_number(row[at]) for at in found.values()) for row in block.cells
-    ]
-    rows = [row for row, keep in zip(block.cells, whole, strict=True) if keep]
-    if not rows:
-        names = ", ".join(shown(block.columns[at][0]) for at in found.values())
-        raise InputError(
-            f"{name}: no row from line {block.line} on has numbers in all of {names}. Name other "
-            "columns."
-        )
-    values, factors = {}, {}
-    for key, at in found.items():
-        column, unit = block.columns[at]
-        unit = str(mapping.units.get(key, unit))  # type: ignore[call-overload]
-        raw = np.array([float(row[at]) for row in rows])
-        factors[key] = factor_to_si(key, unit, column, name)
-        values[key] = raw * factors[key]
-    return values, factors, len(block.cells) - len(rows)
-
-
-def _run(values: dict[str, np.ndarray], mapping: Mapping) -> dict[str, np.ndarray]:
-    geometry, values = mapping.geometry, dict(values)
-    run = {"time_s": values["time"] - mapping.start_time_s}
-    if geometry is not None:
-        strain = geometry.strain_per_angle
-        factors = {
-            "angular_velocity": strain,
-            "angle": strain,
-            "torque": geometry.stress_per_torque,
-            "normal_force": geometry.normal_stress_per_force,
-        }
-        for raw, factor in factors.items():
-            if raw in values and factor is not None:
-                values[_INSTRUMENT[raw]] = values[raw] * factor
-    for key in ("shear_rate", "stress", "N1", "N2", "strain"):
-        if key in values:
-            run[QUANTITIES[key].column] = values[key]
-    return run
-
-
-def _sweep(path: Path, mapping: Mapping, said: list[str], seen: dict[str, set[str]]) -> str:
-    given = {str(key): name for key, name in mapping.columns.items()}
-    for _, block in _blocks(path, mapping.model_copy(update={"blocks": None})):
-        found = guess_columns(block, given, sweep=True)
-        if set(_SWEEP) <= set(found):
-            values, factors, dropped = _values(block, found, mapping, path.name)
-            _note_names(seen, block, found)
-            table = {QUANTITIES[key].column: values[key] for key in _SWEEP}
-            said.append(_summary(SWEEP_FILE, path.name, block, found, factors, table, dropped))
-            return _csv(table)
+def _read_sweep(path: Path, state: _Import) -> None:
+    """Add the first frequency sweep of a file as the linear sweep."""
+    for _, block in _blocks(path, state.mapping.model_copy(update={"blocks": None})):
+        readings = Readings.of(block, state.mapping, path.name)
+        if not readings.has("omega", "Gp", "Gpp"):
+            continue
+        one = next((o for o in recognise(readings) if o.kind == "frequency_sweep"), None)
+        one = one or Recognised("frequency_sweep", np.ones(len(readings), bool), "as asked")
+        made = record(readings, one, None)
+        for quantity, at in readings.columns.items():
+            state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+        state.found.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
+        state.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
+        return
     raise InputError(
         f"{path.name} holds no sweep: a block with angular frequency, storage and loss modulus is "
         'needed. Name its columns with --column omega="…" --column Gp="…" --column Gpp="…".'
     )
 
 
-def _note_names(seen: dict[str, set[str]], block: Block, found: dict[str, int]) -> None:
-    for key, at in found.items():
-        seen.setdefault(key, set()).add(block.columns[at][0])
-
-
-def _csv(table: dict[str, Float[np.ndarray, " _"]]) -> str:
-    # repr gives the shortest text that reads back as the same number
-    rows = zip(*(map(repr, column.tolist()) for column in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(row) for row in rows)]) + "\n"
+_WORDS = {
+    "frequency_sweep": "a frequency sweep at small strain",
+    "amplitude_sweep": "an amplitude sweep",
+    "flow_curve": "a flow curve, of steady states",
+    "relaxation": "relaxation after a step of strain",
+    "creep": "a test at a given stress",
+    "run": "a record in time at a given rate",
+}
 
 
 def _summary(
-    target: str,
-    source: str,
-    block: Block,
-    found: dict[str, int],
-    factors: dict[str, float],
-    run: dict,
-    dropped: int,
+    where: str,
+    readings: Readings,
+    one: Recognised,
+    made: Record,
+    said: list[str] | None = None,
 ) -> str:
+    """Say what a block was taken for and its columns, unless the columns have been said before."""
     understood = ", ".join(
-        f"{key} = {block.columns[at][0]}"
-        + (f" [{block.columns[at][1]}]" if block.columns[at][1] else "")
-        + (f" × {factors[key]:.6g}" if factors[key] != 1.0 else "")
-        for key, at in found.items()
+        f"{key} = {words}" for key, words in readings.used.items() if _is_part(key, made)
     )
-    samples = len(next(iter(run.values())))
-    text = f"{target} from {source}{f' ({block.name})' if block.name else ''}: {understood}; "
-    text += f"{samples} rows"
-    return text + (f", {dropped} without all these numbers left out" if dropped else "") + "."
+    if said is not None:
+        if understood in said:
+            understood = "columns as before"
+        said.append(understood)
+    rows = len(next(iter(made.table.values())))
+    text = f"{where}: taken for {_WORDS[made.kind]} ({one.why}); {understood}; {rows} rows"
+    if made.dropped:
+        text += f", {made.dropped} without all these numbers left out"
+    return "; ".join([text, *made.notes]) + "."
 
 
-def _no_run(
-    path: Path,
-    blocks: list[tuple[int, Block]],
-    given: dict[str, str],
-    geometry: Geometry | None,
+def _is_part(key: str, made: Record) -> bool:
+    """Return whether a quantity that was read went into the table, by itself or through another."""
+    sources = {INSTRUMENT.get(name, name) for name in made.table} | set(made.table)
+    # these are read only where they have to stand for another
+    through = {"viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor"}
+    through |= {"strain_amplitude", "stress_amplitude", "temperature"}
+    if key == "strain":
+        return "strain" in made.table or "step_strain" in made.conditions
+    return key in sources or (key in through)
+
+
+def _left_out(where: str, block: Block, reason: str) -> str:
+    if reason:
+        return f"{where}: left out, {reason}."
+    names = ", ".join(shown(n) for n, _ in block.columns[:15] if n)
+    return f"{where}: not a run, and no table that is known (columns {names}); left out."
+
+
+def _nothing(
+    path: Path, blocks: list[tuple[int, Block]], reasons: list[str], state: _Import
 ) -> str:
-    """Say what the block that is nearest to a run has, what it lacks, and what to do."""
-
-    def known(block: Block) -> dict[str, int]:
-        return _needed(guess_columns(block, given, sweep=False), block, geometry)
-
-    number, best = max(blocks, key=lambda pair: len(known(pair[1])))
-    where = f"block {number} (numbers from line {best.line})" if len(blocks) > 1 else "its block"
-    lacks = _lacking(known(best), geometry)
-    names = list(dict.fromkeys(shown(name) for name, _ in best.columns if name))
+    """Say what the block that is nearest to a test has, what it lacks, and what to do."""
+    if reasons:
+        more = f" and {len(reasons) - 6} more" if len(reasons) > 6 else ""
+        return (
+            f"{path.name} holds nothing that is fitted here: {'; '.join(reasons[:6])}{more}. Say "
+            "what it is if this is wrong, as in --test frequency_sweep, or give another file."
+        )
+    all_readings = [(n, Readings.of(block, state.mapping, path.name)) for n, block in blocks]
+    number, best = max(all_readings, key=lambda pair: len(pair[1].columns))
+    several = len(blocks) > 1
+    where = f"block {number} (numbers from line {best.block.line})" if several else "its block"
+    wanted = (
+        _OSCILLATION if {"omega", "Gp", "Gpp"} & set(best.columns) and not best.has("time")
+        else _FLOW
+    )  # fmt: skip
+    lacks = [keys for keys in wanted if not any(best.has(key) for key in keys)]
+    names = list(dict.fromkeys(shown(name) for name, _ in best.block.columns if name))
     text = (
-        f"{path.name} holds no run: {where} has no column of numbers known as "
-        f"{', nor as '.join(map(_or, lacks))}. Its columns are {', '.join(names[:15])}."
+        f"{path.name} holds no test that is known: {where} has no column of numbers known as "
+        f"{', nor as '.join(' or '.join(keys) for keys in lacks)}. Its columns are "
+        f"{', '.join(names[:15])}."
     )
-    if set(_SWEEP) <= set(guess_columns(best, given, sweep=True)):
-        return f"{text} They look like a linear sweep: give the file with --lve, beside runs."
-    raw = [f"{best.columns[at][0]} is {key}" for key, at in _raw(best, given).items()]
-    if raw and geometry is None:
+    raw = [
+        f"{best.block.columns[best.columns[key]][0]} is {key}"
+        for key in INSTRUMENT.values()
+        if key in best.columns
+    ]
+    if raw and best.geometry is None:
         return (
             f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
             "in --geometry cone_plate:radius_mm=25,angle_deg=1."
         )
-    return f'{text} Name the right one, as in --column {lacks[0][0]}="name of the column".'
+    key = lacks[0][0] if lacks else "stress"
+    return f'{text} Name the right one, as in --column {key}="name of the column".'
 
 
-def _raw(block: Block, given: dict[str, str]) -> dict[str, int]:
-    """Return the columns from which stress and rate can be made, by the geometry of the tool."""
-    found = guess_columns(block, given, sweep=False)
-    return {key: at for key, at in found.items() if key in _INSTRUMENT}
+_FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
+_OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
 
 
 def _source(path: Path, sweep: bool) -> Source:

@@ -28,7 +28,27 @@ QuantityName = Literal[
     "omega",
     "Gp",
     "Gpp",
+    "hencky_rate",
+    "tensile_stress",
+    "hencky_strain",
+    "relaxation_modulus",
+    "compliance",
+    "viscosity",
+    "strain_amplitude",
+    "stress_amplitude",
+    "complex_modulus",
+    "complex_viscosity",
+    "phase_angle",
+    "loss_factor",
+    "temperature",
 ]
+
+TestName = Literal[
+    "frequency_sweep", "amplitude_sweep", "flow_curve", "relaxation", "creep", "run", "none"
+]
+"""What a block may be taken for: ``run`` is a record in time at a given rate, ``none`` nothing."""
+
+EVERY_BLOCK = "*"
 
 
 class Geometry(Section):
@@ -80,7 +100,7 @@ class Layout(Section):
     """
 
     format: str | None = None
-    delimiter: Literal["tab", "semicolon", "comma"] | None = None
+    delimiter: Literal["tab", "semicolon", "comma", "space"] | None = None
     decimal: Literal[".", ","] | None = None
     header_row: Annotated[int, Field(ge=1)] | None = None
     encoding: str | None = None
@@ -112,15 +132,49 @@ class Source(Section):
 
 
 class Mapping(Section):
-    """Everything that decides an import; written beside the result so that it can be repeated."""
+    """Everything that decides an import; written beside the result so that it can be repeated.
+
+    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised.
+    """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
+    temperature_C: Annotated[float, Field(ge=-273.15, le=2000)] | None = None
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
+    tests: dict[str, TestName] = Field(default_factory=dict)
+
+    def test_of(self, file: str, block: int) -> TestName | None:
+        """Return what the user says that a block of a file is; None if nothing.
+
+        Parameters
+        ----------
+        file
+            Its name.
+        block
+            Number of the block, from 1.
+        """
+        name = key_of(file)
+        keys = f"{name}:{block}", name, EVERY_BLOCK
+        return next((self.tests[key] for key in keys if key in self.tests), None)
+
+
+def key_of(file: str) -> str:
+    """Return the name of a file as a key of a mapping; percent-encoded if it is no UTF-8.
+
+    Parameters
+    ----------
+    file
+        Its name.
+    """
+    try:
+        file.encode()
+    except UnicodeEncodeError:
+        return quote(os.fsencode(file))
+    return file
 
 
 def make_mapping(content: dict, where: str) -> Mapping:
@@ -155,14 +209,16 @@ def write_mapping(mapping: Mapping) -> str:
     lines[1] += "import.toml --out FOLDER"
     if mapping.start_time_s:
         lines.append(f"start_time_s = {mapping.start_time_s!r}")
+    if mapping.temperature_C is not None:
+        lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "layout", "geometry"):
+    for name in ("columns", "units", "layout", "geometry", "tests"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
         if known:
-            lines += ["", f"[{name}]", *(f"{key} = {_toml(known[key])}" for key in known)]
+            lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(known[key])}" for key in known)]
     for source in mapping.source:
         lines += ["", "[[source]]", _file(source.file)]
         if source.sha256:
@@ -178,6 +234,10 @@ def _file(name: str) -> str:
     except UnicodeEncodeError:
         return f"{_ENCODED} = {_toml(quote(os.fsencode(name)))}"
     return f"file = {_toml(name)}"
+
+
+def _key(name: str) -> str:
+    return name if name.isidentifier() and name.isascii() else _toml(name)
 
 
 def _toml(value: object) -> str:

@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from discover.dataset.importing.reptate import COLUMNS, read_reptate
+from discover.dataset.importing.spreadsheet import read_spreadsheet
 from discover.dataset.importing.text_export import Block
 from discover.errors import InputError
 from discover.new_names import require_new_name
@@ -27,7 +29,14 @@ class Importer:
     suffixes: tuple[str, ...] = ()
 
 
-IMPORTERS: Registry[Importer] = Registry("importer", "discover.importers", dict)
+def _built_in() -> dict[str, Importer]:
+    return {
+        "spreadsheet": Importer(read_spreadsheet, (".xlsx", ".xlsm")),
+        "reptate": Importer(read_reptate, tuple(COLUMNS)),
+    }
+
+
+IMPORTERS: Registry[Importer] = Registry("importer", "discover.importers", _built_in)
 """Importers by name; a package's own by entry points of this group. Text needs none of them."""
 
 TEXT = "text"

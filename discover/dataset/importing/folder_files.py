@@ -1,0 +1,191 @@
+"""Tests become the files of a folder: runs with their index, and the tables beside them."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discover.dataset.importing.records import Record
+from discover.dataset.load import INDEX_FILE, TESTS_FILE
+from discover.errors import InputError
+
+TABLES = {
+    "frequency_sweep": "lve",
+    "amplitude_sweep": "amplitude_sweep",
+    "flow_curve": "flow_curve",
+    "relaxation": "relaxation",
+    "creep": "creep",
+}
+"""The table of each kind of test, without its ending."""
+
+_TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values()))
+
+_SAME = 1.5
+"""Difference in °C up to which two temperatures are one."""
+
+_CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "step_time_s")
+
+
+@dataclass(frozen=True)
+class NamedRecord:
+    """A test and where it comes from.
+
+    Attributes
+    ----------
+    name
+        Of its file, if it is a run, without ending.
+    record
+        The test.
+    source, block
+        Name of the file, and what that calls the block.
+    chosen
+        Whether the user chose it as the table of its kind.
+    """
+
+    name: str
+    record: Record
+    source: str
+    block: str
+    chosen: bool = False
+
+
+def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
+    """Return the text of every file of a folder by name, and what is to be said of them.
+
+    Parameters
+    ----------
+    found
+        The tests, in their order.
+
+    Raises
+    ------
+    InputError
+        If two runs would have one name.
+    """
+    files: dict[str, str] = {}
+    notes: list[str] = []
+    # a file called creep.txt is no table of compliances
+    runs = [
+        replace(one, name=f"{one.name}-run") if f"{one.name}.csv" in _TAKEN else one
+        for one in found
+        if one.record.is_run
+    ]
+    for one in runs:
+        name = f"{one.name}.csv"
+        if name in files:
+            raise InputError(f"Two runs would be named {name}; rename one of the files.")
+        files[name] = _csv(one.record)
+    by_temperature: list[tuple[str, str, str]] = []
+    of_runs = {one.record.temperature for one in runs}
+    for kind, table in TABLES.items():
+        records = [one for one in found if one.record.kind == kind and not one.record.is_run]
+        records = _merged(sorted(records, key=lambda one: not one.chosen), kind)
+        _tables(table, records, of_runs, files, by_temperature, notes)
+    if by_temperature:
+        files[TESTS_FILE] = _text([("file", "test", "temperature_C"), *by_temperature])
+    if runs:
+        files[INDEX_FILE] = _index(runs)
+    return files, notes
+
+
+def _tables(
+    table: str,
+    records: Sequence[NamedRecord],
+    of_runs: set[float | None],
+    files: dict[str, str],
+    by_temperature: list[tuple[str, str, str]],
+    notes: list[str],
+) -> None:
+    """Add the tables of one kind: one of them, or one for each temperature."""
+    groups: list[list[NamedRecord]] = []
+    for one in records:
+        same = (group for group in groups if _alike(group[0], one))
+        group = next(same, None)
+        if group is None:
+            groups.append([one])
+        else:
+            group.append(one)
+    at_runs = [g for g in groups if of_runs and all(_near(g[0], t) for t in of_runs)]
+    for group in groups:
+        main = len(groups) == 1 or group[0].chosen
+        base = table if main else f"{table}_{group[0].record.temperature:g}C"
+        if not main:
+            by_temperature.append((f"{base}.csv", table, f"{group[0].record.temperature:g}"))
+        for number, one in enumerate(group, start=1):
+            name = f"{base}.csv" if number == 1 else f"{base}-{number}.csv"
+            files[name] = _csv(one.record)
+            if number > 1:
+                notes.append(
+                    f"{name} is another {table.replace('_', ' ')} at the same temperature, from "
+                    f"{one.source} {one.block}: nothing reads it. To exchange the two, rename them."
+                )
+    if len(groups) > 1 and not groups[0][0].chosen:
+        first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))
+        text = f"{table}: {len(groups)} temperatures, {first} to {last} °C, a file each, listed in "
+        text += f"{TESTS_FILE}"
+        if len(at_runs) == 1:
+            files[f"{table}.csv"] = _csv(at_runs[0][0].record)
+            text += f"; {table}.csv is that at the temperature of the runs"
+        else:
+            text += f"; a fit takes one of them: import again with --temperature {first}"
+            if table == "lve":
+                text += ", or make one of all with discover data shift"
+        notes.append(text + ".")
+
+
+def _merged(records: list[NamedRecord], kind: str) -> list[NamedRecord]:
+    """Return amplitude sweeps at one temperature and different frequencies as one table."""
+    if kind != "amplitude_sweep" or len(records) < 2:
+        return records
+    kept: list[NamedRecord] = []
+    for one in records:
+        for into in kept:
+            table, more = into.record.table, one.record.table
+            known = "omega" in table and "omega" in more
+            if known and _alike(into, one) and not _shared(table["omega"], more["omega"]):
+                for key in table:
+                    table[key] = np.concatenate([table[key], more[key]])
+                break
+        else:
+            kept.append(one)
+    return kept
+
+
+def _shared(first, second) -> bool:
+    return bool((abs(first[:, None] - second) < 0.02 * first[:, None]).any())
+
+
+def _alike(first: NamedRecord, second: NamedRecord) -> bool:
+    return _near(first, second.record.temperature)
+
+
+def _near(one: NamedRecord, temperature: float | None) -> bool:
+    has = one.record.temperature
+    return has is None or temperature is None or abs(has - temperature) <= _SAME
+
+
+def _index(runs: Sequence[NamedRecord]) -> str:
+    used = [key for key in _CONDITIONS if any(key in one.record.conditions for one in runs)]
+    warm = any(one.record.temperature is not None for one in runs)
+    rows = [("file", "source_file", "source_block", *used, *(["temperature_C"] if warm else []))]
+    for one in runs:
+        conditions = [one.record.conditions.get(key, "") for key in used]
+        degrees = one.record.temperature
+        last = ["" if degrees is None else f"{degrees:g}"] if warm else []
+        rows.append((f"{one.name}.csv", one.source, one.block, *conditions, *last))
+    return _text(rows)
+
+
+def _text(rows: Sequence[tuple[str, ...]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def _csv(record: Record) -> str:
+    # repr gives the shortest text that reads back as the same number
+    table = record.columns
+    rows = zip(*(map(repr, column.tolist()) for column in table.values()), strict=True)
+    return "\n".join([",".join(table), *(",".join(row) for row in rows)]) + "\n"

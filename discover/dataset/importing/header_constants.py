@@ -1,0 +1,88 @@
+"""What the lines above a block of numbers say of the whole of it: a gap, a radius, a rate."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from discover.dataset.unit_text import read_unit
+
+_VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9]).{0,19})?"
+_ALONE = re.compile(_VALUE)
+_WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
+_IN = re.compile(r"(.*\S) in (\S+)")
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number that holds for a whole block.
+
+    Attributes
+    ----------
+    name
+        As the file writes it.
+    value
+        With a decimal point.
+    unit
+        Empty where the file gives none.
+    """
+
+    name: str
+    value: str
+    unit: str
+
+
+def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
+    """Return what lines say in the form of a name, a number and a unit; the last of a name counts.
+
+    Parameters
+    ----------
+    rows
+        The cells of each line above a block.
+    """
+    found: dict[str, Constant] = {}
+    for row in rows:
+        for constant in _constants([cell for cell in row if cell]):
+            if constant.name[:1].isalpha():
+                found[constant.name.lower()] = constant
+    return tuple(found.values())
+
+
+def _constants(cells: Sequence[str]) -> Iterator[Constant]:
+    if not 1 <= len(cells) <= 8:
+        return
+    value = _ALONE.fullmatch(" ".join(cells[1:3]))
+    if value and len(cells) <= 3:
+        yield _constant(cells[0], *value.groups())
+        return
+    for part in " ".join(cells).split(";"):
+        match = _WITH_KEY.fullmatch(part.strip())
+        if match:
+            yield _constant(*match.groups())
+
+
+def _constant(name: str, number: str, unit: str | None) -> Constant:
+    name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
+    return Constant(name, number.replace(",", "."), unit)
+
+
+def name_and_unit(name: str, unit: str) -> tuple[str, str]:
+    """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
+
+    Parameters
+    ----------
+    name
+        Of a column or a constant.
+    unit
+        As it stands beside or below the name; empty if it does not.
+    """
+    bracket = re.fullmatch(r"[\[(](.*)[\])]", unit)
+    unit = (bracket.group(1) if bracket else unit).strip()
+    if unit:
+        return name, unit
+    inside = re.search(r"\s*[\[(]([^\[\]()]*)[\])]\s*$", name)
+    if inside:
+        return name[: inside.start()].strip(), inside.group(1).strip()
+    words = _IN.fullmatch(name)
+    if words and (read_unit(words.group(2)) or words.group(2).lstrip("°") in ("C", "K", "F")):
+        return words.group(1), words.group(2)
+    return name, ""

@@ -1,0 +1,117 @@
+"""Oscillations sample by sample: whether a record is one, of what, and from which start."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import fminbound
+
+_FEWEST_SAMPLES = 20
+_HARMONICS = 9
+_SINE = 0.005
+"""Higher harmonics over the first, up to which a record is a sine."""
+
+_AS_BEFORE = 0.05
+"""Difference over the amplitude, up to which one cycle repeats another."""
+
+_AT_ONCE = 0.02
+"""Share of a period within which a fluid from rest has no stress yet, unless it answers at once."""
+
+_FAR = 0.3
+
+Values = Float[np.ndarray, " n"]
+
+
+def alternates(values: Values) -> bool:
+    """Return whether a record swings to and fro about its middle, once at least."""
+    if len(values) < _FEWEST_SAMPLES or not np.all(np.isfinite(values)) or not np.ptp(values):
+        return False
+    low, high = np.min(values), np.max(values)
+    if min(high, -low) < 0.3 * max(high, -low):  # one sign: a start-up that overshoots, a ramp
+        return False
+    outer = np.abs(values) > 0.3 * (high - low) / 2.0
+    signs = np.sign(values[outer])
+    turns = int(np.sum(signs[1:] != signs[:-1]))
+    # a sine spends 0.8 of its time there, noise about zero changes sign from sample to sample
+    return turns >= 1 and turns < 0.25 * len(signs) and float(np.mean(outer)) > 0.5
+
+
+def frequency_of(time: Values, values: Values) -> float:
+    """Return the angular frequency in rad/s at which a sine with an offset fits best.
+
+    Parameters
+    ----------
+    time
+        In s, increasing.
+    values
+        The record.
+    """
+    span = float(time[-1] - time[0])
+    centred = values - np.mean(values)
+    turns = np.flatnonzero(np.sign(centred[1:]) != np.sign(centred[:-1]))
+    guess = np.pi * max(len(turns), 1) / span
+
+    def misfit(omega: float) -> float:
+        return float(np.sum((values - _series(time, values, omega, 1)[0]) ** 2))
+
+    trials = guess * np.linspace(0.5, 1.6, 111)
+    best = trials[int(np.argmin([misfit(omega) for omega in trials]))]
+    step = 0.01 * guess
+    return np.asarray(fminbound(misfit, best - step, best + step, xtol=1e-9 * best)).item()
+
+
+def _series(
+    time: Values, values: Values, omega: float, most: int
+) -> tuple[Values, Float[np.ndarray, " most"]]:
+    """Return the Fourier series that fits a record best, and the amplitudes of its harmonics."""
+    phases = omega * time[:, None] * np.arange(1, most + 1)
+    design = np.concatenate([np.ones((len(time), 1)), np.cos(phases), np.sin(phases)], axis=1)
+    found, *_ = np.linalg.lstsq(design, values, rcond=None)
+    return design @ found, np.hypot(found[1 : most + 1], found[most + 1 :])
+
+
+def purer(time: Values, stress: Values, strain: Values) -> bool:
+    """Return whether the stress is a sine and the strain is not, so that the stress was imposed.
+
+    Parameters
+    ----------
+    time
+        In s.
+    stress, strain
+        The records.
+    """
+    if np.any(np.diff(time) <= 0.0):
+        return False
+    omega = frequency_of(time, stress)
+    if (time[-1] - time[0]) * omega < 2.0 * np.pi * 0.99:
+        return False  # less than a cycle
+    impure = []
+    for values in (stress, strain):
+        _, sizes = _series(time, values, omega, _HARMONICS)
+        impure.append(float(np.sqrt(np.sum(sizes[1:] ** 2)) / sizes[0]))
+    return impure[0] < _SINE and impure[1] > 4.0 * impure[0] and impure[1] > 2.0 * _SINE
+
+
+def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
+    """Return whether a record begins as it goes on, in steady alternation, and not from rest.
+
+    Its first cycle repeats in the next, or its first sample is far from rest.
+
+    Parameters
+    ----------
+    time
+        In s.
+    imposed, answer
+        What was imposed, and what the fluid answered: strain and stress, or stress and strain.
+    """
+    period = 2.0 * np.pi / frequency_of(time, imposed)
+    size = float(np.max(np.abs(answer)))
+    if time[-1] - time[0] < period * (1.0 - 1e-3) or size == 0.0:
+        return False
+    if time[0] < _AT_ONCE * period and abs(answer[0]) > _FAR * size:
+        return True
+    first = time - time[0] < 0.2 * period
+    later = time[first] + period
+    inside = later <= time[-1]
+    if not inside.any():  # one cycle alone: its ends meet
+        return bool(abs(answer[0] - answer[-1]) < _AS_BEFORE * size)
+    again = np.interp(later[inside], time, answer)
+    return bool(np.max(np.abs(answer[first][inside] - again)) < _AS_BEFORE * size)

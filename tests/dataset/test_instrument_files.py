@@ -1,0 +1,462 @@
+"""Exports of each shape that instruments write come out as the test that they hold.
+
+All numbers are closed forms of one Maxwell element; what is compared went through text and units.
+"""
+
+import csv
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import load_dataset
+
+EXACT = 1e-12  # text of 17 digits; a unit costs a rounding or two
+G, LAMBDA = 100.0, 2.0
+OMEGA = np.geomspace(0.1, 100.0, 13)
+STRAINS = np.geomspace(0.001, 1.0, 9)
+TIMES = np.geomspace(0.01, 10.0, 30)
+RATES = np.geomspace(0.01, 100.0, 11)
+
+
+def moduli(omega, shift=1.0):
+    x = omega * shift * LAMBDA
+    return G * x**2 / (1 + x**2), G * x / (1 + x**2)
+
+
+def softening(strain, omega=10.0):
+    return tuple(m / (1 + strain**2) for m in moduli(np.full_like(strain, omega)))
+
+
+def lines(*columns, mark="\t", comma=False, before=""):
+    rows = [
+        mark.join([before, *row] if before else row)
+        for row in (map(repr, row) for row in zip(*(c.tolist() for c in columns), strict=True))
+    ]
+    return [row.replace(".", ",") for row in rows] if comma else rows
+
+
+def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
+    path = tmp_path / name
+    path.write_bytes("\r\n".join(rows).encode(encoding))
+    return run(tmp_path, path, *options, code=code)
+
+
+def run(tmp_path, *arguments, code=0):
+    out = tmp_path / "data"
+    words = ["data", "import", *map(str, arguments), "--out", str(out)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == code, result.output
+    return out, result
+
+
+def table(path):
+    with path.open() as stream:
+        rows = list(csv.reader(stream))
+    return {name: np.array([row[i] for row in rows[1:]], float) for i, name in enumerate(rows[0])}
+
+
+def assert_sweep(path, omega=OMEGA, shift=1.0):
+    found = table(path)
+    order = np.argsort(found["omega_rad_s"])
+    np.testing.assert_allclose(found["omega_rad_s"][order], omega, rtol=EXACT)
+    for key, wanted in zip(("Gp_Pa", "Gpp_Pa"), moduli(omega, shift), strict=True):
+        np.testing.assert_allclose(found[key][order], wanted, rtol=EXACT)
+
+
+def assert_softening(path):
+    found = table(path)
+    np.testing.assert_allclose(found["strain"], STRAINS, rtol=EXACT)
+    np.testing.assert_allclose(found["omega_rad_s"], 10.0, rtol=EXACT)
+    np.testing.assert_allclose(found["Gp_Pa"], softening(STRAINS)[0], rtol=EXACT)
+    np.testing.assert_allclose(found["Gpp_Pa"], softening(STRAINS)[1], rtol=EXACT)
+
+
+TRIOS_SWEEP = (
+    "Angular frequency",
+    "Oscillation strain",
+    "Stress",
+    "Storage modulus",
+    "Loss modulus",
+)
+
+
+def trios(mark):
+    """Amplitude sweep, frequency sweep and flow sweep in steps, as TRIOS writes them."""
+    osc = ["[step]", "{}", mark.join(TRIOS_SWEEP), mark.join(("rad/s", "%", "MPa", "MPa", "kPa"))]
+    head = [mark.join(pair) for pair in (("Filename", "a.tri"), ("Gap", "1000.0 µm"))]
+    rows = [*head, *osc, ""]
+    rows[rows.index("{}")] = "Amplitude sweep - 1"
+    a, b = softening(STRAINS)
+    still = np.zeros(9)
+    rows[-1:] = lines(still + 10.0, STRAINS * 100, still, a * 1e-6, b * 1e-3, mark=mark)
+    rows += ["", *(line.replace("{}", "Frequency sweep - 2") for line in osc)]
+    a, b = moduli(OMEGA)
+    still = np.zeros(13)
+    rows += lines(OMEGA, still + 1.0, still, a * 1e-6, b * 1e-3, mark=mark)
+    rows += ["", "[step]", "Flow sweep - 3", mark.join(("Stress", "Shear rate", "Step time"))]
+    rows += [mark.join(("Pa", "1/s", "min"))]
+    return rows + lines(RATES * 3.0, RATES, np.arange(1.0, 12.0), mark=mark)
+
+
+@pytest.mark.parametrize(("name", "mark"), [("a.txt", "\t"), ("a.csv", ",")])
+def test_steps_of_trios_become_the_tables_that_they_are(tmp_path, name, mark):
+    out, result = imported(tmp_path, name, trios(mark))
+    assert_softening(out / "amplitude_sweep.csv")
+    assert_sweep(out / "lve.csv")
+    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3.0 * RATES, rtol=EXACT)
+    assert not (out / "runs.csv").exists()
+    assert "block 1 Amplitude sweep - 1: taken for an amplitude sweep" in result.stdout
+    again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
+    assert_softening(again / "amplitude_sweep.csv")
+
+
+def test_a_spreadsheet_is_read_sheet_by_sheet(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    first, second = book.active, book.create_sheet("Frequency sweep - 2")
+    first.title = "Details"
+    first.append(["Filename", "a.tri"])
+    second.append(["Angular frequency", "Storage modulus", "Loss modulus"])
+    second.append(["rad/s", "kPa", "Pa"])
+    for w, a, b in zip(OMEGA, *moduli(OMEGA), strict=True):
+        second.append([float(w), float(a) / 1e3, float(b)])
+    book.save(tmp_path / "a.xlsx")
+    out, result = run(tmp_path, tmp_path / "a.xlsx")
+    assert_sweep(out / "lve.csv")
+    assert "Frequency sweep - 2" in result.stdout
+
+
+def test_a_spreadsheet_without_its_package_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "openpyxl", None)
+    (tmp_path / "a.xlsx").write_bytes(b"PK\x03\x04")
+    _, result = run(tmp_path, tmp_path / "a.xlsx", code=2)
+    assert "pip install openpyxl" in result.stderr
+
+
+def ares(temperatures):
+    rows = ["[Header]", "Run date\t1/2/2023", "[Geometry: Standard]", "Gap\t1.0 mm"]
+    for degrees in temperatures:
+        rows += ["[Step]", f"Step name\tFrequency sweep ({degrees} °C)", "Number of points\t13"]
+        rows += ["Variables\tTemperature\tAngular frequency\tStorage modulus\tLoss modulus"]
+        rows += ["Units\t°C\trad/s\tPa\tPa"]
+        a, b = moduli(OMEGA, 2.0 ** (-degrees / 10))
+        rows += lines(np.full(13, float(degrees)), OMEGA, a, b, before="Data point")
+    return rows
+
+
+def test_sweeps_at_several_temperatures_stay_apart_and_one_can_be_chosen(tmp_path):
+    out, result = imported(tmp_path, "a.txt", ares((150, 140, -10)), encoding="cp1252")
+    for degrees in (150, 140, -10):
+        assert_sweep(out / f"lve_{degrees}C.csv", shift=2.0 ** (-degrees / 10))
+    assert not (out / "lve.csv").exists()
+    assert "3 temperatures, 150 to -10 °C" in result.stdout
+    out, _ = imported(tmp_path, "a.txt", ares((150, 140)), "--temperature", 140, "--overwrite")
+    assert_sweep(out / "lve.csv", shift=2.0**-14)
+
+
+def test_one_table_of_sweeps_over_temperatures_is_several_sweeps(tmp_path):
+    parts = [np.stack([np.full(13, t), OMEGA, *moduli(OMEGA, t / 20)]) for t in (20.0, 40.0)]
+    head = ["Temperature,Frequency,G',G''", "°C,rad/s,Pa,Pa"]
+    out, _ = imported(tmp_path, "a.csv", head + lines(*np.concatenate(parts, 1), mark=","))
+    for degrees in (20, 40):
+        assert_sweep(out / f"lve_{degrees}C.csv", shift=degrees / 20)
+
+
+def test_german_rheocompass_with_waveforms_gives_the_sweep_and_the_waves(tmp_path):
+    names = ["Intervalldaten:", "Messpkt.", "Deformation", "Kreisfrequenz", "Speichermodul"]
+    names += ["Verlustmodul", "Scherdeformation (Rohdaten)", "Schubspannung (Rohdaten)"]
+    rows = ["Projekt:\tGel", "Test:\tLAOS 1", "Ergebnis:\tLAOS", "", "\t".join(names), ""]
+    rows += ["\t\t[%]\t[rad/s]\t[kPa]\t[Pa]\t[%]\t[Pa]"]
+    phase = 2 * np.pi * np.arange(64) / 64
+    for i, (g, a, b) in enumerate(zip(STRAINS, *softening(STRAINS), strict=True), start=1):
+        point = [str(i), *(repr(float(v)) for v in (100 * g, 10.0, a / 1e3, b)), "", ""]
+        rows.append("\t".join(["", *point]).replace(".", ","))
+        wave = 100 * g * np.sin(phase), g * (a * np.sin(phase) + b * np.cos(phase))
+        rows += lines(*wave, comma=True, before="\t\t\t\t\t")
+    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
+    assert_softening(out / "amplitude_sweep.csv")
+    data = load_dataset(out)
+    assert len(data) == len(STRAINS)
+    assert [row["start"] for row in (r.metadata for r in data)] == ["periodic"] * 9
+    wave = data["a-point-9.csv"]
+    np.testing.assert_allclose(wave.strain[:-1], STRAINS[8] * np.sin(phase), atol=1e-14)
+    np.testing.assert_allclose(wave.time[-1], 2 * np.pi / 10.0, rtol=EXACT)
+    assert "it had gone on before" in result.stdout
+
+
+def test_french_names_are_known(tmp_path):
+    names = ["Interval données:", "Point No.", "Intervalle Temps", "Déformation de Cisaillement"]
+    names += ["Contrainte de Cisaillement", "Température"]
+    rows = ["\t".join(names), "", "\t\t[s]\t[%]\t[mPa]\t[°C]"]
+    decay = G * np.exp(-TIMES / LAMBDA)
+    columns = TIMES, np.full(30, 5.0), 50.0 * decay, np.full(30, 25.0)
+    for i, row in enumerate(lines(*columns, comma=True), start=1):
+        rows.append(f"\t{i}\t{row}")
+    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
+    (test,) = load_dataset(out)
+    assert float(test.metadata["step_strain"]) == 0.05
+    assert test.metadata["temperature_C"] == 25.0
+    np.testing.assert_allclose(test.stress, 0.05 * decay, rtol=EXACT)
+    assert "relaxation after a step of strain" in result.stdout
+
+
+def test_actions_of_rspace_are_told_apart_by_their_name_in_the_first_column(tmp_path):
+    head = "Action Name;Time (action)(s);Shear stress(Pa);Shear rate(s-¹);Complex shear strain(%);"
+    head += "Frequency(Hz);Shear modulus (elastic component)(Pa);"
+    head += "Shear modulus (viscous component)(Pa);Temperature(°C)"
+    rows = [head]
+    for r, t in zip(RATES.tolist(), np.arange(11.0), strict=True):
+        rows.append(f"Table of shear rates;{t!r};{3 * r!r};{r!r};;;;;25.0".replace(".", ","))
+    for w, a, b in zip((OMEGA / (2 * np.pi)).tolist(), *(m.tolist() for m in moduli(OMEGA)),
+                       strict=True):  # fmt: skip
+        rows.append(f"Frequency table;1.0;;;1.0;{w!r};{a!r};{b!r};25.0".replace(".", ","))
+    out, _ = imported(tmp_path, "a.csv", rows)
+    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3 * RATES, rtol=EXACT)
+    assert_sweep(out / "lve.csv")
+
+
+def test_segments_of_rheowin_are_told_apart_by_their_number(tmp_path):
+    rows = ["Company;Institute", "Date;1.2.2020 / 10:00", ";t in s;GP in 1/s;Tau in Pa;T in °C"]
+    start = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
+    for n, (t, s) in enumerate(zip(TIMES.tolist(), start.tolist(), strict=True), start=1):
+        rows.append(f"1|{n};{t!r};0.15;{s!r};25.0")
+    for n, r in enumerate(RATES.tolist(), start=1):
+        rows.append(f"2|{n};{10 * n};{r!r};{3 * r!r};25.0")
+    out, _ = imported(tmp_path, "a.csv", rows, encoding="cp1252")
+    (test,) = load_dataset(out)
+    np.testing.assert_allclose(test.stress, start, rtol=EXACT)
+    np.testing.assert_allclose(test.rate, 0.15)
+    assert len(table(out / "flow_curve.csv")["stress_Pa"]) == 11
+
+
+def test_files_of_reptate_are_what_their_suffix_says(tmp_path):
+    x = np.linspace(0.0, 4 * np.pi, 200)
+    files = {
+        "a.tts": ["Mw=10;T=160;", "w G' G''", "rad/s Pa Pa", *lines(OMEGA, *moduli(OMEGA))],
+        # RepTate divides this column by the rate, whatever stands above it
+        "b.shear": ["gdot=0.5;T=160;", "time\th", "s\tPa-s", *lines(TIMES, TIMES * 2, TIMES * 0)],
+        "c.uext": ["gdot=0.1;T=160", *lines(TIMES, TIMES * 7)],
+        "d.laos": ["omega=1.0;gamma=2.0;", "#Time(s)\tStrain(-)\ttau_yx(Pa)",
+                   *lines(x, 2 * np.sin(x), 3 * np.sin(x + 0.5))],
+        "e.creep": ["T=150;stress=10;", "t\tstrain", "s\t-", *lines(TIMES, TIMES * 0.1)],
+    }  # fmt: skip
+    for name, rows in files.items():
+        (tmp_path / name).write_text("\n".join(rows))
+    out, _ = run(tmp_path, *(tmp_path / name for name in files))
+    assert_sweep(out / "lve.csv")
+    data = load_dataset(out)
+    np.testing.assert_allclose(data["b.csv"].stress, 2 * TIMES, rtol=EXACT)
+    np.testing.assert_allclose(data["b.csv"].rate, 0.5)
+    assert data["c.csv"].flow == "uniaxial"
+    np.testing.assert_allclose(data["c.csv"].stress, 7 * TIMES, rtol=EXACT)
+    assert data["d.csv"].metadata["start"] == "periodic"
+    assert data["e.csv"].protocol.control == "stress"
+    np.testing.assert_allclose(data["e.csv"].stress, 10.0)
+
+
+def test_a_shear_file_of_reptate_without_its_rate_is_refused(tmp_path):
+    rows = ["T=160;", "t h", *lines(TIMES, TIMES)]
+    _, result = imported(tmp_path, "a.shear", rows, code=2)
+    assert "Write gdot=" in result.stderr
+
+
+@pytest.mark.parametrize("with_rate", [False, True])
+def test_tables_of_mitlaos_and_spp_need_no_names(tmp_path, with_rate):
+    time = np.arange(400) * 0.02
+    strain, stress = 2 * np.sin(3 * time), 40 * np.sin(3 * time + 0.4) + 5 * np.sin(9 * time + 1)
+    rate = [6 * np.cos(3 * time)] if with_rate else []
+    out, result = imported(tmp_path, "a.txt", lines(time, strain, *rate, stress, mark="  "))
+    (test,) = load_dataset(out)
+    assert test.metadata["start"] == "periodic"
+    np.testing.assert_allclose(test.strain, strain, atol=1e-14)
+    np.testing.assert_allclose(test.stress, stress, rtol=EXACT)
+    assert "without names" in result.stdout
+
+
+def test_a_rate_that_alternates_is_not_taken_for_a_strain_without_a_name(tmp_path):
+    time = np.linspace(0.0, 12.0, 300)
+    stress = (np.cos(time) + np.sin(time) - np.exp(-time)) * G / 2  # from rest, Maxwell, De = 1
+    rows = ["time_s,shear_rate_1_s,stress_Pa", *lines(time, np.cos(time), stress, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    (test,) = load_dataset(out)
+    np.testing.assert_allclose(test.rate, np.cos(time), rtol=EXACT)
+    assert "start" not in test.metadata
+
+
+def test_a_clock_that_goes_on_from_interval_to_interval_starts_anew_with_each(tmp_path):
+    head = "Interval data:\tPoint No.\tTime\tShear Rate\tShear Stress", "\t\t[s]\t[1/s]\t[Pa]"
+    start = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
+    still = np.full(30, 0.5)
+    rows = []
+    for begin in (0.0, 10.0):
+        rows += ["", *head, *(f"\t{i}\t{row}" for i, row in enumerate(
+            lines(begin + TIMES, still * (1 + begin), start), start=1))]  # fmt: skip
+    out, result = imported(tmp_path, "a.csv", rows, encoding="utf-16")
+    for test in load_dataset(out):
+        np.testing.assert_allclose(test.time, TIMES, rtol=1e-12, atol=1e-14)
+    assert "time counts from the last sample before it, at 10 s" in result.stdout
+
+
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_a_sine_of_stress_is_imposed_and_its_start_is_seen_in_the_strain(tmp_path, at_rest):
+    time = np.linspace(0.0, 18.0, 400)
+    strain = 0.1 * np.sin(time) - 0.3 * np.cos(time) + 0.03 * np.sin(3 * time)
+    if at_rest:
+        strain += 0.3 * np.exp(-time / 5.0)  # what starts from zero and fades
+    rows = ["time_s,stress_Pa,strain", *lines(time, np.sin(time), strain, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    (test,) = load_dataset(out)
+    assert test.protocol.control == "stress"
+    assert ("start" in test.metadata) is not at_rest
+
+
+def test_an_amplitude_sweep_without_a_frequency_says_where_to_write_it(tmp_path):
+    rows = ["strain_percent,Gp_Pa,Gpp_Pa", *lines(100 * STRAINS, *softening(STRAINS), mark=",")]
+    out, result = imported(tmp_path, "a.csv", rows)
+    assert "amplitude_sweep_rad_s" in result.stdout
+    np.testing.assert_allclose(table(out / "amplitude_sweep.csv")["strain"], STRAINS, rtol=EXACT)
+    rows.insert(0, "Frequency [rad/s]: 10")
+    out, _ = imported(tmp_path, "a.csv", rows, "--overwrite")
+    assert_softening(out / "amplitude_sweep.csv")
+
+
+def test_a_table_without_names_that_is_no_oscillation_is_refused(tmp_path):
+    _, result = imported(tmp_path, "a.txt", lines(TIMES, TIMES, TIMES), code=2)
+    assert "add a line such as time_s" in result.stderr
+
+
+def test_a_radius_a_gap_and_a_rate_of_the_header_are_used(tmp_path):
+    start = 30.0 * (1 - np.exp(-TIMES / LAMBDA))
+    torque = start * np.pi * 0.0125**3 / 2
+    rows = [
+        "Radius: 12.5 mm",
+        "Gap [µm]: 800",
+        "Shear rate = 6 1/min",
+        "",
+        "Time [s]\tTorque [mN.m]",
+    ]
+    out, result = imported(tmp_path, "a.txt", rows + lines(TIMES, torque * 1e3))
+    (test,) = load_dataset(out)
+    np.testing.assert_allclose(test.stress, start, rtol=1e-10)
+    np.testing.assert_allclose(test.rate, 0.1)
+    assert "of the header" in result.stdout
+    # masked by zeros, as in exports that are given away
+    rows[0] = "Radius: 00.0 mm"
+    _, result = imported(tmp_path, "b.txt", rows + lines(TIMES, torque), "--overwrite", code=2)
+    assert "--geometry" in result.stderr
+
+
+UNITS = {"Step time": "s", "Stress": "Pa", "Shear rate": "1/s", "Strain": "%"}
+
+
+def steps(*parts):
+    rows = []
+    for name, columns in parts:
+        rows += ["[step]", name, "\t".join(columns), "\t".join(UNITS[key] for key in columns)]
+        rows += [*lines(*columns.values()), ""]
+    return rows
+
+
+def test_creep_and_the_recovery_after_it_are_one_run(tmp_path):
+    rise = 0.2 + 0.1 * TIMES
+    fall = rise[-1] - 0.2 * (1 - np.exp(-TIMES))
+    made = steps(
+        ("Creep - 1", {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": rise * 100}),
+        ("Recovery - 2", {"Step time": TIMES, "Stress": TIMES * 0 + 1e-4, "Strain": fall * 100}),
+    )
+    out, _ = imported(tmp_path, "a.txt", made)
+    (test,) = load_dataset(out)
+    assert test.protocol.control == "stress"
+    np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
+    np.testing.assert_allclose(test.time[30:], 10.0 + TIMES, rtol=EXACT)
+    assert np.all(test.stress[30:] == 0.0)
+
+
+def test_a_run_in_a_file_that_is_called_as_a_table_is_still_a_run(tmp_path):
+    columns = {"Step time": TIMES, "Stress": TIMES * 0 + 50.0, "Strain": 20 + 10 * TIMES}
+    out, _ = imported(tmp_path, "creep.txt", steps(("Creep", columns)))
+    assert load_dataset(out).names == ("creep-run.csv",)
+
+
+def test_the_rise_of_a_step_of_strain_is_told_from_what_follows(tmp_path):
+    time = np.concatenate([[0.0, 0.01, 0.02], 0.03 + TIMES])
+    strain = np.concatenate([[0.0, 33.0, 66.0], np.full(30, 100.0)])
+    stress = G * np.concatenate([[0.0, 0.33, 0.66], np.exp(-TIMES / LAMBDA)])
+    made = steps(("Stress relaxation", {"Step time": time, "Strain": strain, "Stress": stress}))
+    out, _ = imported(tmp_path, "a.txt", made)
+    (test,) = load_dataset(out)
+    assert float(test.metadata["step_strain"]) == 1.0
+    # the first sample at full strain ends the step
+    assert float(test.metadata["step_time_s"]) == 0.04
+    np.testing.assert_allclose(test.time, TIMES[1:] - TIMES[0], rtol=1e-12, atol=1e-15)
+
+
+def test_what_follows_a_steady_flow_starts_from_it(tmp_path):
+    start = 50.0 * (1 - np.exp(-TIMES / LAMBDA))
+    made = steps(
+        ("Peak hold - 1", {"Step time": TIMES, "Shear rate": TIMES * 0 + 0.5, "Stress": start}),
+        ("Peak hold - 2", {"Step time": TIMES, "Shear rate": TIMES * 0,
+                           "Stress": start[-1] * np.exp(-TIMES / LAMBDA)}),
+        ("Peak hold - 3", {"Step time": TIMES, "Shear rate": TIMES * 0, "Stress": TIMES * 0}),
+    )  # fmt: skip
+    out, result = imported(tmp_path, "a.txt", made)
+    first, second = load_dataset(out)
+    assert (first.rate_before, second.rate_before) == (0.0, 0.5)
+    assert "block 3 Peak hold - 3: left out" in result.stdout
+
+
+LEFT_OUT = {
+    "a time sweep": (np.full(13, 10.0), np.full(13, 1.0), np.full(13, 25.0), "a time sweep"),
+    "a temperature sweep": (np.full(13, 10.0), np.full(13, 1.0), 25.0 + 2 * np.arange(13.0),
+                            "a temperature sweep"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_oscillations_that_nothing_is_fitted_to_are_said_not_taken(tmp_path, case):
+    omega, strain, degrees, word = LEFT_OUT[case]
+    rows = ["Time,Angular frequency,Strain,G',G'',Temperature", "s,rad/s,%,Pa,Pa,°C"]
+    rows += lines(TIMES[:13], omega, strain, *moduli(OMEGA), degrees, mark=",")
+    out, result = imported(tmp_path, "a.csv", rows, code=2)
+    assert word in result.stderr
+    assert "--test" in result.stderr
+    assert not out.exists()
+
+
+def test_a_rise_of_the_rate_in_time_is_a_run_where_the_user_says_so(tmp_path):
+    rows = ["Time,Shear rate,Shear stress", "s,1/s,Pa"]
+    rows += lines(np.arange(1.0, 12.0), RATES, 3 * RATES, mark=",")
+    out, result = imported(tmp_path, "a.csv", rows)
+    assert (out / "flow_curve.csv").exists()
+    assert "every row has another rate" in result.stdout
+    out, _ = imported(tmp_path, "a.csv", rows, "--test", "run", "--overwrite")
+    assert load_dataset(out).names == ("a.csv",)
+
+
+def test_moduli_follow_from_their_size_and_angle(tmp_path):
+    a, b = moduli(OMEGA)
+    rows = ["Frequency,Complex viscosity,Phase angle", "Hz,Pa.s,°"]
+    columns = OMEGA / (2 * np.pi), np.hypot(a, b) / OMEGA, np.degrees(np.arctan2(b, a))
+    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
+    found = table(out / "lve.csv")
+    # arctan and back costs some roundings of the smaller modulus
+    np.testing.assert_allclose(found["Gp_Pa"], a, rtol=1e-10)
+    np.testing.assert_allclose(found["Gpp_Pa"], b, rtol=1e-10)
+
+
+@pytest.mark.measured
+def test_real_exports_of_trios_are_what_their_steps_are_called(measured_data, tmp_path):
+    folder = measured_data.parent / "instrument-files"
+    if not folder.is_dir():
+        pytest.skip("the instrument's own files are not here")
+    out, _ = run(tmp_path, folder / "multi_technique.txt")
+    files = {path.name for path in out.iterdir()}
+    assert {"amplitude_sweep.csv", "lve.csv", "multi_technique-3.csv"} <= files
+    (ramp,) = load_dataset(out)
+    assert ramp.protocol.control == "stress"
+    out, _ = run(tmp_path, folder / "creep_experiment.txt", "--overwrite")
+    assert load_dataset(out)["creep_experiment.csv"].protocol.control == "stress"
+    out, _ = run(tmp_path, folder / "frequency_sweep_tts_ARES.txt", "--overwrite")
+    assert len(list(out.glob("lve_*C.csv"))) == 20

@@ -1,0 +1,72 @@
+"""One spectrum predicts oscillation, relaxation and creep, or it is said that it does not."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset.linear_agreement import creep_compliance, linear_agreements
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
+from discover.dataset.superposition import read_temperatures
+
+TIME = np.geomspace(0.01, 100.0, 40)
+OMEGA = np.geomspace(0.01, 100.0, 30)
+MODULUS, RELAXATION = np.array([300.0, 80.0, 20.0]), np.array([0.05, 1.0, 30.0])
+
+
+def spectrum(modulus, times):
+    return RelaxationSpectrum(np.asarray(modulus), np.asarray(times), 0.0, 0.0, {})
+
+
+def test_one_maxwell_element_creeps_as_spring_and_dashpot():
+    found = creep_compliance(spectrum([50.0], [2.0]), TIME)
+    np.testing.assert_allclose(found, 1 / 50.0 + TIME / 100.0, rtol=1e-12)
+
+
+def compliance():
+    """Return the creep of the three elements under a unit stress, by scipy."""
+
+    def slope(_, state):
+        rate = np.sum(state[:3] / RELAXATION) / MODULUS.sum()
+        return np.append(MODULUS * rate - state[:3] / RELAXATION, rate)
+
+    start = np.append(MODULUS, 1.0) / MODULUS.sum()
+    ends = 0.0, TIME[-1]
+    return solve_ivp(slope, ends, start, "LSODA", TIME, rtol=1e-10, atol=1e-13).y[3]
+
+
+def test_several_elements_creep_as_their_differential_equation_does():
+    # tolerance of the integration, over some hundred steps
+    np.testing.assert_allclose(
+        creep_compliance(spectrum(MODULUS, RELAXATION), TIME), compliance(), rtol=1e-7
+    )
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.75])
+def test_a_gain_of_one_test_is_found_and_none_where_there_is_none(tmp_path, gain):
+    x = OMEGA[:, None] * RELAXATION
+    sweep = OMEGA, (x**2 / (1 + x**2)) @ MODULUS, (x / (1 + x**2)) @ MODULUS
+    relaxing = gain * np.exp(-TIME[:, None] / RELAXATION) @ MODULUS
+    tables = {
+        "lve": ("omega_rad_s,Gp_Pa,Gpp_Pa", sweep),
+        "relaxation": ("time_s,relaxation_modulus_Pa", (TIME, relaxing)),
+        "creep": ("time_s,compliance_1_Pa", (TIME, compliance())),
+    }
+    rows = ["file,test,temperature_C"]
+    for celsius in (20, 40):
+        for test, (head, columns) in tables.items():
+            name = f"{test}_{celsius}C.csv"
+            np.savetxt(
+                tmp_path / name, np.stack(columns, 1), "%.17g", ",", header=head, comments=""
+            )
+            rows.append(f"{name},{test},{celsius}")
+    (tmp_path / "tests.csv").write_text("\n".join(rows))
+    found = linear_agreements(tmp_path, read_temperatures(tmp_path))
+    assert len(found) == 4
+    for one in found:
+        if one.test == "creep" or gain == 1.0:
+            assert one.agrees
+        else:
+            assert not one.agrees
+            # the modes found from the sweep fit it to about 1 %
+            assert one.bias == pytest.approx(1 / gain - 1, abs=0.03)
+            assert one.left < 0.05

@@ -1,0 +1,133 @@
+"""Sweeps at several temperatures: known shifts come back, and where there are none that is said."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset import load_dataset
+from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.dataset.superposition import superpose
+from discover.errors import InputError
+
+OMEGA = np.geomspace(0.1, 100.0, 25)
+CELSIUS = np.arange(100.0, 200.0, 15.0)
+C1, C2, REFERENCE = 7.0, 120.0, 145.0
+TIMES = np.geomspace(1e-8, 1e8, 33)
+MODULI = 1e5 * TIMES**-0.2 * np.exp(-TIMES / 1e3)  # a broad spectrum that ends
+
+
+def sweep(shift, vertical=1.0, moduli=MODULI, times=TIMES):
+    x = OMEGA[:, None] * shift * times
+    storage, loss = (x**2 / (1 + x**2)) @ moduli, (x / (1 + x**2)) @ moduli
+    return LinearSweep(OMEGA, vertical * storage, vertical * loss)
+
+
+def wlf(celsius):
+    return 10.0 ** (-C1 * (celsius - REFERENCE) / (C2 + celsius - REFERENCE))
+
+
+def test_the_constants_of_wlf_come_back_from_sweeps_that_were_made_with_them():
+    found = superpose({t: sweep(wlf(t)) for t in CELSIUS})
+    assert found.reference == REFERENCE
+    assert found.verdict == "superposed"
+    # a monotone cubic through eight samples a decade misses by some 1e-4 of a decade
+    np.testing.assert_allclose(found.log_shift, np.log10(wlf(CELSIUS)), atol=5e-3)
+    law = next(law for law in found.laws if law.name == "WLF")
+    np.testing.assert_allclose(list(law.values.values()), (C1, C2), rtol=0.01)
+    arrhenius = next(law for law in found.laws if law.name == "Arrhenius")
+    assert arrhenius.error > 20.0 * law.error
+
+
+def test_an_activation_energy_comes_back_and_its_interval_holds_it():
+    energy, kelvin = 8e4, CELSIUS + 273.15
+    shift = np.exp(energy / 8.314462618 * (1 / kelvin - 1 / (REFERENCE + 273.15)))
+    noise = np.exp(np.random.default_rng(3).normal(0.0, 0.01, (len(CELSIUS), 2, len(OMEGA))))
+    sweeps = {}
+    for t, a, factor in zip(CELSIUS, shift, noise, strict=True):
+        exact = sweep(a)
+        moduli = exact.storage_modulus * factor[0], exact.loss_modulus * factor[1]
+        sweeps[float(t)] = LinearSweep(OMEGA, *moduli)
+    found = superpose(sweeps)
+    law = next(law for law in found.laws if law.name == "Arrhenius")
+    low, high = law.intervals["activation_energy_J_mol"]
+    assert low < energy < high
+    assert high - low < 0.1 * energy
+
+
+def test_vertical_shifts_come_back_only_where_they_are_asked_for():
+    vertical = (CELSIUS + 273.15) / (REFERENCE + 273.15)
+    sweeps = {t: sweep(wlf(t), b) for t, b in zip(CELSIUS, vertical, strict=True)}
+    found = superpose(sweeps, vertical=True)
+    np.testing.assert_allclose(10.0**found.log_vertical, vertical, rtol=5e-3)
+    np.testing.assert_allclose(found.log_shift, np.log10(wlf(CELSIUS)), atol=0.02)
+    assert np.all(superpose(sweeps).log_vertical == 0.0)
+
+
+def two_processes(celsius):
+    """Return moduli of two processes of which one does not feel the temperature."""
+    a, b = sweep(wlf(celsius)), sweep(1.0, 1.0, np.array([3e5]), np.array([0.1]))
+    storage = a.storage_modulus + b.storage_modulus
+    return LinearSweep(OMEGA, storage, a.loss_modulus + b.loss_modulus)
+
+
+def test_where_superposition_fails_it_is_said():
+    found = superpose({t: two_processes(t) for t in CELSIUS})
+    assert found.verdict == "not_superposed"
+
+
+def folder(path, made):
+    path.mkdir()
+    rows = ["file,test,temperature_C"]
+    for t in CELSIUS:
+        made(t).to_dataframe().to_csv(path / f"lve_{t:g}C.csv", index=False)
+        rows.append(f"lve_{t:g}C.csv,lve,{t:g}")
+    (path / "tests.csv").write_text("\n".join(rows) + "\n")
+    return path
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["data", "shift", *map(str, arguments)])
+
+
+def test_the_moved_sweeps_are_a_new_folder_that_loads(tmp_path):
+    made = folder(tmp_path / "melt", lambda t: sweep(wlf(t)))
+    result = invoke(made, "--out", tmp_path / "master", "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["verdict"] == "superposed"
+    master = load_dataset(tmp_path / "master").linear_sweep
+    assert master is not None
+    assert len(master) == len(CELSIUS) * len(OMEGA)
+    exact = sweep(1.0)
+    moved = np.interp(OMEGA, master.angular_frequency, master.storage_modulus)
+    np.testing.assert_allclose(moved, exact.storage_modulus, rtol=0.02)
+    page = (tmp_path / "master" / "report.html").read_text()
+    assert all(f'id="{name}"' in page for name in ("overlap", "van_gurp", "shifts"))
+
+
+def test_what_does_not_superpose_gives_no_sweep_to_fit(tmp_path):
+    made = folder(tmp_path / "blend", two_processes)
+    result = invoke(made, "--out", tmp_path / "master")
+    assert result.exit_code == 0, result.output
+    assert "do not superpose" in result.stdout
+    assert not (tmp_path / "master" / "lve.csv").exists()
+    assert "<svg" in (tmp_path / "master" / "report.html").read_text()
+
+
+def test_a_reference_that_was_not_measured_is_refused():
+    with pytest.raises(InputError, match=r"Take one of 100, 115"):
+        superpose({t: sweep(wlf(t)) for t in CELSIUS}, reference=20.0)
+
+
+def test_neighbours_without_common_moduli_are_refused():
+    with pytest.raises(InputError, match="share no moduli"):
+        superpose({25.0: sweep(1.0), 100.0: sweep(1e-12)})
+
+
+@pytest.mark.measured
+def test_polystyrene_superposes(measured_data, tmp_path):
+    result = invoke(measured_data / "ps-linear", "--out", tmp_path / "master", "--vertical")
+    assert result.exit_code == 0, result.output
+    assert "The sweeps superpose" in result.stdout
