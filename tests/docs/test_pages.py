@@ -14,7 +14,8 @@ from discover.cli import app
 from discover.study import read_study
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+OF_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md")
+PAGES = [*(ROOT / name for name in OF_THE_ROOT), *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page, language):
