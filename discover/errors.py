@@ -8,6 +8,15 @@ class InputError(ValueError):
 
     The message says what was got, what was wanted and how to mend it. The command line
     prints it on standard error without a traceback and exits with status 2.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> try:
+    ...     dc.make_law("giesekus", {"alpha": -1.0})
+    ... except dc.InputError:
+    ...     print("a mobility is not negative")
+    a mobility is not negative
     """
 
 

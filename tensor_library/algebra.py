@@ -24,21 +24,47 @@ def _is_shear(tensor: Symmetric) -> bool:
 
 
 def identity_like(tensor: Symmetric) -> Symmetric:
-    """Return the unit tensor in the storage of `tensor`."""
+    """Return the unit tensor in the storage of `tensor`.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import identity_like
+    >>> identity_like(jnp.zeros(4)).tolist()  # 11, 22, 33, 12
+    [1.0, 1.0, 1.0, 0.0]
+    """
     if _is_shear(tensor):
         return jnp.array([1.0, 1.0, 1.0, 0.0], dtype=tensor.dtype)
     return jnp.eye(3, dtype=tensor.dtype)
 
 
 def trace(tensor: Symmetric) -> Float[Array, ""]:
-    """Return tr a."""
+    """Return tr a.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import trace
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> float(trace(sigma))
+    2.0
+    """
     if _is_shear(tensor):
         return tensor[0] + tensor[1] + tensor[2]
     return jnp.trace(tensor)
 
 
 def square(tensor: Symmetric) -> Symmetric:
-    """Return a·a."""
+    """Return a·a.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import square
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> square(sigma)[0].tolist()
+    [4.0, 0.0, 0.0]
+    """
     if _is_shear(tensor):
         a11, a22, a33, a12 = tensor
         return jnp.stack([a11**2 + a12**2, a22**2 + a12**2, a33**2, a12 * (a11 + a22)])
@@ -46,7 +72,16 @@ def square(tensor: Symmetric) -> Symmetric:
 
 
 def anticommutator(first: Symmetric, second: Symmetric) -> Symmetric:
-    """Return a·b + b·a, which is symmetric although a·b is not."""
+    """Return a·b + b·a, which is symmetric although a·b is not.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import anticommutator
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> anticommutator(sigma, sigma)[0].tolist()
+    [8.0, 0.0, 0.0]
+    """
     if _is_shear(first):
         a11, a22, a33, a12 = first
         b11, b22, b33, b12 = second
@@ -63,7 +98,16 @@ def anticommutator(first: Symmetric, second: Symmetric) -> Symmetric:
 
 
 def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
-    """Return tr(a·b)."""
+    """Return tr(a·b).
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import inner
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> float(inner(sigma, sigma))
+    4.0
+    """
     if _is_shear(first):
         # the 12 component stands for 12 and 21
         a11, a22, a33, a12 = first
@@ -73,12 +117,29 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
 
 
 def to_shear(tensor: Float[Array, "3 3"]) -> Float[Array, "4"]:
-    """Return the four components (11, 22, 33, 12) of a tensor in simple shear."""
+    """Return the four components (11, 22, 33, 12) of a tensor in simple shear.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import to_shear
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> to_shear(sigma).tolist()
+    [2.0, 0.0, 0.0, 0.0]
+    """
     return jnp.stack([tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1]])
 
 
 def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
-    """Return the full tensor of four simple-shear components (11, 22, 33, 12)."""
+    """Return the full tensor of four simple-shear components (11, 22, 33, 12).
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import from_shear
+    >>> from_shear(jnp.asarray([1.0, 2.0, 3.0, 4.0])).tolist()
+    [[1.0, 4.0, 0.0], [4.0, 2.0, 0.0], [0.0, 0.0, 3.0]]
+    """
     a11, a22, a33, a12 = components
     zero = jnp.zeros_like(a11)
     return jnp.stack(

@@ -41,6 +41,12 @@ class ClosedForm:
     expression
         The same as `function`, of SymPy symbols: from it the form is written in any notation. None
         for a form that is built in, which every notation knows.
+
+    Examples
+    --------
+    >>> from tensor_library import CLOSED_FORMS
+    >>> CLOSED_FORMS["exp"].spelling
+    '(exp(epsilon*tr(sigma))-1)'
     """
 
     name: str
@@ -115,6 +121,11 @@ def register_closed_form(form: ClosedForm) -> ClosedForm:
     ValueError
         If its name, spelling or inner parameter is taken or cannot be written, its default is out
         of bounds, it does not vanish at zero stress, or `function` and `expression` differ.
+
+    Examples
+    --------
+    >>> from tensor_library import register_closed_form
+    >>> register_closed_form(form)  # doctest: +SKIP
     """
     known = CLOSED_FORMS.present
     for what, text in (("name", form.name), ("inner_name", form.inner_name)):

@@ -29,6 +29,13 @@ def integrity_basis(
     Any isotropic symmetric tensor function of two symmetric tensors is a sum of these with
     coefficients that depend on the ten invariants of the two alone, so a law written in them does
     not depend on the observer. `scalar_invariants` has eight of the ten.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import integrity_basis
+    >>> integrity_basis(jnp.zeros(4), jnp.zeros(4)).shape
+    (8, 4)
     """
     stress_squared = square(stress)
     rate_squared = square(rate)

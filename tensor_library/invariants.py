@@ -36,6 +36,14 @@ def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
     ----------
     stress, rate
         Symmetric tensors, both (3, 3) or both (4,).
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import scalar_invariants
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> scalar_invariants(sigma, jnp.zeros((3, 3)))[:2].tolist()  # tr σ, tr σ²
+    [2.0, 4.0]
     """
     stress_squared = square(stress)
     rate_squared = square(rate)

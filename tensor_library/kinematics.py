@@ -14,17 +14,41 @@ VelocityGradient = Float[Array, "3 3"] | Float[Array, "4"] | Float[Array, ""]
 
 
 def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of v₁ = γ̇ x₂."""
+    """Return the velocity gradient of v₁ = γ̇ x₂.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import simple_shear
+    >>> simple_shear(jnp.asarray(2.0))[0].tolist()
+    [0.0, 2.0, 0.0]
+    """
     return jnp.zeros((3, 3), dtype=jnp.result_type(shear_rate, float)).at[0, 1].set(shear_rate)
 
 
 def uniaxial_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of uniaxial extension along x₁ at constant volume."""
+    """Return the velocity gradient of uniaxial extension along x₁ at constant volume.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import uniaxial_extension
+    >>> jnp.diag(uniaxial_extension(jnp.asarray(2.0))).tolist()
+    [2.0, -1.0, -1.0]
+    """
     return extension_rate * jnp.diag(jnp.array([1.0, -0.5, -0.5]))
 
 
 def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
-    """Return the velocity gradient of planar extension in the x₁ x₂ plane."""
+    """Return the velocity gradient of planar extension in the x₁ x₂ plane.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import planar_extension
+    >>> jnp.diag(planar_extension(jnp.asarray(2.0))).tolist()
+    [2.0, -2.0, 0.0]
+    """
     return extension_rate * jnp.diag(jnp.array([1.0, -1.0, 0.0]))
 
 
@@ -36,6 +60,13 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
     velocity_gradient
         L, shape (3, 3); its components 11, 22, 33, 12, where no other is there; or the scalar
         shear rate of simple shear.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import rate_of_deformation
+    >>> rate_of_deformation(jnp.asarray(2.0)).tolist()  # of simple shear: 11, 22, 33, 12
+    [0.0, 0.0, 0.0, 2.0]
     """
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():
@@ -57,6 +88,14 @@ def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGra
         σ, shape (3, 3), or its four components 11, 22, 33, 12.
     velocity_gradient
         As in `rate_of_deformation`; the full tensor for a full σ, else one of the other two.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import upper_convected_production
+    >>> stress, rate = jnp.asarray([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
+    >>> upper_convected_production(stress, rate).tolist()  # σ11 grows with 2 γ̇ σ12
+    [12.0, 0.0, 0.0, 0.0]
     """
     velocity_gradient = jnp.asarray(velocity_gradient)
     if velocity_gradient.shape == ():

@@ -32,6 +32,13 @@ class TermLibrary:
     ----------
     terms
         The candidate terms, without repetition.
+
+    Examples
+    --------
+    >>> from tensor_library import TermLibrary, parse_term
+    >>> library = TermLibrary((parse_term("sigma"), parse_term("sigma.sigma")))
+    >>> library.names
+    ('sigma', 'sigma.sigma')
     """
 
     terms: tuple[CandidateTerm, ...]
@@ -190,6 +197,12 @@ def build_library(
     ------
     ValueError
         If a name is unknown or the degree is outside 0 to 4.
+
+    Examples
+    --------
+    >>> from tensor_library import build_library
+    >>> len(build_library(degree=0)), len(build_library(degree=1, closed_forms=["exp"]))
+    (8, 65)
     """
     if not 0 <= degree <= 4:
         raise ValueError(f"degree must be 0 to 4; got {degree}. Higher degrees are not separable.")

@@ -34,6 +34,12 @@ class CandidateTerm:
         Exponent of each invariant of `INVARIANT_NAMES`.
     closed_form
         Key of `CLOSED_FORMS`, or None.
+
+    Examples
+    --------
+    >>> from tensor_library import CandidateTerm
+    >>> CandidateTerm(tensor=1, powers=(1, 0, 0, 0, 0, 0, 0, 0)).name
+    'tr(sigma)*sigma'
     """
 
     tensor: int
@@ -166,7 +172,14 @@ class CandidateTerm:
 
 
 class TermShare(NamedTuple):
-    """A term, by its canonical spelling, with the coefficient that a law or an effect gives it."""
+    """A term, by its canonical spelling, with the coefficient that a law or an effect gives it.
+
+    Examples
+    --------
+    >>> from tensor_library import TermShare
+    >>> TermShare("sigma.sigma", 0.3).coefficient
+    0.3
+    """
 
     term: str
     coefficient: float

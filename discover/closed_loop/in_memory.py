@@ -65,6 +65,13 @@ def close_loop(
     ------
     InputError
         If data, base or an option is not as it should be.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01)
+    >>> loop = dc.close_loop(data, held_out=["laos_2_1"], max_effects=1)  # doctest: +SKIP
+    >>> loop.verdict, loop.to_dataframe()  # doctest: +SKIP
     """
     unknown = sorted(set(options) - _OPTIONS)
     if unknown:

@@ -97,6 +97,13 @@ def compare(
     InputError
         If estimators are not fitted, or not to the same runs with the same known part, a run
         judges that was fitted, or an option is unknown.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01)
+    >>> comparison = dc.compare(data, learners=["tensor_sindy"])  # doctest: +SKIP
+    >>> comparison.to_html("comparison.html")  # doctest: +SKIP
     """
     say = progress or silent
     if isinstance(first, Dataset):

@@ -37,6 +37,17 @@ class Dataset(NotebookView):
     material_functions
         Tables beside the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``,
         ``amplitude_sweep``.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import numpy as np
+    >>> times = np.linspace(0.0, 5.0, 51)
+    >>> stress = 50.0 * (1 - np.exp(-times))
+    >>> run = dc.Run("slow.csv", times, dc.start_up(0.5), np.full(51, 0.5), stress)
+    >>> data = dc.Dataset("my melt", (run,))
+    >>> len(data), data["slow.csv"].stress.shape
+    (1, (51,))
     """
 
     name: str

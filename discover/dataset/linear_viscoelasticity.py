@@ -30,6 +30,15 @@ class LinearSweep:
         In Pa, shape (n,).
     thinned
         How it was thinned when it was read, in words; empty if it was not.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import numpy as np
+    >>> omega = np.logspace(-2, 2, 9)
+    >>> sweep = dc.LinearSweep(omega, omega**2 / (1 + omega**2), omega / (1 + omega**2))
+    >>> sweep.storage_modulus.shape
+    (9,)
     """
 
     angular_frequency: Float[np.ndarray, " n"]

@@ -141,6 +141,12 @@ def load_dataset(
     ------
     InputError
         If something in the folder is wrong; the message says what, where and how to mend it.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.load_dataset("melt")  # doctest: +SKIP
+    >>> train, test = data.split(held_out=["fast.csv"])  # doctest: +SKIP
     """
     root = resolve_folder(folder, base)
     index = read_index(root)

@@ -55,6 +55,16 @@ class Run:
         Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
     metadata
         What else the source says of the run.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import numpy as np
+    >>> times = np.linspace(0.0, 5.0, 51)
+    >>> stress = 50.0 * (1 - np.exp(-times))
+    >>> run = dc.Run("slow.csv", times, dc.start_up(0.5), np.full(51, 0.5), stress)
+    >>> run.name, run.stress.shape
+    ('slow.csv', (51,))
     """
 
     name: str

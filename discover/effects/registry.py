@@ -44,6 +44,12 @@ def effects_table() -> "pd.DataFrame":
 
     An amplitude of zero is no effect. `low` and `high` are in `unit` where `range_scale` is
     ``one``, and else multiples of that property of the data.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> "wall_slip" in dc.effects().index.get_level_values(0)
+    True
     """
     import pandas as pd
 
@@ -75,6 +81,11 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
     ------
     InputError
         If it is no effect, has no parameter, or its name is taken or is none.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.register_effect(effect)  # doctest: +SKIP
     """
     if not isinstance(effect, ConstitutiveEffect | KinematicEffect | SignalEffect):
         raise InputError(

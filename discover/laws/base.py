@@ -27,6 +27,16 @@ class AbstractConstitutiveLaw(eqx.Module):
     ----------
     linear_relaxation
         Whether the −σ is part of the known law. False where it too is left to a learner.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import jax.numpy as jnp
+    >>> law = dc.make_law("giesekus", {"alpha": 0.3})
+    >>> isinstance(law, dc.AbstractConstitutiveLaw)
+    True
+    >>> law.stress_rate(jnp.zeros(4), jnp.asarray(2.0)).tolist()  # at rest, then γ̇ = 2
+    [0.0, 0.0, 0.0, 2.0]
     """
 
     linear_relaxation: eqx.AbstractVar[bool]

@@ -44,6 +44,13 @@ class Fluid(eqx.Module):
         λ_k, shape (k,), in s.
     solvent_viscosity
         η_s, in Pa s.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> fluid = dc.Fluid(dc.make_law("ucm"), modulus=[100.0, 10.0], relaxation_time=[0.1, 1.0])
+    >>> fluid.n_modes
+    2
     """
 
     law: AbstractConstitutiveLaw

@@ -54,6 +54,12 @@ def laws_table() -> "pd.DataFrame":
 
     Laws are dimensionless, stress over modulus and time over relaxation time, and so are their
     parameters.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> "giesekus" in dc.laws().index
+    True
     """
     import pandas as pd
 
@@ -120,6 +126,12 @@ def register_law(
     ------
     InputError
         If the name is taken or is none, a range is none, or `build` makes no law.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.register_law("my_law", MyLaw, {"k": (0.0, 10.0)})  # doctest: +SKIP
+    >>> dc.make_law("my_law", {"k": 1.0})  # doctest: +SKIP
     """
     require_new_name(name, [*LAWS.present, *RESERVED], "law")
     ranges = {}
@@ -195,6 +207,13 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
     ------
     InputError
         If the law is unknown, or a parameter is missing, unknown or outside its range.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> law = dc.make_law("giesekus", {"alpha": 0.3})
+    >>> [(share.term, share.coefficient) for share in law.as_terms()]
+    [('sigma.sigma', 0.3)]
     """
     parameters = dict(parameters or {})
     if name not in LAWS:

@@ -24,6 +24,12 @@ def load(path: str | Path) -> TensorSINDy | TBNNUDE | TensorDense:
     InputError
         If there is no such file, it is something else or damaged, or it needs a law that is not
         registered here.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> law = dc.load("law.discover")  # doctest: +SKIP
+    >>> law.predict(test)  # doctest: +SKIP
     """
     file = EstimatorFile(path)
     if file.learner not in _LEARNERS:

@@ -88,6 +88,12 @@ def register_learner(
     ------
     InputError
         If the name is taken or is none, or `learn` cannot be called.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.register_learner("one_term", learn, title="one term")  # doctest: +SKIP
+    >>> dc.compare(data, learners=["one_term"])  # doctest: +SKIP
     """
     require_new_name(name, [*BUILT_IN, *LEARNERS.present], "learner")
     if not callable(learn):

@@ -41,6 +41,13 @@ def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowPr
     ------
     InputError
         If the rate is zero, a time is not positive, or the protocol is an oscillation by a formula.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> stopped = dc.after_steady_flow(dc.start_up(0.0), 5.0, end=60.0)
+    >>> bool(stopped.begins < 0)
+    True
     """
     _require_positive("end", end)
     if not (np.isfinite(rate) and rate != 0.0):
@@ -71,6 +78,13 @@ def after_step_strain(
     InputError
         If the strain is not finite, a time is not positive, or the protocol is an oscillation by a
         formula.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> relaxation = dc.after_step_strain(dc.start_up(0.0), 2.0, first=0.01)
+    >>> bool(relaxation.begins < 0)
+    True
     """
     _require_positive("first", first)
     if not np.isfinite(strain) or duration < 0.0:
@@ -100,6 +114,15 @@ def after_alternation(
     ------
     InputError
         If the period is not positive.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import numpy as np
+    >>> times = np.linspace(0.0, 4 * np.pi, 201)
+    >>> wave = dc.measured_rate(times, np.cos(times))
+    >>> bool(dc.after_alternation(wave, 2 * np.pi, times).begins < 0)
+    True
     """
     _require_positive("period", period)
     if np.any(np.asarray(protocol.amplitudes)):

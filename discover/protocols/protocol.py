@@ -159,6 +159,13 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
         In rad/s, positive; dimensionless, the Deborah number.
     phase
         In rad; 0 starts at the largest rate, as in the paper.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import jax.numpy as jnp
+    >>> float(dc.oscillatory_shear(2.0, 0.5).rate(jnp.asarray(0.0)))
+    2.0
     """
     _checked("amplitude, frequency and phase", [amplitude, frequency, phase])
     if frequency <= 0:
@@ -169,7 +176,15 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
 
 
 def start_up(rate: float) -> FlowProtocol:
-    """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0."""
+    """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import jax.numpy as jnp
+    >>> float(dc.start_up(0.5).rate(jnp.asarray(2.0)))
+    0.5
+    """
     _checked("rate", [rate])
     return _protocol([0.0], [rate])
 
@@ -183,6 +198,14 @@ def step_rates(times: Sequence[float], rates: Sequence[float]) -> FlowProtocol:
         Times of the jumps in s, increasing; the first rate also holds before ``times[0]``.
     rates
         Rate from each jump on, in 1/s, as many as `times`.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import jax.numpy as jnp
+    >>> protocol = dc.step_rates([0.0, 10.0], [0.1, 1.0])
+    >>> float(protocol.rate(jnp.asarray(12.0)))
+    1.0
     """
     t, r = _checked("times", times), _checked("rates", rates)
     if t.size != r.size or np.any(np.diff(t) <= 0):
@@ -207,6 +230,13 @@ def measured_rate(
         In s, strictly increasing.
     rates
         In 1/s, as many as `times`.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> import jax.numpy as jnp
+    >>> float(dc.measured_rate([0.0, 1.0], [0.0, 3.0]).rate(jnp.asarray(0.5)))
+    1.5
     """
     t, r = _checked("times", times), _checked("rates", rates)
     if t.size != r.size or np.any(np.diff(t) <= 0):
@@ -257,6 +287,12 @@ def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     ------
     InputError
         If there is no such flow.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.in_flow(dc.start_up(0.3), "uniaxial").flow
+    'uniaxial'
     """
     found = kinematics_of(kind)
     return replace(protocol, kinematics=None if kind == "shear" else found)

@@ -68,6 +68,13 @@ def synthetic_dataset(
     ------
     InputError
         If an argument is out of range.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+    >>> len(data), data[0].stress.shape
+    (8, (51,))
     """
     if protocol == "paper":
         protocols: Mapping[str, FlowProtocol] = paper_training_protocols()

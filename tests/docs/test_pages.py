@@ -4,17 +4,21 @@ import ast
 import doctest
 import importlib
 import importlib.util
+import inspect
 import re
 from pathlib import Path
 
 import pytest
 import typer.main
 
+import discover
+import tensor_library
 from discover.cli import app
 from discover.study import read_study
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+OF_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md")
+PAGES = [*(ROOT / name for name in OF_THE_ROOT), *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page, language):
@@ -83,11 +87,20 @@ def test_examples_in_docstrings_run():
     assert ran >= 5
 
 
-def test_the_citation_file_names_this_version():
-    import discover as package
+@pytest.mark.parametrize("package", [discover, tensor_library], ids=lambda p: p.__name__)
+def test_every_public_name_that_is_called_has_an_example(package):
+    for name in package.__all__:
+        public = getattr(package, name)
+        if name in ("laws", "effects"):  # packages, which answer calls by their tables
+            public = getattr(public.registry, f"{name}_table")
+        if callable(public):
+            assert "\nExamples\n--------\n" in inspect.getdoc(public), name
+    assert "Examples" not in inspect.getdoc(inspect.cleandoc)  # control: not everything has one
 
+
+def test_the_citation_file_names_this_version():
     text = (ROOT / "CITATION.cff").read_text("utf-8")
-    assert f"\nversion: {package.__version__}\n" in text
+    assert f"\nversion: {discover.__version__}\n" in text
     assert "\ncff-version: 1.2.0\n" in f"\n{text}"
     assert "license: MIT" in text
 

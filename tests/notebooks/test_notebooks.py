@@ -82,3 +82,17 @@ def test_the_notebook_with_outputs_is_the_source_as_executed(name):
     # one that was run elsewhere does not say where
     said = re.sub(r'"image/png": "[^"]*"', "", (NOTEBOOKS / f"{name}.ipynb").read_text("utf-8"))
     assert not re.findall(r"/(?:home|Users|work|root|tmp)/", said)
+
+
+def test_the_full_stress_notebook_gets_one_mobility_where_components_are_tied(monkeypatch):
+    pytest.importorskip("cvxpy")
+    text = executed_text("full_stress", monkeypatch)
+    # 0.3 planted; the constraint leaves 0.001, noise of 0.5 % in 3,600 samples far less
+    tied = re.search(
+        r"37 equalities.*?\(s12\)'.*?(-?\d\.\d+) s11 s12 \+ (-?\d\.\d+) s22 s12", text, re.S
+    )
+    assert tied is not None
+    assert all(abs(float(value) + 0.3) < 0.01 for value in tied.groups())
+    stacked = re.search(r"sigma\.sigma</th>\s*<td>(-?[\d.]+)</td>", text)
+    assert stacked is not None
+    assert abs(float(stacked.group(1)) + 0.3) < 0.01

@@ -69,6 +69,11 @@ def check_folder(
     ----------
     folder, clock_factor, base
         As in `discover.dataset.load.load_dataset`.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.check_folder("melt")  # doctest: +SKIP
     """
     try:
         root = resolve_folder(folder, base)

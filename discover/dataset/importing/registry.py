@@ -61,6 +61,11 @@ def register_importer(
     ------
     InputError
         If the name is taken or is none, or another importer has one of the suffixes.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.register_importer("house_rheometer", read, suffixes=[".npz"])  # doctest: +SKIP
     """
     require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
     endings = tuple(str(suffix).lower() for suffix in suffixes)

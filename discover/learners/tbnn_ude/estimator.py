@@ -98,6 +98,13 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         The same in words, with a hash.
     equation_ : Equation
         The projection with the modes, for SymPy, LaTeX, JSON.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+    >>> network = dc.TBNNUDE(quick=True).fit(data)  # doctest: +SKIP
+    >>> network.predict(data).shape  # doctest: +SKIP
     """
 
     learner = "tbnn_ude"

@@ -94,6 +94,13 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         The same in words, with a hash.
     equation_ : Equation
         The law with its modes, for SymPy, LaTeX, JSON.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+    >>> dense = dc.TensorDense().fit(data)  # doctest: +SKIP
+    >>> band = dense.predict_band(data)  # doctest: +SKIP
     """
 
     learner = "tensor_dense"

@@ -125,6 +125,13 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         The same in words, with a hash.
     equation_ : Equation
         The law with its modes, for SymPy, LaTeX, JSON.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+    >>> sindy = dc.TensorSINDy(max_terms=2).fit(data)  # doctest: +SKIP
+    >>> [term.term for term in sindy.terms_]  # doctest: +SKIP
     """
 
     learner = "tensor_sindy"

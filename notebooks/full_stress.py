@@ -1,0 +1,174 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Full-stress data with pysindy
+#
+# A simulation, or a rheometer that measures N1 and N2 too, gives every component of the stress. Then
+# no unseen stress has to be integrated: the law is a regression of dσ/dt on σ and γ̇, which pysindy
+# solves by itself. The tensor library adds what a general polynomial lacks: frame invariance.
+#
+# The data: a Giesekus fluid, α = 0.3, in two oscillations and a start-up, made by scipy, with 0.5 %
+# noise. Stress is in units of the modulus, time in units of the relaxation time.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pysindy as ps
+from scipy.integrate import solve_ivp
+from scipy.linalg import null_space
+
+ALPHA = 0.3
+times = np.linspace(0.0, 12.0, 1201)
+rates = [lambda t: 2.0 * np.cos(t), lambda t: 4.0 * np.cos(2.0 * t), lambda t: 3.0 + 0.0 * t]
+
+
+def giesekus(rate):
+    def derivative(t, s):
+        s11, s22, s12 = s  # σ33 stays zero in this law
+        g = rate(t)
+        return (
+            2 * g * s12 - s11 - ALPHA * (s11**2 + s12**2),
+            -s22 - ALPHA * (s22**2 + s12**2),
+            g * (1 + s22) - s12 - ALPHA * s12 * (s11 + s22),
+        )
+
+    return solve_ivp(
+        derivative, (0, times[-1]), np.zeros(3), t_eval=times, rtol=1e-9, atol=1e-11
+    ).y.T
+
+
+random = np.random.default_rng(0)
+clean = [giesekus(rate) for rate in rates]
+stresses = [s + 0.005 * np.sqrt(np.mean(s**2)) * random.standard_normal(s.shape) for s in clean]
+controls = [rate(times)[:, None] for rate in rates]
+
+# %% [markdown]
+# ## A polynomial in components
+#
+# The textbook way: every product of two of (σ11, σ22, σ12, γ̇), in each of the three equations.
+
+# %%
+names = ["s11", "s22", "s12", "g"]
+settings = {
+    "feature_library": ps.PolynomialLibrary(degree=2, include_bias=False),
+    "differentiation_method": ps.SmoothedFiniteDifference(
+        smoother_kws={"window_length": 25, "polyorder": 4}
+    ),
+}
+free = ps.SINDy(optimizer=ps.STLSQ(threshold=0.05), **settings)
+free.fit(stresses, t=times, u=controls, feature_names=names)
+free.print(precision=2)
+
+# %% [markdown]
+# Three equations that know nothing of each other. In a Giesekus law one α stands in all of them; here
+# the coefficients of σ12² in the first two equations, and of σ11 σ12 and σ22 σ12 in the last, are four
+# numbers. A law in which they differ depends on the axes of whoever writes it down.
+
+# %%
+places = {"11: σ12²": (0, "s12^2"), "22: σ12²": (1, "s12^2")}
+places |= {"12: σ11 σ12": (2, "s11 s12"), "12: σ22 σ12": (2, "s22 s12")}
+
+
+def mobilities(model):
+    """Return what stands for −α at each of its four places."""
+    found, features = model.coefficients(), model.get_feature_names()
+    return {place: found[row, features.index(name)] for place, (row, name) in places.items()}
+
+
+pd.Series(mobilities(free), name="should all be −0.3").round(3).to_frame()
+
+# %% [markdown]
+# ## Frame invariance as constraints
+#
+# The upper convected production and the tensors of the library span all polynomials of this degree
+# that do not depend on the observer (and do not vanish in shear). Whatever is orthogonal to them must
+# vanish: equality constraints on the coefficients. One inequality more says that the coefficient of
+# σ·σ cannot be positive, as a mobility is not negative. For inequalities pysindy needs cvxpy:
+# `pip install "discover-rheology[cvxpy]"`.
+
+# %%
+from discover.precision import enable_x64
+
+enable_x64()
+
+import jax
+import jax.numpy as jnp
+
+from tensor_library import build_library, rate_of_deformation, upper_convected_production
+
+KEPT = ["sigma", "gammadot", "sigma.sigma", "sigma.gammadot+gammadot.sigma"]
+library = build_library(KEPT, degree=0)
+
+
+def tensors(state):
+    """Return the production and the tensors of the library, 11, 22 and 12 of each."""
+    s11, s22, s12, rate = state
+    stress = jnp.stack([s11, s22, jnp.zeros_like(s11), s12])
+    terms = library.evaluate(stress, rate_of_deformation(rate), jnp.asarray(library.inner_default))
+    production = upper_convected_production(stress, rate)
+    return jnp.concatenate([production[None], terms])[:, jnp.array([0, 1, 3])]
+
+
+anywhere = random.standard_normal((200, 4))
+products = np.asarray(ps.PolynomialLibrary(degree=2, include_bias=False).fit_transform(anywhere))
+values = np.asarray(jax.vmap(tensors)(jnp.asarray(anywhere)))  # sample, tensor, component
+spanned = np.stack(
+    [np.linalg.lstsq(products, values[:, k], rcond=None)[0].ravel() for k in range(len(KEPT) + 1)]
+)
+forbidden = null_space(spanned).T
+mobility = np.linalg.pinv(spanned)[:, [1 + KEPT.index("sigma.sigma")]].T
+print(f"{len(forbidden)} equalities leave {len(spanned)} of {spanned.shape[1]} coefficients")
+
+# %%
+optimizer = ps.ConstrainedSR3(
+    constraint_lhs=np.vstack([mobility, forbidden]),  # pysindy wants inequalities first
+    constraint_rhs=np.zeros(1 + len(forbidden)),
+    constraint_separation_index=1,
+    constraint_order="feature",
+    equality_constraints=True,
+    inequality_constraints=True,
+    regularizer="l1",
+    reg_weight_lam=1e-3,
+    max_iter=20_000,  # of the convex solver, which pysindy's default of 30 stops too early
+    tol=1e-8,
+)
+tied = ps.SINDy(optimizer=optimizer, **settings)
+tied.fit(stresses, t=times, u=controls, feature_names=names)
+tied.print(precision=3)
+
+# %%
+both = pd.DataFrame({"free": mobilities(free), "constrained": mobilities(tied)})
+axes = both.plot.bar(rot=0, figsize=(7, 3), ylabel="coefficient")
+axes.axhline(-ALPHA, color="black", linestyle=":")
+plt.show()
+
+# %% [markdown]
+# ## The same without constraints
+#
+# Shorter, and what `discover` does: regress on the tensors themselves, all components in one column.
+# A coefficient is then one number for all equations, and any pysindy optimiser will do.
+
+# %%
+differentiate = settings["differentiation_method"]
+slopes = np.vstack([differentiate(s, times) for s in stresses])
+columns = jax.vmap(tensors)(jnp.asarray(np.hstack([np.vstack(stresses), np.vstack(controls)])))
+columns = np.asarray(columns)
+target = (slopes - columns[:, 0]).ravel()
+design = columns[:, 1:].transpose(0, 2, 1).reshape(target.size, -1)
+stacked = ps.STLSQ(threshold=0.05).fit(design, target[:, None])
+pd.Series(stacked.coef_[0], index=KEPT, name="coefficient").round(3).to_frame()
+
+# %% [markdown]
+# Truth: dσ/dt = L·σ + σ·Lᵀ + γ̇ − σ − 0.3 σ·σ. With σ12 alone none of this is possible: the other
+# components have to be integrated along each trial law, which is what `TensorSINDy` is for.
