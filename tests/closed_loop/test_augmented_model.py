@@ -9,7 +9,7 @@ from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
-from discover.protocols import measured_rate, oscillatory_shear, start_up
+from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
 
 MODULUS, TIME = np.array([50.0, 120.0]), np.array([3.0, 0.05])
@@ -18,7 +18,7 @@ TIMES = np.linspace(0.1, 8.0, 60)
 
 
 def make_run(name, protocol, stress=None, times=TIMES):
-    rate = np.array([float(protocol.rate(jnp.asarray(t))) for t in times])
+    rate = shear_rates(protocol, times)
     return Run(name, times, protocol, rate, np.ones(len(times)) if stress is None else stress)
 
 

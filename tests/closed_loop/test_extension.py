@@ -40,7 +40,7 @@ def base():
 
 @pytest.mark.parametrize("kind", ["uniaxial", "planar"])
 def test_a_mobility_is_found_in_extension_alone(base, kind):
-    loop = dc.close_loop(extension(kind, 0.3), base)
+    loop = dc.close_loop(extension(kind, 0.3), base, explanations=1)
     assert loop.verdict == "effects_added"
     assert [stage.effect for stage in loop.stages] == ["giesekus_mobility"]
     low, high = loop.stages[0].parameters["alpha"].ci95
@@ -50,7 +50,7 @@ def test_a_mobility_is_found_in_extension_alone(base, kind):
 
 
 def test_nothing_is_found_where_the_declared_law_made_the_extension(base):
-    loop = dc.close_loop(extension("uniaxial", 0.0), base)
+    loop = dc.close_loop(extension("uniaxial", 0.0), base, explanations=1)
     assert loop.verdict == "no_effect_needed"
     assert not loop.stages
 

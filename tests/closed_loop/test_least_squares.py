@@ -14,7 +14,7 @@ from discover.effects.base import EffectParameter, SignalEffect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus
-from discover.protocols import oscillatory_shear, start_up
+from discover.protocols import oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.1, 8.0, 60)
@@ -28,7 +28,7 @@ def runs(count, noise=0.0, seed=0):
     for i, flow in enumerate(FLOWS[:count]):
         stress = np.asarray(simulate(FLUID, flow, TIMES).shear_stress)
         size = noise * np.sqrt(np.mean(stress**2))
-        rate = np.array([float(flow.rate(jnp.asarray(t))) for t in TIMES])
+        rate = shear_rates(flow, TIMES)
         noisy = stress + size * generator.standard_normal(len(TIMES))
         made.append(Run(f"run {i}", TIMES, flow, rate, noisy))
     return made

@@ -63,7 +63,7 @@ def test_what_shapes_a_command_is_no_candidate_where_the_rate_was_measured(measu
     runs = [replace(run, rate_is_measured=measured) for run in start_ups(0.3)]
     dataset = Dataset("start-ups", tuple(runs))
     declared = DeclaredModel.maxwell(100.0, 1.0)
-    result = run_loop(dataset, declared, effects=EFFECTS, max_effects=1)
+    result = run_loop(dataset, declared, effects=EFFECTS, max_effects=1, explanations=1)
     ranked = {candidate.effect for stage in result.rankings for candidate in stage}
     assert ("rate_rise_time" in ranked) == (not measured)
     # a wrong gap is between the tool and the fluid
@@ -89,7 +89,7 @@ def test_constants_of_the_declared_law_come_back_with_units_from_a_guess_far_off
 
 def test_each_run_is_judged_by_a_search_that_did_not_see_it():
     dataset, declared = start_ups(0.3), DeclaredModel.maxwell(100.0, 1.0)
-    options = {"effects": EFFECTS, "max_effects": 1}
+    options = {"effects": EFFECTS, "max_effects": 1, "explanations": 1}
     result = run_loop_on_each(dataset, declared, **options)
     assert [fold.run for fold in result.folds] == list(dataset.names)
     assert {fold.effects for fold in result.folds} == {("giesekus_mobility",)}

@@ -61,7 +61,7 @@ def mobility_of(loop):
 
 def test_a_mobility_is_found_in_creep_alone(tmp_path):
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME, SOLVENT)
-    loop = dc.close_loop(creep_folder(tmp_path, 0.3), base, effects=EFFECTS)
+    loop = dc.close_loop(creep_folder(tmp_path, 0.3), base, effects=EFFECTS, explanations=1)
     low, high = mobility_of(loop)
     assert low <= 0.3 <= high
     assert {record.quantity for record in loop.records} == {"strain"}
@@ -71,26 +71,28 @@ def test_a_mobility_is_found_in_creep_alone(tmp_path):
 
 def test_nothing_is_found_in_the_creep_of_the_declared_fluid(tmp_path):
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME, SOLVENT)
-    loop = dc.close_loop(creep_folder(tmp_path, 0.0), base, effects=EFFECTS)
+    loop = dc.close_loop(creep_folder(tmp_path, 0.0), base, effects=EFFECTS, explanations=1)
     assert loop.verdict == "no_effect_needed"
 
 
 def test_a_mobility_is_found_in_a_flow_curve_and_its_n1(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
-    loop = dc.close_loop(data, BASE, effects=EFFECTS)
+    loop = dc.close_loop(data, BASE, effects=EFFECTS, explanations=1)
     low, high = mobility_of(loop)
     assert low <= 0.3 <= high
     assert [record.name for record in loop.records] == ["flow_curve.csv", "flow_curve.csv (N1)"]
 
 
 def test_nothing_is_found_in_the_flow_curve_of_the_declared_fluid(tmp_path):
-    loop = dc.close_loop(curve_folder(tmp_path, 0.0), BASE, effects=EFFECTS)
+    loop = dc.close_loop(curve_folder(tmp_path, 0.0), BASE, effects=EFFECTS, explanations=1)
     assert loop.verdict == "no_effect_needed"
 
 
 def test_n1_that_was_not_fitted_judges_a_law_found_in_the_stress_alone(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
-    loop = dc.close_loop(data, BASE, effects=EFFECTS, held_out=["flow_curve.csv (N1)"])
+    loop = dc.close_loop(
+        data, BASE, effects=EFFECTS, explanations=1, held_out=["flow_curve.csv (N1)"]
+    )
     assert mobility_of(loop)
     # N1 lies over three decades: its root mean square is that of the fastest rates, where one per
     # cent of noise and the mobility's own uncertainty are what is missed

@@ -1,6 +1,5 @@
 """Effects that carry state or feel the stress, against analytic solutions and scipy."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +9,7 @@ from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
-from discover.protocols import oscillatory_shear, start_up
+from discover.protocols import oscillatory_shear, shear_rates, start_up
 
 MODULUS, TIME = 100.0, 1.0
 STEADY, OSCILLATION = 1.5, (1.2, 2.0)
@@ -19,7 +18,7 @@ FLOWS = (start_up(STEADY), oscillatory_shear(*OSCILLATION))
 
 
 def make_run(name, flow):
-    rate = np.array([float(flow.rate(jnp.asarray(t))) for t in TIMES])
+    rate = shear_rates(flow, TIMES)
     return Run(name, TIMES, flow, rate, np.ones(len(TIMES)))
 
 

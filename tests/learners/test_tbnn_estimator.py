@@ -11,7 +11,7 @@ import tensor_library as tl
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
-from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, PaperRecipe
+from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe
 from discover.learners.tbnn_ude.prior import sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.projection import project
@@ -25,7 +25,6 @@ FLOWS = {
     "laos_2_1": oscillatory_shear(2.0, 1.0),
 }
 SMALL = DefaultRecipe(width=4, steps=6, polish_steps=40, max_tensors=1)
-TINY = PaperRecipe(width=3, iterations_per_series=50)
 
 
 @pytest.fixture(scope="module")
@@ -104,13 +103,15 @@ def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
 
 
 def test_it_is_a_scikit_learn_estimator(data):
-    model = TBNNUDE(recipe=TINY, random_state=3, n_members=1)
+    model = TBNNUDE(recipe=SMALL, random_state=3, n_members=1)
     copy = clone(model)
     assert copy.get_params()["random_state"] == 3
     assert not hasattr(copy, "law_")
-    scores = cross_val_score(model, list(data.runs), cv=KFold(3), error_score="raise")
-    assert scores.shape == (3,)
-    assert np.all(scores < 1.0)
+    # three runs to each fit, as in every test here, so that none compiles for itself
+    four = [*data.runs, replace(data.runs[0], name="again")]
+    scores = cross_val_score(model, four, cv=KFold(4), error_score="raise")
+    assert scores.shape == (4,)
+    assert np.all((scores > 0.999) & (scores < 1.0))
 
 
 @pytest.mark.parametrize(

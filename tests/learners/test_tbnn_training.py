@@ -9,6 +9,7 @@ from independent.homogeneous import GiesekusFluid
 
 from discover.dataset import Run
 from discover.laws import Giesekus
+from discover.learners.tbnn_ude import TBNNUDE
 from discover.learners.tbnn_ude.least_squares import Objective, Stopping, minimise
 from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import make_problem
@@ -176,6 +177,17 @@ def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus
     for series in range(3):
         assert losses[50 * series + 49] < losses[50 * series]
     assert losses[50] > losses[49]  # the peak of a series added
+
+
+def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
+    recipe = PaperRecipe(width=4, iterations_per_series=50)
+    data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
+    model = TBNNUDE(recipe=recipe, n_members=1, random_state=3).fit(data.runs)
+    (key,) = jax.random.split(jax.random.key(3), 1)
+    law, _ = train_paper(giesekus_problem, key, True, recipe)
+    for one, two in zip(jax.tree.leaves(model.law_), jax.tree.leaves(law), strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert model.result_.details["recipe"] == "PaperRecipe"
 
 
 def test_an_absurd_learning_rate_is_survived(giesekus_problem):

@@ -25,27 +25,28 @@ def make_programs(n):
 def limit(tmp_path, monkeypatch):
     file = tmp_path / "max_map_count"
     monkeypatch.setattr(room, "_LIMIT", file)
+    monkeypatch.setattr("discover.programs.kept._LOOK_EVERY", 10)
     return file
 
 
 def test_programs_make_room_for_others_and_answers_stay(limit):
     limit.write_text(str(10**9))
     before = pieces()
-    expected = make_programs(150)
+    expected = make_programs(45)
     with_all = pieces()
-    assert with_all > before + 100  # or there is nothing to make room for
+    assert with_all > before + 30  # or there is nothing to make room for
 
     limit.write_text(str(before + with_all))  # crowded half way
-    assert make_programs(150) == expected
+    assert make_programs(45) == expected
     assert pieces() < with_all
 
 
 def test_a_process_with_room_keeps_its_programs(limit):
     limit.write_text(str(10**9))
     assert not room.is_crowded()
-    make_programs(100)
+    make_programs(30)
     held = pieces()
-    make_programs(10)  # of a function made anew, so programs of its own
+    make_programs(5)  # of a function made anew, so programs of its own
     assert pieces() >= held
 
 
