@@ -203,7 +203,8 @@ def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
     out, row = [], 0
     for base, positions in zip(residuals, free, strict=True):
         n = len(positions)
-        difference = moved_residuals[row : row + n] - base
+        with np.errstate(invalid="ignore", over="ignore"):  # a trial that ran away
+            difference = moved_residuals[row : row + n] - base
         out.append(difference / np.asarray(widths[row : row + n])[:, None, None])
         row += n
     return out
