@@ -9,6 +9,9 @@ from discover.report.parts import attempt
 from discover.report.plots.superposition import superposition_pictures
 from discover.report.wording import percent
 
+_DESCRIBES = 0.1
+"""Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
+
 _SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("E", "J/mol")}
 
 
@@ -36,10 +39,16 @@ def superposition_words(found: Superposition) -> list[str]:
             "with --between, or allow a shift of the moduli with --vertical."
         ),
     }[found.verdict]
-    return [first, *(_law_words(law, found) for law in found.laws)]
+    laws = () if found.verdict == "not_superposed" else found.laws
+    return [first, *(_law_words(law, found) for law in laws)]
 
 
 def _law_words(law: ShiftLaw, found: Superposition) -> str:
+    if law.error > _DESCRIBES:
+        return (
+            f"{law.name} does not describe the shifts: off by {law.error:.2g} decades (root mean "
+            "square)."
+        )
     parts = []
     for key, value in law.values.items():
         symbol, unit = _SYMBOLS[key]
@@ -47,13 +56,13 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
         known = (
             "not determined by these shifts"
             if interval is None
-            else f"{interval[0]:.4g} to {interval[1]:.4g}"
+            else f"95 %: {interval[0]:.4g} to {interval[1]:.4g}"
         )
-        parts.append(f"{symbol} = {value:.4g} {unit} ({known})".replace(" (", " (95 %: ", 1))
+        parts.append(f"{symbol} = {f'{value:.4g} {unit}'.strip()} ({known})")
     return (
         f"{law.name} at {found.reference:g} °C: {', '.join(parts)}; off by {law.error:.2g} "
         "decades (root mean square)."
-    ).replace("95 %: not", "not")
+    )
 
 
 def agreement_words(agreements: Sequence[Agreement]) -> list[str]:

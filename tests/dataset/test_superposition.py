@@ -11,6 +11,7 @@ from discover.dataset import load_dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.superposition import superpose
 from discover.errors import InputError
+from discover.report.superposition_page import superposition_words
 
 OMEGA = np.geomspace(0.1, 100.0, 25)
 CELSIUS = np.arange(100.0, 200.0, 15.0)
@@ -39,6 +40,9 @@ def test_the_constants_of_wlf_come_back_from_sweeps_that_were_made_with_them():
     np.testing.assert_allclose(list(law.values.values()), (C1, C2), rtol=0.01)
     arrhenius = next(law for law in found.laws if law.name == "Arrhenius")
     assert arrhenius.error > 20.0 * law.error
+    said = superposition_words(found)
+    assert any("WLF at 145 °C: C1 = 7" in sentence for sentence in said)
+    assert any("Arrhenius does not describe the shifts" in sentence for sentence in said)
 
 
 def test_an_activation_energy_comes_back_and_its_interval_holds_it():
@@ -76,6 +80,7 @@ def two_processes(celsius):
 def test_where_superposition_fails_it_is_said():
     found = superpose({t: two_processes(t) for t in CELSIUS})
     assert found.verdict == "not_superposed"
+    assert len(superposition_words(found)) == 1  # and no law of shifts that mean nothing
 
 
 def folder(path, made):
