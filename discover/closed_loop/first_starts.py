@@ -10,15 +10,23 @@ _TIMES = (1e-3, 1e-2, 0.1, 0.3, 3.0, 10.0)
 """A relaxation time to be fitted starts at these multiples of its first guess too: from far off its
 effect on the stress is flat."""
 
-_POINTS = 8
-"""Starts of a law with several constants, spread evenly over their ranges."""
+_FEW, _POINTS = 3, 8
+"""Starts of a law with one constant, and with several, spread evenly over their ranges."""
 
 
-def first_starts(model: AugmentedModel) -> list[np.ndarray]:
+def first_starts(model: AugmentedModel, nothing_known: bool = False) -> list[np.ndarray]:
     """Return parameter vectors to fit the declared model from, the declared values first.
 
     An unknown relaxation time, several constants of one law, and inner times and exponents of known
     effects may all have a misfit with several minima.
+
+    Parameters
+    ----------
+    model
+        The model.
+    nothing_known
+        Whether a law's only constant may be anywhere too, and from where it starts be a place where
+        the law cannot be integrated.
     """
     declared = model.declared
     starts = [model.zero()]
@@ -29,10 +37,11 @@ def first_starts(model: AugmentedModel) -> list[np.ndarray]:
             if declared.fit_modulus:
                 start[0] = -start[1]  # the viscosity is known better than either
             starts.append(start)
-    if len(declared.free_parameters) > 1:
+    count = len(declared.free_parameters)
+    if count > 1 or (count == 1 and nothing_known):
         # the first of Halton's points is the corner of all lower bounds
-        shares = qmc.Halton(len(declared.free_parameters), scramble=False).random(_POINTS + 1)[1:]
-        for share in shares:
+        points = _POINTS if count > 1 else _FEW
+        for share in qmc.Halton(count, scramble=False).random(points + 1)[1:]:
             start = model.zero()
             start[2 : 2 + len(share)] = [
                 _inside(parameter, at)

@@ -108,7 +108,7 @@ def choose_law(
     for name in dict.fromkeys(names):
         say(f"law {len(tried) + 1} of {len(names)}: {LAWS[name].title}")
         model = AugmentedModel(_with_law(declared, name), [], scales)
-        starts = first_starts(model)
+        starts = first_starts(model, nothing_known=True)
         free = [model.free_positions] * len(starts)
         fits = fit_batch(model, batch, starts, free)
         usable = [fit for fit in fits if fit.usable]
