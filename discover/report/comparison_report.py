@@ -11,7 +11,7 @@ from discover.report.equations import equations_tex
 from discover.report.page import made_by, render
 from discover.report.parts import Missing, attempt
 from discover.report.plots.style import Picture
-from discover.report.predictions import comparison_predictions, write_predictions
+from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
 from discover.report.verdicts import QUESTIONS
 from discover.study.run_folder import RunFolder
 
@@ -46,8 +46,9 @@ def write_comparison(
     The page.
     """
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
-    folder.write("comparison.json", content + "\n")
-    write_predictions(comparison_predictions(comparison), folder)
+    content += "\n"
+    folder.write("comparison.json", content)
+    predictions = write_predictions(comparison_predictions(comparison), folder)
     folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
     pictures, training = comparison_pictures(comparison)
     for drawn in (*pictures, *training):
@@ -62,6 +63,7 @@ def write_comparison(
     sentences = attempt("The verdict", lambda: comparison_verdict(comparison))
     page = render(
         "comparison.html",
+        data={PREDICTIONS: predictions, "comparison.json": content},
         comparison=comparison,
         questions=QUESTIONS,
         sentences=[] if isinstance(sentences, Missing) else sentences,

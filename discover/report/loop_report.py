@@ -28,7 +28,7 @@ from discover.report.plots.loop import (
 )
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
-from discover.report.predictions import loop_predictions, write_predictions
+from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict, named
 from discover.report.wording import effect_title, percent, significant
 from discover.statistics.residual import fast_part
@@ -81,11 +81,13 @@ def write_loop(
     for one in drawn:
         folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)
     content = json.dumps(result.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
-    folder.write("loop.json", content + "\n")
+    content += "\n"
+    folder.write("loop.json", content)
     folder.write("equations.tex", loop_tex(result))
-    write_predictions(loop_predictions(result), folder)
+    predictions = write_predictions(loop_predictions(result), folder)
     page = render(
         "loop.html",
+        data={PREDICTIONS: predictions, "loop.json": content},
         name=f"{name}, {conditions}" if conditions else name,
         summary=summary,
         result=result,
@@ -106,6 +108,7 @@ def write_loop(
         readings=[
             (f"Of the {name} model", reading.sentences)
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
+            if name == "declared" or result.stages
         ],
         pictures=drawn,
         run=run

@@ -2,6 +2,7 @@
 
 import os
 import platform
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -59,7 +60,11 @@ def _as_link(name: str) -> str:
     return quote(os.fsencode(name))
 
 
-def render(template: str, **content: Any) -> str:
+_MOST_INSIDE = 3_000_000
+"""Characters of a file that a page carries; more would make the page slow to open."""
+
+
+def render(template: str, data: Mapping[str, str] | None = None, **content: Any) -> str:
     """Return a page.
 
     Everything is escaped except pictures and mathematics that this package wrote itself.
@@ -68,13 +73,23 @@ def render(template: str, **content: Any) -> str:
     ----------
     template
         File in ``templates``.
+    data
+        Text of files that each picture links to, by name. The page carries those that are not too
+        long, so that it hands them out where it stands alone; the others lie beside it.
     content
         Its variables.
     """
+    carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
         _environment()
         .get_template(template)
-        .render(version=__version__, style_sheet=Markup(style_sheet()), **content)
+        .render(
+            version=__version__,
+            style_sheet=Markup(style_sheet()),
+            data=data or {},
+            carried=carried,
+            **content,
+        )
     )
 
 

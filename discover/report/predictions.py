@@ -86,10 +86,12 @@ def loop_predictions(result: LoopResult) -> pd.DataFrame:
     return _table([part for record in result.records for part in _record_parts(record)])
 
 
-def write_predictions(table: pd.DataFrame, folder: RunFolder) -> None:
-    """Write a table of predictions into a folder of results."""
+def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
+    """Write a table of predictions into a folder of results, and return its text."""
     # nine digits: more than any measurement has, and than the integration promises
-    folder.write(PREDICTIONS, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+    text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+    folder.write(PREDICTIONS, text)
+    return text
 
 
 def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from standing_alone import stands_alone
 
 from discover.closed_loop import CandidateScore
 from discover.closed_loop.result import (
@@ -20,7 +21,9 @@ from discover.closed_loop.result import (
 )
 from discover.effects import make_effect
 from discover.report.loop_report import _noise_range, write_loop
+from discover.report.page import render
 from discover.report.plots.cycles import in_last_cycle
+from discover.report.plots.loop import residual_picture, runs_picture
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
 from discover.report.verdicts import QUESTIONS, loop_verdict
@@ -60,9 +63,7 @@ def loop_result(held_out=0.2):
 def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
     folder = RunFolder(tmp_path, "x")
     page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
-    outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!#)([^"']*)""", page)
-    assert not outside
-    assert "<script" not in page
+    assert stands_alone(page)
     assert "<i>name" not in page
     assert r"a&lt;b&gt;$\frac$.csv" in page
     names = ("waterfall", "runs", "residual_map", "residual", "reading", "run_errors", "ranking")
@@ -256,6 +257,52 @@ def test_oscillations_are_drawn_against_strain_and_rate_and_start_ups_are_not():
     assert lissajous_picture(loop_result()) is None
 
 
+def test_lissajous_curves_hold_the_samples_of_every_cycle():
+    drawn = lissajous_picture(replace(loop_result(), records=(oscillating(),)))
+    assert "measured, all cycles" in drawn.svg
+    marks = drawn.svg.split("measured, all cycles")[0].count("<use ")
+    assert marks > 2 * oscillating().time.size  # each sample in both panels
+
+
+def test_the_page_carries_the_data_of_its_pictures(tmp_path):
+    page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "name", "data", "").read_text(
+        "utf-8"
+    )
+    for name in ("predictions.csv", "loop.json"):
+        (inside,) = re.findall(rf'data-name="{name}">([^<]*)</script>', page)
+        assert json.loads(inside) == (tmp_path / name).read_text("utf-8")
+        assert page.count(f'<a class="data" href="{name}" download>') == page.count("<figure id=")
+
+
+def test_data_too_long_for_a_page_lie_beside_it():
+    page = render("base.html", data={"short.csv": "1", "long.csv": "1" * 4_000_000})
+    assert 'data-name="short.csv"' in page
+    assert 'data-name="long.csv"' not in page
+
+
+def test_one_run_has_no_residual_map():
+    assert loop_residual_map(loop_result()) is not None
+    assert loop_residual_map(replace(loop_result(), records=(oscillating(),))) is None
+
+
+def without_stages():
+    """A loop that added nothing: one prediction and one error a run."""
+    found = loop_result()
+    records = tuple(
+        replace(r, predicted=r.predicted[:1], errors=r.errors[:1]) for r in found.records
+    )
+    return replace(found, stages=(), records=records, error_after=found.error_before)
+
+
+def test_nothing_is_called_augmented_where_nothing_was_added():
+    with_stage, without = loop_result(), without_stages()
+    for draw in (runs_picture, residual_picture, loop_residual_map):
+        assert "augmented" in draw(with_stage).svg
+        assert "augmented" not in draw(without).svg
+        assert "declared" in draw(without).svg
+    assert "→" not in runs_picture(without).svg
+
+
 def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residuals():
     given = loop_result()
     assert _noise_range(given) is None  # 0.5 % that somebody gave: no run has it
@@ -314,5 +361,6 @@ def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
     assert r"a&lt;b&gt;$\frac$" in drawn.svg
     assert "c (held out)" in drawn.svg
     assert "strain" in drawn.svg  # start-ups sampled over decades
-    assert "time (s)" in loop_residual_map(replace(loop_result(), records=(oscillating(),))).svg
+    two = (oscillating(), oscillating("held.csv", True))
+    assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
     assert drawn.svg.count("deepest at") == 2

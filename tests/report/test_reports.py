@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import compare
 from discover.comparison.next_measurement import NextMeasurement
@@ -84,13 +85,6 @@ def page(folder):
     return (folder / "report.html").read_text("utf-8")
 
 
-def stands_alone(text):
-    outside = re.findall(r"""(?:src|href)\s*=\s*["'](?!#)([^"']*)""", text)
-    return (
-        not outside and "url(http" not in text and "@import" not in text and "<script" not in text
-    )
-
-
 def test_the_page_stands_alone_and_escapes_names(page):
     assert stands_alone(page)
     assert "&lt;script&gt;alert(1)" in page
@@ -102,6 +96,8 @@ def test_a_page_that_needs_the_network_is_told_from_one_that_does_not():
     # negative control of the check above
     assert not stands_alone('<img src="https://example.org/a.png">')
     assert not stands_alone("<script>1</script>")
+    assert stands_alone(f"<script>{SCRIPT}</script>")
+    assert not stands_alone(f"<script>{SCRIPT} fetch('https://example.org')</script>")
 
 
 def test_identifiers_are_unique(page):

@@ -141,6 +141,8 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
         along[shown], record.predicted[0][shown], "-.", lw=1.1, color=BEFORE,
         label="declared model",
     )  # fmt: skip
+    if len(record.predicted) == 1:  # nothing was added
+        return
     panel.plot(
         along[shown], record.predicted[-1][shown], lw=1.5,
         color=_HELD if record.held_out else _FIT,
@@ -148,12 +150,25 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     )  # fmt: skip
 
 
+def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
+    """Return the models that a picture shows, by their place among the stages.
+
+    Parameters
+    ----------
+    records
+        Of one loop. Where nothing was added there is the declared model alone.
+    """
+    augmented = [(-1, "augmented model")] * any(len(r.predicted) > 1 for r in records)
+    return [(0, "declared model"), *augmented]
+
+
 def short_title(record: RunRecord) -> str:
     """Return the name of a run, and below it its errors before and after."""
     name = literal(shortened(record.name))
     if record.flow != "shear" and record.flow not in name:
         name = f"{name}, {record.flow}"
-    return f"{name}\n{percent(record.errors[0])} → {percent(record.errors[-1])}"
+    errors = record.errors[[0, -1]] if len(record.errors) > 1 else record.errors
+    return f"{name}\n{' → '.join(map(percent, errors))}"
 
 
 def shortened(name: str, longest: int = 30) -> str:
@@ -182,10 +197,11 @@ def residual_picture(result: LoopResult) -> Picture:
     records = records or list(result.records)
     start_ups = only_states or all(map(_through_decades, records))
     labels = (along_in_common(records), _label(records)) if only_states else ("time (s)", "strain")
-    with figure(2, 2, height=2.4) as (drawing, axes):
-        for row, (stage, title) in enumerate(((0, "declared model"), (-1, "augmented model"))):
+    models = models_of(records)
+    with figure(len(models), 2, height=2.4) as (drawing, axes):
+        for row, (stage, title) in enumerate(models):
             limit = 0.0
-            for record in records:
+            for place, record in enumerate(records):
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
                     "color": _HELD if record.held_out else _FIT,
@@ -195,14 +211,15 @@ def residual_picture(result: LoopResult) -> Picture:
                 }
                 other = record.measured if only_states else record.strain
                 along = (record.along[1], other)
-                axes[row, 0].plot(along[0], relative, **style)
+                axes[row, 0].plot(along[0], relative, gid=f"run{place}-{row}0", **style)
                 # a logarithmic axis has no place for strains against the positive direction
-                axes[row, 1].plot(np.abs(along[1]) if start_ups else along[1], relative, **style)
+                along_1 = np.abs(along[1]) if start_ups else along[1]
+                axes[row, 1].plot(along_1, relative, gid=f"run{place}-{row}1", **style)
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             for panel, label in zip(axes[row], labels, strict=True):
                 if start_ups:
                     make_logarithmic(panel.xaxis)
-                panel.set_xlabel(label if row else "")
+                panel.set_xlabel(label if row == len(models) - 1 else "")
                 panel.axhline(0.0, color=INK, lw=0.6)
                 panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
             axes[row, 0].set_ylabel(f"residual (% of rms {_recorded(records)})")
@@ -213,23 +230,25 @@ def residual_picture(result: LoopResult) -> Picture:
             "residual",
             "Prediction minus measurement, over each run's root-mean-square stress, against "
             + ("what was varied and what was measured" if only_states else "time and strain")
-            + ". Note the different scales above and below. What is left should look like "
-            "noise around zero; anything else is an effect still missing.",
+            + "."
+            + " Note the different scales above and below." * (len(models) > 1)
+            + " What is left should look like noise around zero; anything else is an effect still "
+            "missing.",
+            switched=tuple(record.name for record in records),
         )
 
 
 def reading_picture(result: LoopResult) -> Picture | None:
     """Return on what the residual depends, before and after."""
-    readings = [
-        (result.readings[0], "declared", BEFORE),
-        (result.readings[1], "augmented", _FIT),
-    ]
+    readings = [(result.readings[0], "declared", BEFORE)]
+    if result.stages:
+        readings.append((result.readings[1], "augmented", _FIT))
     if not readings[0][0].collapses:
         return None
     waves = any(reading.waves for reading, _, _ in readings)
     with figure(1, 3 if waves else 2, width=10.0, height=2.8) as (drawing, axes):
         names = [c.coordinate for c in readings[0][0].collapses]
-        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=True):
+        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=False):
             shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
             places = np.arange(len(names)) + shift
             axes[0, 0].barh(
@@ -263,7 +282,8 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
         panel.set_visible(False)
         return
     values = varied[name]
-    for model, colour, label in ((0, BEFORE, "declared"), (-1, _FIT, "augmented")):
+    for (model, label), colour in zip(models_of(result.records), (BEFORE, _FIT), strict=False):
+        label = label.removesuffix(" model")
         errors = [100.0 * float(record.errors[model]) for record in result.records]
         panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
     if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
@@ -276,7 +296,7 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
 
 def _draw_waves(panel, readings) -> None:
     parts = ("elastic", "viscous", "odd", "even", "drift")
-    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=True):
+    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=False):
         for place, part in enumerate(parts):
             sizes = [100.0 * abs(getattr(wave, part)) for wave in reading.waves]
             panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)

@@ -6,7 +6,7 @@ from discover.closed_loop.result import LoopResult
 from discover.closed_loop.waves import oscillation
 from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.loop import draw_run, short_title
-from discover.report.plots.style import Picture, figure, legend_above, picture
+from discover.report.plots.style import MEASURED, Picture, figure, legend_above, picture
 
 _MOST = 4
 
@@ -26,8 +26,13 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
             last = in_last_cycle(record.time, frequency)
             strain = about_middle(record.strain, last)
             for panel, along in ((axes[0, column], strain), (axes[1, column], record.rate)):
+                if not np.all(last):
+                    panel.plot(
+                        along, record.measured, ".", ms=1.2, alpha=0.5, color=MEASURED,
+                        label="measured, all cycles", zorder=1,
+                    )  # fmt: skip
                 draw_run(panel, record, along, last, last)
-                _frame(panel, record.measured[last])
+                _frame(panel, record.measured)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")
             axes[1, column].set_xlabel("γ̇ (1/s)")
@@ -38,8 +43,8 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
         return picture(
             drawing,
             "lissajous",
-            "Elastic (above) and viscous (below) Lissajous curves of the last cycle, errors of the "
-            f"run before and after over each.{left}",
+            "Elastic (above) and viscous (below) Lissajous curves: models in the last cycle, "
+            f"measurements in all of them, faint. Over each the errors of the run.{left}",
         )
 
 

@@ -11,7 +11,7 @@ from discover.closed_loop.result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
 from discover.report.plots.flows import units
-from discover.report.plots.loop import along_in_common, shortened
+from discover.report.plots.loop import along_in_common, models_of, shortened
 from discover.report.plots.style import (
     INK,
     NETWORK,
@@ -48,16 +48,21 @@ class ResidualRow:
     values: Float[np.ndarray, " n"]
 
 
-def loop_residual_map(result: LoopResult) -> Picture:
-    """Return the residual of every run before and after, over time or strain."""
+def loop_residual_map(result: LoopResult) -> Picture | None:
+    """Return the residual of every run before and after, over time or strain.
+
+    None for a single run, of which the residual is drawn already.
+    """
     transients = [record for record in result.records if record.is_transient]
     states = not transients
     records = sorted(
         transients or result.records, key=lambda r: (r.held_out, np.max(np.abs(r.rate)))
     )
+    if len(records) == 1:
+        return None
     started = states or all(runs_through_decades(r.time, r.rate) for r in records)
     panels = {}
-    for stage, title in ((0, "declared model"), (-1, "augmented model")):
+    for stage, title in models_of(records):
         panels[title] = [
             ResidualRow(
                 f"{shortened(r.name)}{' (held out)' if r.held_out else ''}",
@@ -88,7 +93,7 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
                 rows.append(ResidualRow(flow.title, flow.times, values))
         if rows:
             panels[title] = rows
-    if not panels:
+    if max(map(len, panels.values()), default=0) < 2:  # streaks are seen across runs
         return None
     logarithmic = all(runs_through_decades(f.times, f.rate) for f in flows)
     return _draw(panels, units(comparison)[1], logarithmic, "in the order of the data")

@@ -2,6 +2,7 @@
 
 import html
 import io
+import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from discover.learners.registry import LEARNERS
 from discover.report.palette import style_sheet
@@ -110,11 +111,19 @@ class Picture:
         What it shows and how to read it.
     svg
         A stand-alone SVG document.
+    axes
+        Of each panel its box in the SVG's own units and the ends of its axes, for a page that reads
+        values off: ``box`` (left, top, width, height), ``x`` and ``y`` (low, high, logarithmic).
+        An axis of names has no ends.
+    switched
+        Names of curves that a page can hide; the elements of the i-th have ids ``run{i}-...``.
     """
 
     name: str
     caption: str
     svg: str
+    axes: tuple[dict, ...] = ()
+    switched: tuple[str, ...] = ()
 
     @property
     def inline(self) -> str:
@@ -130,7 +139,11 @@ class Picture:
         # the page decides the width
         text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", _without_height(text), count=1)
         description = html.escape(self.caption or self.name, quote=True)
-        return text.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1)
+        told = f'role="img" aria-label="{description}"'
+        if self.axes:
+            read = json.dumps({"axes": self.axes, "switched": self.switched})
+            told += f' data-read="{html.escape(read, quote=True)}"'
+        return text.replace("<svg ", f"<svg {told} ", 1)
 
     @property
     def adaptive(self) -> str:
@@ -190,13 +203,35 @@ def literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def picture(drawing: Figure, name: str, caption: str) -> Picture:
-    """Return the figure as SVG, the same bytes every time."""
+def picture(drawing: Figure, name: str, caption: str, switched: tuple[str, ...] = ()) -> Picture:
+    """Return the figure as SVG, the same bytes every time.
+
+    Parameters
+    ----------
+    drawing
+        The figure.
+    name, caption, switched
+        As in `Picture`.
+    """
     buffer = io.StringIO()
     # as savefig does, which draws once more before, to no effect on these figures
     canvas = FigureCanvasSVG(drawing)
     canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})
-    return Picture(name, caption, buffer.getvalue())
+    panels = tuple(_place_of(panel) for panel in drawing.axes if panel.get_visible())
+    return Picture(name, caption, buffer.getvalue(), panels, switched)
+
+
+def _place_of(panel) -> dict:
+    """Return where a panel stands in the SVG, whose unit is the point, and between which values."""
+    width, height = 72.0 * panel.figure.get_size_inches()
+    box = panel.get_position()
+    corner = (box.x0 * width, (1.0 - box.y1) * height, box.width * width, box.height * height)
+    place: dict = {"box": [round(float(value), 2) for value in corner]}
+    for axis, ends in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
+        if not isinstance(axis.get_major_locator(), FixedLocator):  # names instead of numbers
+            logarithmic = axis.get_scale() == "log"
+            place[axis.axis_name] = [*(float(f"{end:.6g}") for end in ends), logarithmic]
+    return place
 
 
 def runs_through_decades(
