@@ -79,7 +79,7 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
     content
         Its variables.
     """
-    inside = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
+    carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
         _environment()
         .get_template(template)
@@ -87,7 +87,7 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
             version=__version__,
             style_sheet=Markup(style_sheet()),
             data=data or {},
-            inside=inside,
+            carried=carried,
             **content,
         )
     )
