@@ -6,19 +6,10 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import jaxlib.version
 import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
 
-# Most of the tests' time goes into compiling programs that then run for a second. These ways of
-# compiling take half as long; the answers differ in the last bits, and what runs for minutes would
-# be a tenth slower, so that the package leaves XLA its own. XLA ends a process that asks for what
-# it does not know: with another version the tests only take longer. Subprocesses inherit them.
-if jaxlib.version.__version_info__[:2] == (0, 10) and "XLA_FLAGS" not in os.environ:
-    os.environ["XLA_FLAGS"] = (
-        "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
-    )
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
 
