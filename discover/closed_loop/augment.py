@@ -39,6 +39,8 @@ FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
 
 _RESTARTED = 3
+_INSIDE = (0.1, 0.4)
+"""Shares of the largest amplitude from which one that stands there is tried again."""
 
 
 @dataclass
@@ -187,7 +189,9 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
     """Return fits of which the best were also started from other inner times and exponents.
 
     In these a misfit has several minima: where two effects share a misfit, the inner time at which
-    the first stood alone may be far from the one at which both serve best.
+    the first stood alone may be far from the one at which both serve best. An amplitude that
+    stands at the end of its range, the best or not, is started from inside it too: a first step
+    beyond a minimum may end in another one there, and what is at an end is never a finding.
     """
     fits = list(fits)
     order = sorted((i for i, fit in enumerate(fits) if fit.usable), key=lambda i: fits[i].cost)
@@ -198,6 +202,10 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
                 others = with_other_inner(model, fits[i].theta, effect)
                 starts += others
                 owners += [i] * len(others)
+    for i in order:
+        inside = _from_inside(model, fits[i])
+        starts += inside
+        owners += [i] * len(inside)
     if not starts:
         return fits
     free = [fits[i].free for i in owners]
@@ -206,6 +214,19 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
         if fit.usable and fit.cost < fits[i].cost:
             fits[i] = fit
     return fits
+
+
+def _from_inside(model: AugmentedModel, fit: Fit) -> list[np.ndarray]:
+    """Return a fit's parameters with each amplitude at the end of its range put inside."""
+    amplitudes = [model.positions(effect.name)[0] for effect in model.effects]
+    starts = []
+    for at in amplitudes:
+        if at in fit.free and np.isfinite(model.high[at]) and fit.theta[at] == model.high[at]:
+            for share in _INSIDE:
+                theta = fit.theta.copy()
+                theta[at] = share * model.high[at]
+                starts.append(theta)
+    return starts
 
 
 def simplest(choices: Sequence[Choice], model: AugmentedModel) -> Choice:

@@ -13,6 +13,8 @@ from discover.statistics import NoiseModel, least_squares_covariance
 
 _LARGEST_DAMPING = 1e7
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
+_FREE = 1.0
+"""Damping, relative to the curvature, below which a step is the problem's own."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,8 @@ def fit_batch(
                 gain = 1.0 - trial_cost[row] / cost[i]
                 short = gain < tolerance
                 behind = rivals and cost[i] > _FAR_BEHIND * np.min(cost) and gain < _HARDLY
-                done[i] = (short and fresh[i]) or behind
+                # a step that damping cut short gains little anywhere
+                done[i] = damping[i] < _FREE and ((short and fresh[i]) or behind)
                 step = trial[row, list(free[i])] - theta[i, list(free[i])]
                 change = trial_residual[row] - residual[i]
                 theta[i], residual[i], cost[i] = trial[row], trial_residual[row], trial_cost[row]

@@ -1,0 +1,53 @@
+"""A first step beyond the minimum, to the end of a range, hides no law. Records by scipy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from independent.flow import start_up
+from independent.folders import write_folder
+from independent.giesekus import Giesekus
+from independent.instruments import Instrument
+from independent.johnson_segalman import JohnsonSegalman
+
+import discover as dc
+
+BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
+FLOWS = {"slow.csv": (start_up(0.2), 8.0), "faster.csv": (start_up(0.6), 6.0)}
+NOISE = 0.02
+
+
+def records(folder, material):
+    generator = np.random.default_rng(0)
+    runs = {}
+    for name, (flow, end) in FLOWS.items():
+        run = Instrument().record(material, flow, np.linspace(0.05, end, 80))
+        size = NOISE * np.sqrt(np.mean(run.stress**2))
+        noisy = run.stress + size * generator.standard_normal(run.stress.size)
+        runs[name] = replace(run, stress=noisy)
+    return dc.load_dataset(write_folder(folder, runs))
+
+
+# of these flows the misfit as a function of α has a second minimum at its largest, 1, and as one of
+# ξ it is flat there, so that steps towards the minimum are first far too long and then too short
+@pytest.mark.parametrize(
+    ("effect", "material", "constant", "planted"),
+    [
+        ("giesekus_mobility", Giesekus(0.5, 100.0, 1.0), "alpha", 0.5),
+        ("non_affine_motion", JohnsonSegalman(0.55, 100.0, 1.0), "xi", 0.55),
+    ],
+)
+def test_what_was_planted_is_found_from_the_far_end(tmp_path, effect, material, constant, planted):
+    loop = dc.close_loop(records(tmp_path, material), BASE, effects=[effect], max_effects=1)
+    assert loop.verdict == "effects_added"
+    low, high = loop.stages[0].parameters[constant].ci95
+    assert low < planted < high
+
+
+def test_slow_shear_of_a_giesekus_fluid_does_not_exclude_the_law_that_made_it(tmp_path):
+    effects = ["giesekus_mobility", "non_affine_motion", "ptt_linear", "ptt_exponential"]
+    loop = dc.close_loop(
+        records(tmp_path, Giesekus(0.5, 100.0, 1.0)), BASE, effects=effects, max_effects=1
+    )
+    told = [one for one in loop.explanations.likeliest_first if one.probability > 0.05]
+    assert any(one.effects == ("giesekus_mobility",) for one in told)
