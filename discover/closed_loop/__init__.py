@@ -5,6 +5,7 @@ from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.explanation import Explanation, Explanations
 from discover.closed_loop.free_curve import FreeForm
 from discover.closed_loop.loop import run_loop
+from discover.closed_loop.next_test import NextTest, NextTests
 from discover.closed_loop.result import (
     ConstantByMode,
     ErrorPair,
@@ -29,6 +30,8 @@ __all__ = [
     "FreeForm",
     "LoopResult",
     "ModeConstant",
+    "NextTest",
+    "NextTests",
     "RunRecord",
     "Stage",
     "StageParameter",

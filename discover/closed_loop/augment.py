@@ -39,8 +39,8 @@ FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
 
 _RESTARTED = 3
-_INSIDE = (0.1, 0.4)
-"""Shares of the largest amplitude from which one that stands there is tried again."""
+_INSIDE = 0.25
+"""Share of the largest amplitude from which one that stands there is tried again."""
 
 
 @dataclass
@@ -222,10 +222,9 @@ def _from_inside(model: AugmentedModel, fit: Fit) -> list[np.ndarray]:
     starts = []
     for at in amplitudes:
         if at in fit.free and np.isfinite(model.high[at]) and fit.theta[at] == model.high[at]:
-            for share in _INSIDE:
-                theta = fit.theta.copy()
-                theta[at] = share * model.high[at]
-                starts.append(theta)
+            theta = fit.theta.copy()
+            theta[at] = _INSIDE * model.high[at]
+            starts.append(theta)
     return starts
 
 

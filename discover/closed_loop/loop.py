@@ -17,12 +17,19 @@ from discover.closed_loop.before_after import (
 from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.explanation import Explanations
-from discover.closed_loop.explanations import BEAM_WIDTH, carry, explain, with_band
+from discover.closed_loop.explanations import (
+    BEAM_WIDTH,
+    carry,
+    explain,
+    next_tests,
+    with_band,
+)
 from discover.closed_loop.finer_steps import on_finer_steps
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.law_choice import LawFit, choose_law
+from discover.closed_loop.next_test import NextTests
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.result import (
     ConstantByMode,
@@ -226,7 +233,7 @@ def run_loop(
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
-    side_by_side, forms = Explanations(), ()
+    side_by_side, forms, following = Explanations(), (), NextTests()
     if carried:
         runs = (fitted_runs, held_runs)
         tried = [effect.name for effect in candidates if search.admitted(effect)]
@@ -235,6 +242,9 @@ def run_loop(
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
             forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
         side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
+        if len(side_by_side.likeliest_first) + len(carried) > 2:
+            say("which test would tell the explanations apart")
+        following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
     return LoopResult(
@@ -268,6 +278,7 @@ def run_loop(
         declared_effects=_declared_effects(model, current, bounds, by_mode),
         declared_law=None if differ & {*of_law} else _declared_law(declared, current),
         explanations=side_by_side,
+        next_tests=following,
         laws=tried_laws,
         free_form=forms,
         fluid=None if differ else _fluid(model, current, [*active, *known]),

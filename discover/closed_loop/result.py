@@ -16,6 +16,7 @@ from discover.closed_loop.error_pair import ErrorPair
 from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.free_curve import FreeForm
 from discover.closed_loop.law_choice import LawFit
+from discover.closed_loop.next_test import NextTests
 from discover.closed_loop.reading import Reading, read_residual
 from discover.closed_loop.run_record import RunRecord
 from discover.equations import Equation, HasEquation, Tested, equation_to_json, law_terms
@@ -195,6 +196,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
         no law of stress and rate can carry.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
+    next_tests
+        The tests that were weighed by how well they would tell these apart.
     laws
         The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
@@ -221,6 +224,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
     explanations: Explanations = field(default_factory=Explanations)
+    next_tests: NextTests = field(repr=False, default_factory=NextTests)
     laws: tuple[LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
     folds: tuple[Fold, ...] = ()
@@ -411,6 +415,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 for record in self.records
             },
             **self.explanations.to_json(),
+            "next_tests": self.next_tests.to_json(),
             "held_out_in_band": self.held_in_band,
             "laws": [one.to_json() for one in self.laws],
             "free_form": [one.to_json() for one in self.free_form],

@@ -1,7 +1,6 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -27,10 +26,17 @@ from discover.report.plots.loop import (
     waterfall_picture,
 )
 from discover.report.plots.loop_lissajous import lissajous_picture
+from discover.report.plots.next_test import next_test_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict, named
-from discover.report.wording import effect_title, percent, significant
+from discover.report.wording import (
+    FIGURE_SYMBOLS,
+    effect_title,
+    effects_title,
+    percent,
+    significant,
+)
 from discover.statistics.residual import fast_part
 from discover.study.run_folder import RunFolder
 
@@ -76,6 +82,7 @@ def write_loop(
         run_error_picture(result),
         ranking_picture(result),
         by_mode_picture(result),
+        next_test_picture(result),
     ]
     drawn = [p for p in pictures if p is not None]
     for one in drawn:
@@ -99,6 +106,7 @@ def write_loop(
         run_rows=_run_rows(result),
         explanations=_explanations(result),
         inclusion=_inclusion(result),
+        next_tests=_next_tests(result),
         stages=[_stage(stage, i) for i, stage in enumerate(result.stages)],
         declared_effects=_declared_effects(result),
         rankings=[_ranking(ranking) for ranking in result.rankings],
@@ -237,15 +245,11 @@ def _stage(stage: Stage, number: int) -> dict[str, Any]:
 
 def _explanations(result: LoopResult) -> list[dict[str, Any]]:
     """Return the explanations as lines of a table; none where there is only one that is certain."""
-
-    def named(effects: Sequence[str]) -> str:
-        return " + ".join(map(effect_title, effects)) or "the declared model alone"
-
     chosen = result.explanations.holding([stage.effect for stage in result.stages])
     return [
         {
-            "effects": named(one.effects),
-            "twins": "; ".join(map(named, one.twins)),
+            "effects": effects_title(one.effects),
+            "twins": "; ".join(map(effects_title, one.twins)),
             "probability": one.probability,
             "error": one.error,
             "chosen": one is chosen,
@@ -269,6 +273,26 @@ def _inclusion(result: LoopResult) -> str:
 
 
 _MOST_INCLUDED = 8
+_MOST_TESTS = 8
+
+
+def _next_tests(result: LoopResult) -> list[dict[str, Any]]:
+    """Return the tests that tell most of which explanation is right, as lines of a table."""
+    following = result.next_tests
+    titles = [effects_title(effects) for effects in following.explanations]
+    return [
+        {
+            "title": one.title,
+            "quantity": FIGURE_SYMBOLS[one.quantity],
+            "share": one.nats / following.open_nats,
+            "pairs": "; ".join(f"{titles[i]} from {titles[j]}" for i, j in one.pairs[:_MOST_PAIRS]),
+            "more": max(len(one.pairs) - _MOST_PAIRS, 0),
+        }
+        for one in following.tests[:_MOST_TESTS]
+    ]
+
+
+_MOST_PAIRS = 2
 
 
 def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:

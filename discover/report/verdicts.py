@@ -9,7 +9,9 @@ from discover.closed_loop.result import ConstantByMode, LoopResult, Stage, Stage
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
+    FIGURE_SYMBOLS,
     effect_title,
+    effects_title,
     estimate,
     interval,
     percent,
@@ -184,6 +186,8 @@ def _loop_next(result: LoopResult) -> str:
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
+    if result.verdict in _EXPLAINED and (told := _telling_test(result)):
+        return told
     doubtful = _most_doubtful(result.stages)
     if doubtful is not None and result.verdict != "unexplained":
         check = doubtful.check.rstrip(". ")
@@ -212,6 +216,24 @@ def _loop_next(result: LoopResult) -> str:
         f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
         f"tests the model hardest is a faster flow: {faster}."
     )
+
+
+_EXPLAINED = ("effects_added", "no_effect_needed")
+
+
+def _telling_test(result: LoopResult) -> str:
+    """Return the test that tells the likeliest explanation from others; empty if none does."""
+    following = result.next_tests
+    best = following.best
+    if best is None:
+        return ""
+    titles = [effects_title(effects) for effects in following.explanations]
+    first, *_ = best.pairs
+    chosen = first[0]
+    others = _several([titles[j] for i, j in best.pairs if i == chosen], "and")
+    what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
+    count = len(following.tests)
+    return f"To tell {titles[chosen]} from {others}: {best.title}{what}, of {count} tests weighed."
 
 
 def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:

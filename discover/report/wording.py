@@ -144,6 +144,11 @@ def effect_title(name: str) -> str:
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
+def effects_title(names: Sequence[str]) -> str:
+    """Return a set of effects as readers know it."""
+    return " + ".join(map(effect_title, names)) or "the declared model alone"
+
+
 def interval(bounds: Sequence[float | None] | None) -> str:
     """Return an interval with as many digits as tell two of its width; a dash where none is known.
 

@@ -1,0 +1,53 @@
+"""What to measure next: what each explanation of a closed loop predicts in the test proposed."""
+
+from discover.closed_loop import LoopResult
+from discover.protocols.kinematics import MODULI
+from discover.report.plots.style import (
+    BEFORE,
+    GREEN,
+    NETWORK,
+    PURPLE,
+    SPARSE,
+    YELLOW,
+    Picture,
+    figure,
+    legend_above,
+    picture,
+)
+from discover.report.wording import FIGURE_SYMBOLS, effects_title, percent
+
+_COLOURS = (SPARSE, NETWORK, GREEN, PURPLE, YELLOW, BEFORE)
+_DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
+
+
+def next_test_picture(result: LoopResult) -> Picture | None:
+    """Return the predictions of all explanations in the best test; None where none decides."""
+    following = result.next_tests
+    best = following.best
+    if best is None:
+        return None
+    with figure(1, 1, width=7.0, height=3.2) as (drawing, axes):
+        panel = axes[0, 0]
+        lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
+        for i, (effects, probability, curve) in enumerate(lines):
+            panel.plot(
+                best.samples,
+                curve,
+                color=_COLOURS[i % len(_COLOURS)],
+                linestyle=_DASHES[i % len(_DASHES)],
+                lw=2.0 if i == 0 else 1.4,
+                label=f"{effects_title(effects)} ({percent(probability)})",
+            )
+        unit = "" if best.quantity == "strain" else " (Pa)"
+        panel.set_ylabel(FIGURE_SYMBOLS[best.quantity] + unit)
+        panel.set_xlabel("shear rate (1/s)" if best.is_flow_curve else "time (s)")
+        if best.is_flow_curve or best.quantity in MODULI:
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+        legend_above(drawing, axes, columns=1)
+        return picture(
+            drawing,
+            "next_test",
+            f"What to measure next: {best.title}. Each explanation as it predicts it, all of which "
+            f"fit the records at hand; noise is {percent(following.noise)}.",
+        )
