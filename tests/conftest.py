@@ -52,8 +52,21 @@ _LONG = (
 )  # fmt: skip
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let long files begin first, so that no worker waits for another at the end."""
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the choice of running everything."""
+    parser.addoption("--whole", action="store_true", help="run the tests marked slow too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave what is slow out unless it is asked for, by --whole, -m or a file's name.
+
+    Let long files begin first, so that no worker waits for another at the end.
+    """
+    asked = config.getoption("--whole") or config.getoption("-m")
+    if not asked and all(Path(name.split("::")[0]).is_dir() for name in config.args):
+        left = [item for item in items if item.get_closest_marker("slow")]
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if not item.get_closest_marker("slow")]
     place = {name: i for i, name in enumerate(_LONG)}
     items.sort(key=lambda item: place.get(item.path.name, len(_LONG)))
 

@@ -146,6 +146,7 @@ def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypat
     assert "RuntimeError: it broke" in result.stderr
 
 
+@pytest.mark.slow
 def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, trained, undrawn):
     to_fit = 'modulus_Pa = "fit"\nrelaxation_time_s = "fit"\n'
     to_fit += '[loop]\nnoise = 0.01\nmax_effects = 1\neffects = ["stress_offset"]'

@@ -55,6 +55,7 @@ def test_nothing_is_found_where_the_declared_law_made_the_extension(base):
     assert not loop.stages
 
 
+@pytest.mark.slow
 def test_the_sparse_learner_finds_the_law_in_extension_alone(base):
     data = extension("uniaxial", 0.3)
     law = dc.TensorSINDy(base=base, n_stability=0).fit(data)

@@ -37,11 +37,17 @@ def chosen(data, held_out=(), names=NAMES):
     ("law", "name", "constants"),
     [
         (Giesekus(0.3), "giesekus", {"alpha": 0.3}),
-        (RoliePoly(0.7, 0.1), "rolie_poly", {"stretch_time_ratio": 0.1, "beta": 0.7}),
-        (
+        pytest.param(
+            RoliePoly(0.7, 0.1),
+            "rolie_poly",
+            {"stretch_time_ratio": 0.1, "beta": 0.7},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
             ExtendedPomPom(4.0, 0.15, 0.3),
             "xpp",
             {"q": 4.0, "stretch_time_ratio": 0.3, "alpha": 0.15},
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["giesekus", "rolie_poly", "xpp"],
@@ -63,6 +69,7 @@ def test_the_law_that_made_the_records_is_taken_and_its_interval_holds(law, name
     assert written[0]["behind"] == 0.0
 
 
+@pytest.mark.slow
 def test_laws_that_slow_shear_cannot_tell_apart_are_said_to_be_alike():
     found = chosen(runs(Giesekus(0.3), (0.02, 0.05, 0.1)))
     alike = [one.law for one in found.laws[1:] if not one.is_told_apart]

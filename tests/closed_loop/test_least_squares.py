@@ -61,6 +61,7 @@ def test_a_fit_asks_for_few_predictions(monkeypatch):
     assert sum(asked) < 36
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
 def test_errors_left_out_are_near_the_noise_whatever_the_number_of_runs(count):
     model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect("giesekus_mobility")])
@@ -102,6 +103,7 @@ def test_a_trial_lets_a_fitted_constant_give_way_that_stood_in_for_the_effect():
     assert candidate.reduction > 1.5 * max(held)
 
 
+@pytest.mark.slow
 def test_finer_steps_take_the_bias_out_of_a_compliance():
     model = AugmentedModel(
         DeclaredModel.maxwell(100.0, 1.0), [make_effect("tool_compliance")], data_scales(runs(4))

@@ -186,6 +186,7 @@ def test_terms_that_name_the_rate_are_not_tried_where_the_loop_must_extrapolate_
     assert "giesekus_mobility" in ranked
 
 
+@pytest.mark.slow
 def test_a_noise_that_is_given_is_believed():
     dataset = make_dataset(Giesekus(0.2))
     result = loop(dataset, effects=("stress_offset",), noise=0.9, max_effects=1)
@@ -211,6 +212,7 @@ MELT_CANDIDATES = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_one_instrument_effect_cuts_the_held_out_error_of_the_melt_fourfold(measured_data):
     dataset = load_dataset(measured_data / "pi95k-startup", clock_factor="time_factor")
     assert dataset.linear_sweep is not None

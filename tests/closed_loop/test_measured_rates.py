@@ -87,6 +87,7 @@ def test_constants_of_the_declared_law_come_back_with_units_from_a_guess_far_off
         assert found.ci95[1] > value * 0.98
 
 
+@pytest.mark.slow
 def test_each_run_is_judged_by_a_search_that_did_not_see_it():
     dataset, declared = start_ups(0.3), DeclaredModel.maxwell(100.0, 1.0)
     options = {"effects": EFFECTS, "max_effects": 1, "explanations": 1}
@@ -111,6 +112,7 @@ def test_one_run_cannot_be_held_out_of_itself():
         run_loop_on_each(dataset, DeclaredModel.maxwell(100.0, 1.0))
 
 
+@pytest.mark.slow
 def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     times = np.geomspace(1e-3, 60.0, 60)
     noise = 1.0 + 1e-4 * np.random.default_rng(0).standard_normal(60)

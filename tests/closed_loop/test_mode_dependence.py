@@ -81,6 +81,7 @@ def test_the_exponent_gives_each_mode_its_own_constant():
         np.testing.assert_allclose(row[: len(run)], stress, atol=2e-3 * np.max(np.abs(stress)))
 
 
+@pytest.mark.slow
 def test_two_mobilities_are_no_thixotropy():
     result = loop(runs((0.1, 0.7)))
     # without the question by modes it is named, with a narrow interval, and explains the data
@@ -98,6 +99,7 @@ def test_a_thixotropy_that_is_there_stays():
     assert result.stages[0].parameters["breakdown"].value == pytest.approx(0.05, rel=0.2)
 
 
+@pytest.mark.slow
 def test_constants_by_mode_leave_to_an_effect_what_it_explains():
     # mobilities are alike: chosen without the thixotropy, their difference would stand for it
     result = loop(runs((0.3, 0.3), breakdown=0.05), by_mode=("alpha",))

@@ -70,6 +70,7 @@ def loop(runs, *units):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [17, 6, 3])
 def test_exact_data_of_the_declared_law_lack_nothing(digits):
     result = loop(maxwell_runs(digits=digits))
@@ -77,6 +78,7 @@ def test_exact_data_of_the_declared_law_lack_nothing(digits):
     assert result.stages == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [17, 4])
 def test_the_one_effect_that_exact_data_have_is_found_and_explains_them(digits):
     result = loop(maxwell_runs(3.0, digits))
@@ -85,6 +87,7 @@ def test_the_one_effect_that_exact_data_have_is_found_and_explains_them(digits):
     assert result.stages[0].parameters["offset"].value == pytest.approx(3.0, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_small_effect_that_no_candidate_is_stays_unexplained_in_exact_data():
     # a slow wave of 0.1 % of the stress, ten times what the samples of the rate leave
     runs = maxwell_runs()
@@ -95,6 +98,7 @@ def test_a_small_effect_that_no_candidate_is_stays_unexplained_in_exact_data():
     assert result.verdict == "unexplained"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stress", "time"), [(1e-6, 1.0), (1e6, 1e-3), (1.0, 1e3)])
 def test_units_decide_nothing(stress, time):
     result = loop(maxwell_runs(3.0, 17, stress, time), stress, time)
@@ -109,6 +113,7 @@ def test_a_copy_of_a_fitted_run_is_not_held_out():
         loop([*runs[:2], replace(runs[1], name="held")])
 
 
+@pytest.mark.slow
 def test_every_candidate_may_be_in_the_model():
     runs = [Run(r.name, r.time, r.protocol, r.rate, 1.2 * r.stress + 3.0) for r in maxwell_runs()]
     result = loop(runs)

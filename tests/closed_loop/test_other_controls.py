@@ -75,6 +75,7 @@ def test_nothing_is_found_in_the_creep_of_the_declared_fluid(tmp_path):
     assert loop.verdict == "no_effect_needed"
 
 
+@pytest.mark.slow
 def test_a_mobility_is_found_in_a_flow_curve_and_its_n1(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
     loop = dc.close_loop(data, BASE, effects=EFFECTS, explanations=1)
@@ -88,6 +89,7 @@ def test_nothing_is_found_in_the_flow_curve_of_the_declared_fluid(tmp_path):
     assert loop.verdict == "no_effect_needed"
 
 
+@pytest.mark.slow
 def test_n1_that_was_not_fitted_judges_a_law_found_in_the_stress_alone(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
     loop = dc.close_loop(

@@ -33,6 +33,7 @@ def relaxed():
     return run_loop(Dataset("step", (relaxation(),)), declared, effects=CANDIDATES)
 
 
+@pytest.mark.slow
 def test_no_heat_is_found_in_the_relaxation_after_a_step_of_three_per_cent(relaxed):
     names = {stage.effect for stage in relaxed.stages}
     aliases = {alias for stage in relaxed.stages for alias in stage.aliases}
@@ -63,6 +64,7 @@ def warming(heating, count=60):
     return Run("melt.csv", at, flow, np.full(count, rate), record + noise)
 
 
+@pytest.mark.slow
 def test_the_heat_of_a_stiff_melt_is_still_found():
     dataset = Dataset("melt", (warming(2e-8),))
     result = run_loop(dataset, DeclaredModel.maxwell(1e6, 1.0), effects=CANDIDATES)

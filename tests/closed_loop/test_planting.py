@@ -100,6 +100,7 @@ def test_nothing_is_named_in_data_without_a_flaw(planter, correlation):
         assert result.stages == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "seed"), [("wall_slip", 1), ("thixotropy", 2), ("stress_drift", 3)]
 )

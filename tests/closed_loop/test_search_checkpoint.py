@@ -76,6 +76,7 @@ def test_an_interrupted_loop_ends_where_an_undisturbed_one_does(dataset):
         assert said[0].startswith("going on from what was kept")
 
 
+@pytest.mark.slow
 def test_what_another_list_of_candidates_left_is_not_gone_on_from(dataset):
     store = Store()
     loop(dataset, store)

@@ -54,6 +54,7 @@ def integrate(slope, size, rate):
     return solution.y
 
 
+@pytest.mark.slow
 def test_all_effects_together_at_zero_amplitude_leave_maxwell():
     start, oscillation = predict()
     np.testing.assert_allclose(start, maxwell_in_start_up(MODULUS, TIME), rtol=1e-6)

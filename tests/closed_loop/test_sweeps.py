@@ -33,6 +33,7 @@ def sweep_folder(folder, mobility):
     return folder
 
 
+@pytest.mark.slow
 def test_a_mobility_is_found_in_an_amplitude_sweep_alone_and_holds_in_the_linear_limit(tmp_path):
     folder, omega = sweep_folder(tmp_path, 0.3), np.geomspace(0.1, 10.0, 24)
     write_table(folder / "lve.csv", maxwell_sweep([MODULUS], [TIME], omega))

@@ -55,6 +55,7 @@ def comparison() -> Comparison:
         return compare(fake_study())
 
 
+@pytest.mark.slow
 def test_a_perfect_learner_has_no_error_and_a_wrong_one_has(comparison):
     for flow in comparison.flows_of("test"):
         assert max(comparison.errors("tensor_sindy", flow).values()) < 1e-6  # solver tolerance
@@ -138,6 +139,7 @@ def slip_case():
     return declared_model(study, data.dataset), comparison_flows(data, ())
 
 
+@pytest.mark.slow
 def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     model, flows = slip_case
     chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
@@ -155,6 +157,7 @@ def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     assert "Checked by simulation" in statements[0].text
 
 
+@pytest.mark.slow
 def test_rivals_of_other_terms_are_simulated_in_one_program(slip_case, monkeypatch):
     model, flows = slip_case
     chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
@@ -181,6 +184,7 @@ def test_rivals_of_other_terms_are_simulated_in_one_program(slip_case, monkeypat
     np.testing.assert_allclose(together["N1"], alone["N1"], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pair_on_33_is_no_rival_where_the_trace_feels_it(slip_case):
     # negative control: with tr σ in the law, σ33 acts back on σ12
     model, flows = slip_case

@@ -46,6 +46,7 @@ def weak():
     return oscillations(gain=0.9)
 
 
+@pytest.mark.slow
 def test_without_the_gain_the_law_bends(weak):
     result, _ = sparse(declared_fluid(None, weak), divided(weak), LIBRARY)
     low, high = next(t.ci95 for t in result.terms if t.term == "sigma.sigma")
@@ -58,6 +59,7 @@ def with_gain(weak):
     return learned(weak, {"stress_gain": "fit"})
 
 
+@pytest.mark.slow
 def test_with_the_gain_fitted_along_the_law_is_found_and_the_gain_too(with_gain):
     (term,) = with_gain.result.terms
     assert term.term == "sigma.sigma"
@@ -69,6 +71,7 @@ def test_with_the_gain_fitted_along_the_law_is_found_and_the_gain_too(with_gain)
     assert with_gain.settled
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_coefficient_allows_for_the_constant(weak, with_gain):
     held = replace(declared_fluid(None, weak), effects=known_effects(KNOWN_GAIN))
     data, _ = corrected(divided(weak), held.effects)
@@ -78,6 +81,7 @@ def test_the_interval_of_a_coefficient_allows_for_the_constant(weak, with_gain):
     assert wide > 1.3 * narrow
 
 
+@pytest.mark.slow
 def test_a_gain_is_not_found_where_there_is_none():
     found = learned(oscillations(gain=1.0), {"stress_gain": "fit"})
     gain = found.constants["stress_gain.gain_error"]
@@ -85,6 +89,7 @@ def test_a_gain_is_not_found_where_there_is_none():
     assert [term.term for term in found.result.terms] == ["sigma.sigma"]
 
 
+@pytest.mark.slow
 def test_a_factor_on_the_modulus_does_as_well_as_a_gain(weak):
     found = learned(weak, free=("modulus_Pa",))
     modulus = found.constants["modulus_Pa"]
@@ -92,6 +97,7 @@ def test_a_factor_on_the_modulus_does_as_well_as_a_gain(weak):
     assert modulus.ci95[0] <= 0.9 <= modulus.ci95[1]
 
 
+@pytest.mark.slow
 def test_two_constants_that_do_the_same_are_refused(weak):
     with pytest.raises(InputError, match="cannot tell modulus_Pa from the other constants"):
         learned(weak, {"stress_gain": "fit"}, free=("modulus_Pa",))

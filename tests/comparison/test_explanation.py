@@ -111,6 +111,7 @@ def test_arithmetic_is_no_pattern(responses):
     assert explained(rows, rather).verdict == "unexplained"
 
 
+@pytest.mark.slow
 def test_a_rate_that_is_known_at_the_samples_only_is_allowed_for(responses):
     exact = flows_of(responses["giesekus"])
     read = [replace(f, protocol=measured_rate(TIMES, np.asarray(f.rate))) for f in exact]

@@ -25,6 +25,7 @@ def divided(data):
     return StudyData(data, data, data.select([]))
 
 
+@pytest.mark.slow
 def test_a_rate_that_rises_slowly_is_the_rate_that_the_fluid_felt():
     data = divided(slow_start_ups(rise_time=0.2))
     known = known_effects({"rate_rise_time": {"tau": 0.2}})
@@ -64,6 +65,7 @@ def test_a_known_effect_of_the_fluid_becomes_its_law_its_modes_and_its_solvent()
     assert [known.name for known in found.effects] == ["stress_gain"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "words"),
     [

@@ -50,6 +50,7 @@ def stand_in(source: Path, folder: Path, runs, every: int) -> None:
         (folder / "lve.csv").write_bytes((source / "lve.csv").read_bytes())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_a_comparison_of_measured_data_ends_with_a_verdict(name, measured_data, tmp_path):
     fit, held_out, every, options, model = SETS[name]

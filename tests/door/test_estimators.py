@@ -117,7 +117,7 @@ def test_the_score_is_one_less_the_relative_error(sindy, data):
     assert 0.98 < sindy.score([run]) < 1.0  # noise of half a per cent
 
 
-@pytest.mark.parametrize("which", ["sindy", "network"])
+@pytest.mark.parametrize("which", ["sindy", pytest.param("network", marks=pytest.mark.slow)])
 def test_an_estimator_is_the_same_after_every_way(which, request, data, tmp_path):
     fitted = request.getfixturevalue(which)
     expected = fitted.predict(data)
@@ -220,6 +220,7 @@ print(jax.config.jax_enable_x64, fitted.fluid_.modulus.dtype, repr(last))
 """
 
 
+@pytest.mark.slow
 def test_a_process_that_only_unpickles_computes_in_double_precision(sindy, tmp_path, monkeypatch):
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir))
     (tmp_path / "fitted.pickle").write_bytes(pickle.dumps(sindy))
@@ -232,6 +233,7 @@ def test_a_process_that_only_unpickles_computes_in_double_precision(sindy, tmp_p
     assert float(told[2]) == pytest.approx(sindy.predict(sindy.runs_)[-1], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_cross_validation_in_two_processes_equals_that_in_one(data, base, monkeypatch):
     # workers find the programs that this process has compiled
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir))

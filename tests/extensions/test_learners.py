@@ -10,6 +10,7 @@ from discover.learners.registry import LEARNERS, learner_title, register_learner
 PAGE = "adding-a-learner.md"
 
 
+@pytest.mark.slow
 def test_the_learner_of_the_page_is_trained_judged_reported_and_exported(workplace):
     workplace.follow(PAGE)
     study = workplace.study(PAGE, more="high_deborah = [1.5]\n")

@@ -49,6 +49,7 @@ def form():
     del CLOSED_FORMS[FORM.name]
 
 
+@pytest.mark.slow
 def test_the_form_of_the_page_is_found_in_data_reported_and_exported(workplace):
     workplace.follow(PAGE)
     workplace.run(script=SAMPLES)

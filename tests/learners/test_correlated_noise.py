@@ -33,6 +33,7 @@ def fitted(correlation, seed):
     return TensorSINDy(LIBRARY, n_stability=0, n_folds=0).fit(runs(correlation, seed))
 
 
+@pytest.mark.slow
 def test_correlated_noise_seldom_brings_in_a_term():
     # counting every sample, all four have terms, three to five of them
     models = [fitted(0.9, seed) for seed in range(4)]

@@ -53,6 +53,7 @@ def trained(giesekus_problem):
     return train_default(giesekus_problem, jax.random.key(0), True, SMALL)
 
 
+@pytest.mark.slow
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
     law = make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
@@ -70,6 +71,7 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
     law = make_network(jax.random.key(1), 3, True)
@@ -106,6 +108,7 @@ def test_maxwell_data_leave_nothing_to_learn():
     assert not trained.varies
 
 
+@pytest.mark.slow
 def test_the_network_is_called_in_when_constants_leave_structure():
     problem = problem_of("ptt_linear", {"epsilon": 0.4})
     recipe = dataclasses.replace(SMALL, width=6, steps=10, polish_steps=60)
@@ -170,6 +173,7 @@ def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem
     assert loss == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus_problem):
     recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=3e-3)
     _, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)

@@ -45,6 +45,7 @@ def test_normal_stresses_that_were_never_seen_are_predicted(giesekus):
     assert np.max(np.abs(predicted.components - exact.components)) < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("optimizer", OPTIMISERS)
 def test_every_optimiser_finds_linear_ptt_in_noise(optimizer):
     # The library holds the exponential form too, which with a small ε imitates the linear one:
@@ -138,6 +139,7 @@ def test_a_redundant_first_pick_leaves():
     assert found(polynomials)["sigma"] == pytest.approx(0.2, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_modes_share_one_law_of_which_not_even_the_relaxation_is_known():
     modulus, relaxation_time = [30.0, 10.0], [0.5, 3.0]
     truth = Fluid(Giesekus(0.3), modulus, relaxation_time)
@@ -184,6 +186,7 @@ def test_runs_may_come_one_after_another(giesekus):
     assert found(model) == pytest.approx(found(giesekus), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_scikit_learn_splits_by_run():
     # beside the four flows of all tests here, four others that take as many steps: each half has
     # the programs that are there already

@@ -29,6 +29,7 @@ def executed_text(name, monkeypatch):
     return "".join([o.get("text", "") for o in outputs] + shown)
 
 
+@pytest.mark.slow
 def test_the_comparison_notebook_finds_the_giesekus_term(monkeypatch):
     text = executed_text("compare", monkeypatch)
     assert "<td>sigma.sigma</td>" in text
@@ -46,6 +47,7 @@ def test_the_loop_notebook_finds_what_was_planted_and_what_a_melt_lacks(monkeypa
         assert "Skipped: " in text
 
 
+@pytest.mark.slow
 def test_the_identifiability_notebook_separates_the_twins(monkeypatch):
     text = executed_text("identifiability", monkeypatch)
     assert "tr(sigma)*gammadot" in text
@@ -54,6 +56,7 @@ def test_the_identifiability_notebook_separates_the_twins(monkeypatch):
     assert rows[-2:] == [("slip", "False"), ("twin", "True")]
 
 
+@pytest.mark.slow
 def test_the_model_selection_notebook_loses_the_law_in_the_noise(monkeypatch):
     text = executed_text("model_selection", monkeypatch)
     fates = re.findall(r"<td>(chosen|a rival|ruled out)</td>", text)
@@ -62,6 +65,7 @@ def test_the_model_selection_notebook_loses_the_law_in_the_noise(monkeypatch):
     assert "N2 is not determined by σ12" in text
 
 
+@pytest.mark.slow
 def test_the_batch_notebook_goes_on_after_a_stop_and_lists_the_failure(monkeypatch):
     text = executed_text("batch", monkeypatch)
     second = text.split("stopped")[1].split("complete noise_01")[1]
