@@ -39,6 +39,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
 from discover.learners.result import LearnerResult
+from discover.protocols import settled
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
 from discover.study.build import (
@@ -98,6 +99,7 @@ def compare(
     _require_teacher(study)
     sweep = _sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
+    data = _settled(data, float(max(declared.relaxation_time)))
     if declared.choice:
         raise InputError(
             "[model] law names several laws to choose from, which is for close-loop: a comparison "
@@ -222,6 +224,21 @@ def compare(
         classical=classical,
         warnings=() if silent_records else tuple(disagreements(outcomes, judged, bands)),
     )
+
+
+def _settled(data: StudyData, relaxation_time: float) -> StudyData:
+    """Return data in which what starts periodic has the cycles before it that learners wait for."""
+    parts = {
+        name: replace(
+            part,
+            runs=tuple(
+                replace(run, protocol=settled(run.protocol, relaxation_time)) for run in part.runs
+            ),
+        )
+        for name in ("dataset", "fit", "held_out")
+        for part in [getattr(data, name)]
+    }
+    return replace(data, **parts)
 
 
 def _at_rates(data: StudyData) -> StudyData:

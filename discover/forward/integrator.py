@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from discover.effects import StateEffect
 from discover.forward.dynamics import Dynamics
+from discover.forward.periodic_start import Cycle, periodic_start
 from discover.protocols.kinematics import Kinematics
 from discover.simulate.exponential_runge_kutta import relax
 
@@ -28,6 +29,7 @@ def integrate(
     times: Float[Array, " s"],
     rate: Float[Array, " m"],
     flow: Kinematics | None = None,
+    cycle: Cycle | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
@@ -39,6 +41,8 @@ def integrate(
         Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
     flow
         Which flow has this rate; None is simple shear.
+    cycle
+        The last cycle before the record, of a batch that holds runs with a periodic start.
     """
     width = jnp.diff(times)
     states, series = dynamics.states, dynamics.series
@@ -99,17 +103,57 @@ def integrate(
         return (after, levels, missing, compliance_rate), (stress_after, compliance_rate)
 
     zero = jnp.zeros(())
-    start = (*dynamics.rest(), zero, zero)
+    rest = dynamics.rest()
+    start = (*rest, zero, zero)
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
-    _, (stress, compliance_rate) = jax.lax.scan(
-        step, start, (rates, width, dynamics.weights(width))
-    )
+    inputs = (rates, width, dynamics.weights(width))
+    if cycle is None:
+        _, (stress, compliance_rate) = jax.lax.scan(step, start, inputs)
+    else:
+        begun = _begun(step, start, inputs, cycle, times, dynamics)
+
+        def step_or_begin(carry, numbered):
+            number, one = numbered
+            carry = jax.tree.map(lambda a, b: jnp.where(number == cycle.start, b, a), carry, begun)
+            return step(carry, one)
+
+        _, (stress, compliance_rate) = jax.lax.scan(
+            step_or_begin, start, (jnp.arange(len(width)), inputs)
+        )
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides
         inside = 0.5 * (compliance_rate[1:] + compliance_rate[:-1])
         felt = felt + jnp.concatenate([compliance_rate[:1], inside, compliance_rate[-1:]])
     return jnp.concatenate([jnp.zeros(1), stress]), felt
+
+
+def _begun(step, start, inputs, cycle: Cycle, times, dynamics: Dynamics):
+    """Return the carry at the start of the cycle, which the cycle brings back."""
+    numbers = jnp.arange(cycle.steps)
+    one_cycle = jax.tree.map(
+        lambda of: jax.lax.dynamic_slice_in_dim(of, cycle.start, cycle.steps), inputs
+    )
+
+    def through(carry):
+        def in_cycle(carry, numbered):
+            number, one = numbered
+            after, _ = step(carry, one)
+            inside = number < cycle.end - cycle.start
+            return jax.tree.map(lambda a, b: jnp.where(inside, a, b), after, carry), None
+
+        return jax.lax.scan(in_cycle, carry, (numbers, one_cycle))[0]
+
+    def after_cycle(stress, levels):
+        stress, levels, *_ = through((stress, levels, *start[2:]))
+        return stress, levels
+
+    period = times[cycle.end] - times[cycle.start]
+    slowness = dynamics.modes.relaxation_time / jnp.where(period > 0.0, period, 1.0)
+    stress, levels = periodic_start(after_cycle, start[:2], slowness, period > 0.0)
+    # what gives way in series comes back too
+    _, _, *series = through((stress, levels, *start[2:]))
+    return (stress, levels, *series)
 
 
 def _compliance_rate(

@@ -25,6 +25,7 @@ from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
 from discover.forward.imposed_stress import strain_at_stress
 from discover.forward.integrator import integrate
+from discover.forward.periodic_start import Cycle
 from discover.forward.periodic_states import complex_modulus, first_harmonic
 from discover.forward.run_batch import (
     OscillationBatch,
@@ -139,7 +140,10 @@ class Program:
             rate = _where_in_shear(flow, changed, rate)
         times = run.times[::2]
         dynamics = self._dynamics(numbers, used, theta, flow)
-        stress, felt = integrate(dynamics, times, rate, flow)
+        cycle = None
+        if run.cycle_steps:
+            cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
+        stress, felt = integrate(dynamics, times, rate, flow, cycle)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)

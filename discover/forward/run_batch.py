@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
@@ -54,6 +54,11 @@ class RunBatch(eqx.Module):
         Total strain of the sample before each run, shape (runs,).
     kinematics
         Which flow each run is; None where all are simple shear.
+    cycle
+        Positions among step ends of the last cycle before the first sample, shape (runs, 2);
+        −1 where the run has no periodic start.
+    cycle_steps
+        The most steps that such a cycle has.
     """
 
     times: Float[Array, "runs m"]
@@ -63,7 +68,9 @@ class RunBatch(eqx.Module):
     recorded: Float[Array, "runs n"]
     clock_factor: Float[Array, " runs"]
     strain_before: Float[Array, " runs"]
+    cycle: Int[Array, "runs 2"]
     kinematics: Kinematics | None = None
+    cycle_steps: int = eqx.field(static=True, default=0)
 
     @property
     def longest(self) -> float:
@@ -320,8 +327,15 @@ def _transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
         grids.append((grid, np.searchsorted(grid, run.time)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
     n_samples = max(len(run) for run in runs)
+    cycles = [
+        np.searchsorted(grid, run.protocol.cycle) if np.ptp(run.protocol.cycle) else (-1, -1)
+        for run, (grid, _) in zip(runs, grids, strict=True)
+    ]
+    cycle_steps = int(max(end - start for start, end in cycles))
+    if cycle_steps:
+        n_steps = max(n_steps, *(int(start) + cycle_steps + 1 for start, _ in cycles))
     rows = []
-    for run, (grid, index) in zip(runs, grids, strict=True):
+    for run, cycle, (grid, index) in zip(runs, cycles, grids, strict=True):
         spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
         padded = np.concatenate([grid, grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)])
         half = np.empty(2 * n_steps - 1)
@@ -341,11 +355,14 @@ def _transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
                 recorded,
                 run.clock_factor,
                 run.strain_before,
+                np.asarray(cycle),
             )
         )
     columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
     return RunBatch(
-        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
+        *columns,
+        kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
+        cycle_steps=cycle_steps,
     )
 
 

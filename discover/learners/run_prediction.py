@@ -16,6 +16,7 @@ from discover.errors import InputError
 from discover.first_use import require_double
 from discover.learners.estimator_file import EstimatorFile, write_estimator
 from discover.learners.provenance import Provenance
+from discover.protocols import settled
 
 if TYPE_CHECKING:
     from discover.equations import Equation
@@ -23,16 +24,17 @@ if TYPE_CHECKING:
     from discover.learners.result import LearnerResult
 
 
-def as_runs(runs: Any) -> list[Run]:
+def as_runs(runs: Any, relaxation_time: Any = 0.0) -> list[Run]:
     """Return the runs as a list, each as one that follows a rate in time.
 
-    One at a given stress follows its measured rate.
+    One at a given stress follows its measured rate. One that starts periodic gets as many cycles
+    before it as the longest relaxation time, of these in s, needs.
 
     Raises
     ------
     InputError
-        If there is none, one is something else or follows no rate (a flow curve, a creep test), or
-        JAX computes in single precision.
+        If there is none, one is something else or follows no rate (a flow curve, a creep test), a
+        mode is too slow to become periodic, or JAX computes in single precision.
     """
     require_double()
     if isinstance(runs, Run):
@@ -54,7 +56,9 @@ def as_runs(runs: Any) -> list[Run]:
                 f"A learner takes a sequence of Run; got a {type(run).__name__}. Load a "
                 "folder or make a synthetic data set."
             )
-    return [at_measured_rate(run) for run in listed]
+    longest = float(np.max(np.asarray(relaxation_time)))
+    followed = [at_measured_rate(run) for run in listed]
+    return [replace(run, protocol=settled(run.protocol, longest)) for run in followed]
 
 
 class RunPrediction:
@@ -127,7 +131,7 @@ class RunPrediction:
 
     def predict(self, X: Any) -> Float[np.ndarray, " rows"]:
         """Return σ12 in Pa at the samples of all runs, one run after the other."""
-        return np.concatenate(self._predict_runs(as_runs(X)))
+        return np.concatenate(self._predict_runs(as_runs(X, self.fluid_.relaxation_time)))
 
     def score(self, X: Any, y=None, sample_weight=None) -> float:
         """Return one minus the relative error of σ12, averaged over runs: 1 is perfect.
@@ -146,7 +150,7 @@ class RunPrediction:
             Ignored; scikit-learn passes them.
         """
         del y, sample_weight
-        runs = as_runs(X)
+        runs = as_runs(X, self.fluid_.relaxation_time)
         errors = [
             np.sqrt(np.mean((p - run.recorded) ** 2) / np.mean(run.recorded**2))
             for p, run in zip(self._predict_runs(runs), runs, strict=True)

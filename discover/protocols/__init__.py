@@ -2,7 +2,12 @@
 
 from discover import first_use as first_use  # double precision, before any array is made
 from discover.protocols.control import imposed_stress, oscillations, steady_rates
-from discover.protocols.history import after_alternation, after_steady_flow, after_step_strain
+from discover.protocols.history import (
+    after_alternation,
+    after_steady_flow,
+    after_step_strain,
+    settled,
+)
 from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
 from discover.protocols.protocol import (
@@ -36,6 +41,7 @@ __all__ = [
     "paper_test_protocols",
     "paper_training_protocols",
     "recorded_at",
+    "settled",
     "shear_rates",
     "smooth_between_samples",
     "stack_protocols",

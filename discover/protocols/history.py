@@ -20,6 +20,12 @@ CYCLES = 10
 """Cycles computed before the first sample of an oscillation that had gone on. It begins where the
 strain is in the middle of its range, so that what relaxes slowly starts without an offset."""
 
+SETTLED = 6.0
+"""Relaxation times after which what was different at the start is a four-hundredth of it."""
+
+MOST_CYCLES = 500
+"""Cycles that are waited for, at most."""
+
 # Of the time to the first sample: the duration of a step of strain that has none of its own
 _AT_ONCE = 1e-3
 _PER_CYCLE = 64
@@ -129,7 +135,8 @@ def after_alternation(
         # a cosine has gone on for ever: begin where its rate is largest
         turn = -CYCLES * period + np.arange(_PER_CYCLE) / _PER_CYCLE * period
         largest = int(np.argmax(np.abs(shear_rates(protocol, turn))))
-        return replace(protocol, begins=jnp.asarray(float(turn[largest])))
+        begins = jnp.asarray(float(turn[largest]))
+        return replace(protocol, begins=begins, cycle=jnp.array([-period, 0.0]))
     # one cycle of the record, whole cycles before it, and from the largest rate on
     phase = np.arange(_PER_CYCLE) / _PER_CYCLE * period
     first = float(times[0])
@@ -137,7 +144,59 @@ def after_alternation(
     knots = np.concatenate([first + phase - k * period for k in range(CYCLES, 0, -1)])
     rates = np.tile(cycle, CYCLES)
     start = int(np.argmax(np.abs(cycle)))
-    return _begun(protocol, knots[start:], rates[start:], until=first)
+    begun = _begun(protocol, knots[start:], rates[start:], until=first)
+    return replace(begun, cycle=jnp.array([first - period, first]))
+
+
+def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
+    """Return the protocol with as many cycles before the record as a mode needs to be periodic.
+
+    For integrators that wait; what solves for the periodic state needs no more than it has.
+
+    Parameters
+    ----------
+    protocol
+        Of any kind; what is no oscillation that had gone on is returned as it is.
+    relaxation_time
+        The longest, in s.
+
+    Raises
+    ------
+    InputError
+        If more than `MOST_CYCLES` would be needed.
+    """
+    start, end = np.asarray(protocol.cycle)
+    period, begins = end - start, float(protocol.begins)
+    if period <= 0.0:
+        return protocol
+    wanted = int(np.ceil(SETTLED * relaxation_time / period))
+    if wanted > MOST_CYCLES:
+        raise InputError(
+            f"A run that starts periodic, with a period of {period:.3g} s, would need {wanted} "
+            f"cycles until a mode of {relaxation_time:.3g} s is periodic too, more than the "
+            f"{MOST_CYCLES} that a learner waits for. Use close-loop, which solves for the "
+            "periodic state, leave the run out, or leave out the slowest modes."
+        )
+    more = wanted - int((end - begins) / period)
+    if more <= 0:
+        return protocol
+    if np.any(np.asarray(protocol.amplitudes)):
+        return replace(protocol, begins=jnp.asarray(begins - more * period))
+    knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    inside = (knots >= start) & (knots < end)
+    # from the phase on at which it begins
+    first = np.searchsorted(knots[inside] - start, (begins - start) % period - 1e-9 * period)
+    before = np.roll(knots[inside] - start, -first)
+    before = begins + (before - before[0]) % period - more * period
+    cycles = np.concatenate([before + k * period for k in range(more)])
+    return replace(
+        protocol,
+        table_times=jnp.asarray(np.concatenate([cycles, knots])),
+        table_rates=jnp.asarray(
+            np.concatenate([np.tile(np.roll(rates[inside], -first), more), rates])
+        ),
+        begins=jnp.asarray(float(cycles[0])),
+    )
 
 
 def _require_positive(name: str, value: float) -> None:

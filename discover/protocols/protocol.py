@@ -42,6 +42,9 @@ class FlowProtocol(eqx.Module):
         Cosine terms a cos(ω t + φ), shape (c,), in 1/s, rad/s and rad.
     begins
         Time in s, zero or negative, until which the fluid was at rest.
+    cycle
+        Times in s between which the last cycle before the record lies, of an oscillation that had
+        gone on for ever; the same twice otherwise.
     kinematics
         Which flow has this rate; None is simple shear, for which a scalar is enough.
     control
@@ -59,6 +62,7 @@ class FlowProtocol(eqx.Module):
     frequencies: Float[Array, " c"]
     phases: Float[Array, " c"]
     begins: Float[Array, ""] = eqx.field(default=0.0, converter=jnp.asarray)
+    cycle: Float[Array, "2"] = eqx.field(default=(0.0, 0.0), converter=jnp.asarray)
     kinematics: Kinematics | None = None
     control: Control = eqx.field(static=True, default="rate")
     modulus: RecordedQuantity | None = eqx.field(static=True, default=None)

@@ -94,7 +94,8 @@ def make_grid(
     recorded = rates[max(int(np.searchsorted(knots, 0.0, side="right")) - 1, 0) :]
     table = np.max(np.abs(recorded if steady.size else rates))
     rest = _relaxation(times) if begins < 0.0 and not np.any(recorded) else ()
-    anchors = np.unique(np.concatenate([[begins, 0.0], times, kinks, before, steady, rest]))
+    cycle = np.asarray(protocol.cycle)
+    anchors = np.unique(np.concatenate([[begins, 0.0], times, kinks, before, steady, rest, cycle]))
     intensity = 1.0 if protocol.kinematics is None else float(protocol.kinematics.intensity)
     fastest = intensity * (table + np.sum(np.abs(np.asarray(protocol.amplitudes))))
     waves = np.asarray(protocol.frequencies)[np.asarray(protocol.amplitudes) != 0.0]

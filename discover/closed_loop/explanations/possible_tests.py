@@ -148,8 +148,8 @@ def _creep(runs: Sequence[Run], relaxation_time: float) -> list[PossibleTest]:
     stress = 0.5 * stresses[fastest]
     times = np.geomspace(_SHORTEST * relaxation_time, _RELAXED * relaxation_time, _SAMPLES)
     imposed = np.full(_SAMPLES, stress)
-    # only sets the pace of integration
-    strain = rates[fastest] * (times + relaxation_time * _SHORTEST)
+    # only sets the pace of integration, which a creep of unknown speed must not make endless
+    strain = np.minimum(rates[fastest] * times, _STRAIN)
     run = Run(
         "creep", times, imposed_stress(times, imposed), np.zeros(_SAMPLES), imposed, strain=strain
     )

@@ -36,6 +36,9 @@ MOST = 6
 _LEAST_LIKELY = 0.02
 _MOST_EVIDENCE = 1e6
 
+_NOT_BELIEVED = 0.9
+"""Probability of none of them from which on it is idle to ask which one it is."""
+
 # What half the gap doubles: a velocity of slip, and a strain that the tool takes
 _BY_GAP = ("wall_slip", "tool_compliance")
 
@@ -48,7 +51,9 @@ def next_tests(
     runs: Sequence[Run],
     judgement: Judgement,
 ) -> NextTests:
-    """Return the tests that could be run, the most telling first; none for one explanation alone.
+    """Return the tests that could be run, the most telling first.
+
+    None for one explanation alone, or where it is hardly any of them.
 
     Parameters
     ----------
@@ -60,7 +65,7 @@ def next_tests(
         Of what the search chose.
     """
     contenders = _contenders(carried, explanations)
-    if len(contenders) < 2:
+    if len(contenders) < 2 or explanations.unexplained_probability > _NOT_BELIEVED:
         return NextTests()
     share = np.array([p for _, p in contenders])
     share = share / np.sum(share)

@@ -167,9 +167,9 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         """
         del y
         started = time.perf_counter()
-        runs = as_runs(X)
-        recipe = self._recipe()
         known = known_part(self)
+        runs = as_runs(X, known.relaxation_time)
+        recipe = self._recipe()
         problem = _problem(runs, known)
         if self.n_members < 1:
             raise InputError(f"n_members must be at least 1; got {self.n_members}.")

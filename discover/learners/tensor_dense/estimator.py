@@ -164,7 +164,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         del y
         started = time.perf_counter()
         self._check_parameters()
-        runs = as_runs(X)
+        runs = as_runs(X, known_part(self).relaxation_time)
         problem = self._problem(runs)
 
         def sizes(constants):
@@ -231,8 +231,8 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         For each run ``"sigma12"``, ``"N1"`` and ``"N2"``: lowest, middle and highest value in Pa at
         its samples, shape (3, n). None where laws of more than half of the weight run away.
         """
-        runs = as_runs(X)
         fluid = self.fluid_
+        runs = as_runs(X, fluid.relaxation_time)
         return self.laws_that_fit().bands(
             (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
             stack_protocols([run.protocol for run in runs]),

@@ -216,8 +216,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         started = time.perf_counter()
         self._check_parameters()
         library = build_library() if self.library is None else self.library
-        runs = as_runs(X)  # once, for it may be read only once
         known = known_part(self)
+        runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
         problem = make_problem(
             runs,
             library,

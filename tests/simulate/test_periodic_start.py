@@ -1,0 +1,148 @@
+"""A run whose oscillation had gone on for ever, against scipy after so many cycles that it had."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset import Run
+from discover.effects import make_effect
+from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.laws import Fluid, Giesekus
+from discover.protocols import (
+    after_alternation,
+    after_step_strain,
+    measured_rate,
+    oscillatory_shear,
+    settled,
+    shear_rates,
+    start_up,
+)
+from discover.simulate import simulate
+
+MODULUS, MOBILITY, FREQUENCY = 100.0, 0.3, 1.0
+PERIOD = 2.0 * np.pi / FREQUENCY
+TIMES = np.linspace(0.0, PERIOD, 65)
+
+
+def giesekus_after(cycles, time, strain):
+    """Return σ12 in Pa of a cycle, from rest that many cycles before, by scipy."""
+
+    def change(t, s):
+        rate = strain * FREQUENCY * np.cos(FREQUENCY * t)
+        a, b, c, d = s
+        squared = np.array([a * a + d * d, b * b + d * d, c * c, d * (a + b)])
+        flow = rate * np.array([2.0 * d, 0.0, 0.0, b + 1.0])
+        return flow - (s + MOBILITY * squared) / time
+
+    times = cycles * PERIOD + TIMES
+    found = solve_ivp(change, (0.0, times[-1]), np.zeros(4), t_eval=times, rtol=1e-9, atol=1e-11)
+    return MODULUS * found.y[3]
+
+
+def alternating(strain):
+    rate = oscillatory_shear(strain * FREQUENCY, FREQUENCY)
+    protocol = after_alternation(rate, PERIOD, TIMES)
+    return Run("swing", TIMES, protocol, shear_rates(rate, TIMES), np.ones(65))
+
+
+def predicted(declared, runs, **values):
+    model = AugmentedModel(declared, [make_effect(name) for name in values])
+    theta = model.zero()
+    for name, value in values.items():
+        theta[model.positions(name)] = value
+    return model.predict(theta, make_batch(runs, strain_step=0.1))
+
+
+@pytest.mark.parametrize(("time", "strain"), [(1.0, 3.0), (100.0, 3.0)])
+def test_a_slow_mode_is_periodic_from_the_first_sample(time, strain):
+    declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, time)
+    (found,) = predicted(declared, [alternating(strain)])
+    settled = giesekus_after(10 + int(12 * time / PERIOD), time, strain)
+    # steps of fourth order of a tenth of strain: 1e-5; scipy has settled to e⁻¹²
+    np.testing.assert_allclose(found, settled, atol=5e-5 * np.max(np.abs(settled)))
+    if time > PERIOD:
+        waited = giesekus_after(10, time, strain)
+        # what ten cycles of waiting leave: 16 %
+        assert np.linalg.norm(waited - settled) > 0.1 * np.linalg.norm(settled)
+
+
+def test_a_mode_of_a_thousand_periods_takes_no_more_than_a_fast_one():
+    # closed form: G ωλ/(1 + ω²λ²) (cos + ωλ sin)
+    time = 1000.0 * PERIOD
+    (found,) = predicted(DeclaredModel.maxwell(MODULUS, time), [alternating(2.0)])
+    x = FREQUENCY * time
+    wave = np.cos(FREQUENCY * TIMES) + x * np.sin(FREQUENCY * TIMES)
+    exact = 2.0 * MODULUS * x / (1.0 + x**2) * wave
+    np.testing.assert_allclose(found, exact, atol=1e-4 * np.max(exact))
+
+
+def test_a_structure_that_heals_over_many_cycles_is_periodic_too():
+    declared = DeclaredModel.maxwell(MODULUS, 1.0)
+    swing = alternating(2.0)
+    twice = Run(
+        "twice", np.linspace(0.0, 2.0 * PERIOD, 129), swing.protocol,
+        shear_rates(swing.protocol, np.linspace(0.0, 2.0 * PERIOD, 129)), np.ones(129),
+    )  # fmt: skip
+    # breaks down over strain, heals in 300 s: from rest it would take fifty cycles
+    model = AugmentedModel(declared, [make_effect("thixotropy")])
+    theta = model.zero()
+    theta[model.positions("thixotropy")] = [0.3, 300.0]
+    (found,) = model.predict(theta, make_batch([twice], strain_step=0.1))
+    assert np.ptp(found) > 0.0
+    np.testing.assert_allclose(found[:65], found[64:], atol=1e-4 * np.max(np.abs(found)))
+
+
+def test_runs_that_begin_otherwise_are_as_they_were_beside_it():
+    declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, 5.0)
+    times = np.linspace(0.1, 6.0, 40)
+    up = Run("up", times, start_up(1.0), np.ones(40), np.ones(40))
+    stepped = after_step_strain(start_up(0.0), 2.0, first=0.1)
+    step = Run("step", times, stepped, np.zeros(40), np.ones(40))
+    alone = predicted(declared, [up, step])
+    beside = predicted(declared, [alternating(1.0), up, step])[1:, :40]
+    np.testing.assert_allclose(beside, alone, rtol=1e-6)
+
+
+def test_a_record_in_samples_begins_as_the_wave_that_they_are_of():
+    declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, 100.0)
+    times = np.linspace(3.0, 3.0 + 2.0 * PERIOD, 257)
+    rates = np.cos(FREQUENCY * times)
+    protocol = after_alternation(measured_rate(times, rates), PERIOD, times)
+    run = Run("samples", times, protocol, rates, np.ones(257), rate_is_measured=True)
+    (found,) = predicted(declared, [run])
+    settled = giesekus_after(10 + int(12 * 100.0 / PERIOD), 100.0, 1.0)
+    exact = np.interp((times * FREQUENCY) % (2.0 * np.pi), TIMES, settled)
+    # straight lines between 128 samples, and 64 knots, a cycle
+    np.testing.assert_allclose(found, exact, atol=3e-3 * np.max(np.abs(settled)))
+    assert bool(jnp.all(protocol.cycle == jnp.array([3.0 - PERIOD, 3.0])))
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_learners_wait_until_the_slowest_mode_is_periodic(sampled):
+    time = 100.0
+    if sampled:
+        times = np.linspace(3.0, 3.0 + PERIOD, 257)
+        wave = measured_rate(times, 3.0 * np.cos(FREQUENCY * times))
+        begun = after_alternation(wave, PERIOD, times)
+    else:
+        times, begun = TIMES, alternating(3.0).protocol
+    protocol = settled(begun, time)
+    assert settled(protocol, time) is protocol
+    fluid = Fluid(Giesekus(MOBILITY), MODULUS, time)
+    found = simulate(fluid, protocol, times, rtol=1e-7).shear_stress
+    exact = giesekus_after(10 + int(12 * time / PERIOD), time, 3.0)
+    exact = np.interp((times * FREQUENCY) % (2.0 * np.pi), TIMES, exact)
+    # e⁻⁶ of what ten cycles leave, 16 %, and straight lines between samples
+    assert np.linalg.norm(found - exact) < 5e-3 * np.linalg.norm(exact)
+
+
+def test_a_learner_refuses_to_wait_for_thousands_of_cycles():
+    with pytest.raises(InputError, match="Use close-loop"):
+        settled(alternating(1.0).protocol, 1e4)
+
+
+def test_what_does_not_start_periodic_has_nothing_to_wait_for():
+    protocol = start_up(1.0)
+    assert settled(protocol, 1e6) is protocol
