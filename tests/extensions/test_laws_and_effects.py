@@ -7,6 +7,7 @@ import numpy as np
 LAW, EFFECT = "adding-a-law.md", "adding-an-effect.md"
 
 
+@pytest.mark.slow
 def test_the_law_of_the_page_is_listed_fitted_reported_and_exported(workplace):
     workplace.follow(LAW)
     listed = json.loads(workplace.run("laws", "--json").stdout)
@@ -76,6 +77,7 @@ for number, run in enumerate(list(data)[:4]):
     assert "Hang several known weights" in report
 
 
+@pytest.mark.slow
 def test_the_study_of_the_page_on_effects_runs_as_it_stands(workplace):
     workplace.follow(EFFECT)
     workplace.run("close-loop", workplace.study(EFFECT), "--out", "out", "--quiet")
