@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 LAW, EFFECT = "adding-a-law.md", "adding-an-effect.md"
 
