@@ -76,7 +76,8 @@ def other_times(
     carried, judgement
         Its explanations, and what is to be believed of what it chose.
     """
-    if _FACTOR_AT in search.fit.free or not (search.active or judgement.structured):
+    refuted = not judgement.carries_over  # by runs that no fit saw, of which a fit says nothing
+    if refuted or _FACTOR_AT in search.fit.free or not (search.active or judgement.structured):
         return []
     tried: dict[tuple[str, ...], tuple[np.ndarray, tuple[int, ...]]] = {}
     for one in carried[:_MOST]:
