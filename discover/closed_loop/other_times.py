@@ -13,7 +13,7 @@ from itertools import islice
 
 import numpy as np
 
-from discover.closed_loop.augment import INDISTINGUISHABLE, criterion, taken_out
+from discover.closed_loop.augment import BARE_MENTION, INDISTINGUISHABLE, criterion, taken_out
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judgement import Judgement
 from discover.closed_loop.search import Search
@@ -97,11 +97,14 @@ def other_times(
         prior=search.prior,
         rivals=True,
     )
-    return [
+    found = [
         _found(search, effects, fit)
         for effects, fit in zip(tried, fits, strict=True)
         if fit.usable and _inside(search, fit) and search.tolerated.explained(fit, effects)
     ]
+    # beside effects that do as well alone the factor does nothing
+    alone = {one.effects: _worth(search, one.cost, one.free, one.effects) for one in search.seen}
+    return [one for one in found if one.criterion < alone.get(one.effects, np.inf) - BARE_MENTION]
 
 
 def _inside(search: Search, fit: Fit) -> bool:
@@ -111,13 +114,17 @@ def _inside(search: Search, fit: Fit) -> bool:
 
 
 def _found(search: Search, effects: tuple[str, ...], fit: Fit) -> OtherTimes:
-    weight = np.asarray(search.batch.weight)
-    # as the explanations are weighed, from the samples that what the search chose leaves
-    effective = summarise(search.fit.residual, weight).effective_samples
-    cost = judged_cost(fit.residual, weight)
-    worth = criterion(cost, len(fit.free), len(effects) + 1, effective, search.n_candidates)
+    cost = judged_cost(fit.residual, np.asarray(search.batch.weight))
+    worth = _worth(search, cost, fit.free, (*effects, FACTOR))
     error = float(np.mean(fit.run_errors))
     return OtherTimes(float(np.exp(fit.theta[_FACTOR_AT])), effects, error, worth)
+
+
+def _worth(search: Search, cost: float, free: Sequence[int], effects: Sequence[str]) -> float:
+    """Return the criterion of a fit as the explanations are weighed: by what the search left."""
+    weight = np.asarray(search.batch.weight)
+    effective = summarise(search.fit.residual, weight).effective_samples
+    return criterion(cost, len(free), len(effects), effective, search.n_candidates)
 
 
 def held_against_times(
