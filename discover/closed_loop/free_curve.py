@@ -107,7 +107,8 @@ def nearest_form(
             continue
         for start in starts:
             try:
-                with warnings.catch_warnings():
+                # a trial of an exponent or a rate may leave the range of numbers
+                with warnings.catch_warnings(), np.errstate(all="ignore"):
                     # the values count, not their covariance
                     warnings.simplefilter("ignore", OptimizeWarning)
                     found, _ = curve_fit(

@@ -31,6 +31,7 @@ from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.law_choice import LawFit, choose_law
 from discover.closed_loop.next_test import NextTests
 from discover.closed_loop.numerical_resolution import NumericalResolution
+from discover.closed_loop.other_times import FACTOR, held_against_times, other_times
 from discover.closed_loop.result import (
     ConstantByMode,
     DeclaredEffect,
@@ -216,10 +217,6 @@ def run_loop(
     by_mode = constants_by_mode(model, batch, current, bounds, search.degrees, search.prior)
     differ = {name for name, found in by_mode.items() if found.degree}
     of_law = {p.name: by_mode[p.name] for p in declared.free_parameters if p.name in by_mode}
-    stages = tuple(
-        _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
-        for i, name in enumerate(active, start=1)
-    )
     after = errors_of(records, len(thetas) - 1)
     held = None
     if held_batch is not None:
@@ -232,6 +229,14 @@ def run_loop(
     if not silent and fluid_is_silent(model, batch, current, active):
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
+    times = other_times(search, carried, judgement) if carried else []
+    judgement, instead = held_against_times(judgement, active, carried, times)
+    for name in instead:
+        search.aliases[name] = (*search.aliases.get(name, ()), FACTOR)
+    stages = tuple(
+        _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
+        for i, name in enumerate(active, start=1)
+    )
     spikes = _with_later_ones(spikes, fitted_runs, judgement)
     side_by_side, forms, following = Explanations(), (), NextTests()
     if carried:
@@ -241,9 +246,10 @@ def run_loop(
         if judgement.structured and judgement.carries_over:
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
             forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
-        side_by_side = explain(model, batch, carried, current, runs, held_batch, judgement)
-        if len(side_by_side.likeliest_first) + len(carried) > 2:
-            say("which test would tell the explanations apart")
+        side_by_side = explain(
+            model, batch, carried, current, runs, held_batch, judgement,
+            min((one.criterion for one in times), default=np.inf),
+        )  # fmt: skip
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)

@@ -64,7 +64,6 @@ class AugmentedModel:
                 declared.law_name if free else "",
                 declared.parameters if free else (),
                 declared.fit_modulus,
-                declared.fit_relaxation_time,
                 tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
             )
         )

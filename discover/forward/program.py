@@ -58,7 +58,6 @@ class Structure(NamedTuple):
     law_name: str
     parameters: tuple[tuple[str, float], ...]
     fit_modulus: bool
-    fit_relaxation_time: bool
     by_mode: tuple[tuple[str, int, int], ...] = ()
     """Constants that may differ from mode to mode, and where what varies them begins and ends."""
 
@@ -315,12 +314,12 @@ class Program:
                 declared = numbers.modulus, numbers.relaxation_time
                 places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
         law = self._law(theta, numbers, places)
-        # factors that are not fitted stay constants: no trial and no derivative passes through
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
+        # a factor that is not fitted stays a constant: no trial and no derivative passes through
         if self.structure.fit_modulus:
             modulus = modulus * jnp.exp(theta[0])
-        if self.structure.fit_relaxation_time:
-            relaxation_time = relaxation_time * jnp.exp(theta[1])
+        # that on the times is tried where it is not fitted too
+        relaxation_time = relaxation_time * jnp.exp(theta[1])
         of_law = self._over_modes(lambda law, *flow: law.stress_rate(*flow))
         amplitudes = {
             e.name: self._varied(

@@ -8,6 +8,8 @@ with S the weighted sensitivities and Ω the covariance of the noise. Ω is esti
 residual as an autoregressive process (`noise_model`): a block bootstrap needs a refit for every
 draw, an effective sample size alone would shrink all directions alike, while slow noise spoils a
 slow signature more than a fast one.
+
+A combination of parameters that changes no sample is not determined, however small the noise.
 """
 
 from collections.abc import Sequence
@@ -17,6 +19,13 @@ from jaxtyping import Float, Int
 
 from discover.statistics.noise_model import NoiseModel, noise_model
 
+_UNSEEN = 1e-14
+"""Of the largest eigenvalue of SᵀS, its columns made of length one: below it is only rounding."""
+
+_OPEN = 100.0
+"""Standard deviation of what no sample sees, in units in which every column has length one: so far
+off, either of two parameters that cancel changes the residual a hundredfold of its unit."""
+
 
 def least_squares_covariance(
     columns: Float[np.ndarray, "rows p"],
@@ -24,6 +33,9 @@ def least_squares_covariance(
     sequences: Sequence[Int[np.ndarray, " _"]],
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
+
+    What no sample sees has no inverse: there (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C
+    is far larger than any finding.
 
     Parameters
     ----------
@@ -39,9 +51,12 @@ def least_squares_covariance(
     norms = np.linalg.norm(columns, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     scaled = columns / norms
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    seen = values > _UNSEEN * np.max(values, initial=0.0)
+    inverse = vectors[:, seen] / values[seen] @ vectors[:, seen].T
+    unseen = _OPEN**2 * vectors[:, ~seen] @ vectors[:, ~seen].T
     middle = sum(
         scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
     )
     sizes = np.outer(norms, norms)
-    return inverse @ middle @ inverse / sizes, inverse / sizes, noise
+    return (inverse @ middle @ inverse + unseen) / sizes, inverse / sizes, noise

@@ -191,6 +191,21 @@ def test_a_missing_sweep_a_copy_and_a_file_left_over_are_told(folder):
     assert any("steady.csv is not named" in f.text for f in findings)
 
 
+@pytest.mark.parametrize(
+    ("index", "told"),
+    [
+        ("file,temperature_C\nr0.csv,25\nr1.csv,45\n", True),
+        ("file,temperature_C\nr0.csv,25.2\nr1.csv,24.8\n", False),
+        ("file,temperature_C\nr0.csv,25\nr1.csv,\n", False),
+        ("file,temperature_C,time_factor\nr0.csv,25,1\nr1.csv,45,3\n", False),
+    ],
+    ids=["two temperatures", "one", "one told", "shifted"],
+)
+def test_runs_at_several_temperatures_are_told_unless_their_times_are_shifted(folder, index, told):
+    found = check_folder(folder(start_up(), start_up(2.0), runs__csv=index))
+    assert ("temperature" in subjects(found)) is told
+
+
 def test_the_clock_column_is_told_when_it_is_not_used(folder):
     root = folder(start_up(), runs__csv="file,time_factor\nr0.csv,3\n")
     assert "clock" in subjects(check_folder(root), "note")

@@ -26,6 +26,7 @@ def explain(
     runs: tuple[Sequence[Run], Sequence[Run]],
     held_batch: Batch | None,
     judgement: Judgement,
+    unlisted: float = np.inf,
 ) -> Explanations:
     """Return the explanations that were carried, with their probabilities and errors.
 
@@ -41,6 +42,8 @@ def explain(
         These, as the model has them, if there are any.
     judgement
         Of what the search chose. Where it is no signal, nothing is explained.
+    unlisted
+        Criterion of what explains the records and is no set of effects, if anything does.
     """
     if judgement.verdict == "no_signal":
         return Explanations()
@@ -50,7 +53,7 @@ def explain(
         records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
     errors = [errors_of(records, i) for i in range(len(thetas))]
     effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
-    return explanations_of(model, carried, errors, judgement, effective)
+    return explanations_of(model, carried, errors, judgement, effective, unlisted)
 
 
 def with_band(

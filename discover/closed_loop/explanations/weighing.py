@@ -26,6 +26,7 @@ def explanations_of(
     errors: Sequence[ErrorPair],
     judgement: Judgement,
     effective_samples: float,
+    unlisted: float = np.inf,
 ) -> Explanations:
     """Return the probabilities of what was carried, twins merged, the likeliest first.
 
@@ -39,13 +40,16 @@ def explanations_of(
         Of what the search chose; the explanations together are believed as far as that is.
     effective_samples
         Independent samples of what it leaves.
+    unlisted
+        Criterion of what explains the records and is none of them.
     """
     classes = _classes(carried)
-    best = min(one.criterion for one in carried)
+    best = min(unlisted, *(one.criterion for one in carried))
     # a class counts once, however many spellings the library has for it
     weights = np.array([np.exp(-0.5 * (carried[c[0]].criterion - best)) for c in classes])
     none = unexplained_probability(judgement, effective_samples)
-    shares = (1.0 - none) * weights / np.sum(weights)
+    shares = (1.0 - none) * weights / (np.sum(weights) + np.exp(-0.5 * (unlisted - best)))
+    none = 1.0 - float(np.sum(shares))
     found = [
         Explanation(
             carried[members[0]].effects,

@@ -1,4 +1,4 @@
-"""Doubts about runs held against one another: a unit that is another in one of them."""
+"""Doubts about runs held against one another: another unit in one of them, or temperature."""
 
 from collections.abc import Iterator, Sequence
 
@@ -12,6 +12,10 @@ from discover.protocols.kinematics import KINDS
 # Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
 # band) stays within this factor
 _UNIT_FACTOR = 30.0
+
+_ONE_TEMPERATURE = 2.0
+"""In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11), so that less than this is within
+the gain and the noise of most records."""
 
 
 def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
@@ -29,6 +33,30 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
     """
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
         yield from _among_alike([r for r in runs if r.flow == kind and _is_start_up(r)])
+
+
+def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
+    """Yield that runs at several temperatures are taken for those of one fluid, if they are.
+
+    Parameters
+    ----------
+    runs
+        Those whose times nobody has shifted to one temperature, with ``temperature_C`` of runs.csv.
+    """
+    told = {run.name: run.metadata.get("temperature_C") for run in runs}
+    known = {name: float(t) for name, t in told.items() if isinstance(t, int | float)}
+    if not known or max(known.values()) - min(known.values()) <= _ONE_TEMPERATURE:
+        return
+    coldest, hottest = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
+    yield Finding(
+        "warning",
+        "temperature",
+        "",
+        f"{coldest} was measured at {known[coldest]:g} °C and {hottest} at {known[hottest]:g} °C, "
+        "and relaxation times change by some per cent a degree: one law for both looks like a "
+        "missing effect. Fit the runs of one temperature ([data] fit), or shift their times to one "
+        "and name the column of the factors ([data] clock_factor).",
+    )
 
 
 def _among_alike(start_ups: Sequence[Run]) -> Iterator[Finding]:

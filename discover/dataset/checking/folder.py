@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from discover.dataset import units
-from discover.dataset.checking.among_runs import doubts_among_runs
+from discover.dataset.checking.among_runs import doubts_among_runs, doubts_of_temperature
 from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
@@ -121,6 +121,8 @@ def check_folder(
         findings += doubts
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
+    if clock_factor is None and not _shift_columns(index):
+        findings += doubts_of_temperature(runs)
     try:
         tables, aside = read_material_functions(root, index.columns["file"])
     except InputError as error:
@@ -146,18 +148,22 @@ def check_folder(
     return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
 
 
+def _shift_columns(index: Table) -> list[str]:
+    """Return the columns by which times may have been shifted to one temperature."""
+    return [name for name in index.columns if name.lower() in _CLOCK_WORDS]
+
+
 def _clock(index: Table, column: str | None) -> Iterator[Finding]:
     if column is None:
-        for name in index.columns:
-            if name.lower() in _CLOCK_WORDS:
-                yield Finding(
-                    "note",
-                    "clock",
-                    INDEX_FILE,
-                    f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
-                    f'temperature, write clock_factor = "{name}" in the study, so that effects of '
-                    "the instrument are looked for on the instrument's clock.",
-                )
+        for name in _shift_columns(index):
+            yield Finding(
+                "note",
+                "clock",
+                INDEX_FILE,
+                f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
+                f'temperature, write clock_factor = "{name}" in the study, so that effects of '
+                "the instrument are looked for on the instrument's clock.",
+            )
         return
     try:
         factors = read_clock_factors(index, column)

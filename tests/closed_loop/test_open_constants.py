@@ -1,0 +1,40 @@
+"""Constants that the records leave open are said to be open, however small the noise."""
+
+import numpy as np
+from independent.folders import write_table
+
+import discover as dc
+
+NOISE, MODULUS, TIME = 0.01, 100.0, 1.0
+BASE = dc.Fluid(dc.make_law("ucm"), 30.0, 0.5)
+
+
+def constants(folder, observe):
+    """Return the intervals of modulus and time from the steady states of a Maxwell fluid."""
+    rates = np.geomspace(0.05, 20.0, 40)
+    # upper convected Maxwell: σ12 = Gλγ̇ and N1 = 2G(λγ̇)²   [Bird, Armstrong & Hassager 1987, 4.2]
+    steady = np.stack([MODULUS * TIME * rates, 2.0 * MODULUS * (TIME * rates) ** 2])
+    noise = np.random.default_rng(0).standard_normal((2, 40))
+    stress, first = steady * (1.0 + NOISE * noise)
+    write_table(
+        folder / "flow_curve.csv", {"shear_rate_1_s": rates, "stress_Pa": stress, "N1_Pa": first}
+    )
+    data = dc.load_dataset(folder).with_material_functions()
+    if "N1" in observe:
+        data = data.quantity_by_quantity()
+    free = ["modulus_Pa", "relaxation_time_s"]
+    loop = dc.close_loop(data, BASE, free=free, effects=["stress_offset"], explanations=1)
+    assert loop.verdict == "no_effect_needed"
+    return [loop.declared_parameters[name].ci95 for name in free]
+
+
+def test_a_flow_curve_of_constant_viscosity_leaves_modulus_and_time_open(tmp_path):
+    for (low, high), truth in zip(constants(tmp_path, ["sigma12"]), (MODULUS, TIME), strict=True):
+        assert low < 1e-2 * truth < 1e2 * truth < high
+
+
+def test_with_its_normal_stress_both_are_told(tmp_path):
+    found = constants(tmp_path, ["sigma12", "N1"])
+    for (low, high), truth in zip(found, (MODULUS, TIME), strict=True):
+        assert low < truth < high
+        assert high - low < 0.05 * truth

@@ -1,0 +1,43 @@
+"""What no sample tells apart has no narrow interval, and what it does keeps its own."""
+
+import numpy as np
+import pytest
+
+from discover.statistics import least_squares_covariance
+
+NOISE = 0.01
+
+
+def deviations(second):
+    """Return the standard deviations of two amplitudes, (SᵀS)⁻¹ and S, with this second column."""
+    times = np.linspace(0.0, 5.0, 60)
+    columns = np.column_stack([np.sin(times), second(times)])
+    residual = NOISE * np.random.default_rng(0).standard_normal(60)
+    covariance, inverse, _ = least_squares_covariance(columns, residual, [np.arange(60)])
+    return np.sqrt(np.diag(covariance)), inverse, columns
+
+
+@pytest.mark.parametrize("second", [np.sin, lambda t: 3.0 * np.sin(t), np.zeros_like])
+def test_an_amplitude_that_another_cancels_is_open_however_small_the_noise(second):
+    found, inverse, _ = deviations(second)
+    assert found[1] > 1e2 * NOISE
+    # the pseudo-inverse, with which a known parameter is put in, stays finite and small
+    assert np.max(np.abs(inverse)) < 1.0
+
+
+def test_amplitudes_that_differ_keep_the_textbook_deviation():
+    found, _, columns = deviations(np.cos)
+    expected = NOISE * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    # the noise is estimated from 60 samples: its size is known to a tenth
+    np.testing.assert_allclose(found, expected, rtol=0.3)
+
+
+def test_what_two_that_cancel_do_together_keeps_its_deviation():
+    times = np.linspace(0.0, 5.0, 60)
+    columns = np.column_stack([np.sin(times), np.sin(times)])
+    residual = NOISE * np.random.default_rng(0).standard_normal(60)
+    covariance, *_ = least_squares_covariance(columns, residual, [np.arange(60)])
+    alone, *_ = least_squares_covariance(columns[:, :1], residual, [np.arange(60)])
+    together = np.ones(2) @ covariance @ np.ones(2)
+    # 58 and 59 degrees of freedom
+    assert together == pytest.approx(alone[0, 0], rel=0.03)
