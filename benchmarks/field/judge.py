@@ -91,7 +91,9 @@ def percent(error: float | None) -> str:
     """Return an error in percent; a dash where nothing is predicted."""
     if error is None:
         return "–"
-    return "runs away" if not np.isfinite(error) else f"{100 * error:.2g} %"
+    if not np.isfinite(error):
+        return "runs away"
+    return f"{100 * error:.2g} %" if error < 0.995 else f"{100 * error:.0f} %"
 
 
 def _middle(errors: Sequence[float | None]) -> str:
