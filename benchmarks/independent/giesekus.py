@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import Modes, StressLaw, rate_tensor, stretched
+from independent.material import Modes, Rate, StressLaw, rate_tensor, stretched
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Giesekus(StressLaw):
     modulus: float = 1.0
     relaxation_time: float = 1.0
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
         relaxing = stress + self.mobility / self.modulus * stress @ stress
         production = self.modulus * rate_tensor(rate) + stretched(stress, rate)

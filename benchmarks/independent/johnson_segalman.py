@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import StressLaw, rate_tensor
+from independent.material import Rate, StressLaw, rate_tensor, velocity_gradient
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class JohnsonSegalman(StressLaw):
     modulus: float = 1.0
     relaxation_time: float = 1.0
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
-        vorticity = np.zeros((3, 3))
-        vorticity[0, 1], vorticity[1, 0] = rate / 2, -rate / 2
+        gradient = velocity_gradient(rate)
+        vorticity = (gradient - gradient.T) / 2
         deformation = rate_tensor(rate) / 2
         turned = vorticity @ stress - stress @ vorticity
         carried = (1 - self.slip) * (deformation @ stress + stress @ deformation)

@@ -9,6 +9,9 @@ import numpy as np
 
 from independent.flow import Flow
 
+Rate = float | np.ndarray
+"""Shear rate in 1/s, or a whole velocity gradient L in 1/s, shape (3, 3), of any flow."""
+
 TOLERANCE = 1e-9
 """Tolerance of the integrator, relative, and absolute in the scale of each state."""
 
@@ -51,11 +54,11 @@ class RateLaw(Material):
         return np.ones(len(self.rest()))
 
     @abstractmethod
-    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
-        """Return the time derivative of the state at a shear rate in 1/s, shape (m,)."""
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
+        """Return the time derivative of the state at a rate, shape (m,)."""
 
     @abstractmethod
-    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the extra stress tensor in Pa, shape (3, 3)."""
 
     def respond(self, flow: Flow, times: np.ndarray) -> Stresses:
@@ -70,6 +73,17 @@ class RateLaw(Material):
         return differences(
             [self.stress(state, rate) for state, rate in zip(states, rates, strict=True)]
         )
+
+    def pull(self, rate: float, times: np.ndarray) -> np.ndarray:
+        """Return σ11 − σ22 in Pa in uniaxial extension from rest at a Hencky rate in 1/s."""
+        gradient = rate * np.diag([1.0, -0.5, -0.5])
+        states = integrate(
+            lambda _, state: self.change(state, gradient),
+            self.rest(),
+            np.asarray(times, float),
+            scale=self.scale(),
+        )
+        return differences([self.stress(state, gradient) for state in states]).N1
 
 
 def integrate(
@@ -116,18 +130,25 @@ def differences(tensors: Sequence[np.ndarray]) -> Stresses:
     return Stresses(s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2])
 
 
-def stretched(tensor: np.ndarray, rate: float) -> np.ndarray:
-    """Return L·T + T·Lᵀ with L_12 = γ̇, shape (3, 3)."""
-    turned = np.zeros((3, 3))
-    turned[0] = rate * tensor[1]
+def velocity_gradient(rate: Rate) -> np.ndarray:
+    """Return L, shape (3, 3); of a shear rate, L_12 = γ̇."""
+    if np.ndim(rate):
+        return np.asarray(rate)
+    gradient = np.zeros((3, 3))
+    gradient[0, 1] = rate
+    return gradient
+
+
+def stretched(tensor: np.ndarray, rate: Rate) -> np.ndarray:
+    """Return L·T + T·Lᵀ of a symmetric T, shape (3, 3)."""
+    turned = velocity_gradient(rate) @ tensor
     return turned + turned.T
 
 
-def rate_tensor(rate: float) -> np.ndarray:
+def rate_tensor(rate: Rate) -> np.ndarray:
     """Return L + Lᵀ, shape (3, 3)."""
-    tensor = np.zeros((3, 3))
-    tensor[0, 1] = tensor[1, 0] = rate
-    return tensor
+    gradient = velocity_gradient(rate)
+    return gradient + gradient.T
 
 
 class StressLaw(RateLaw):
@@ -141,15 +162,15 @@ class StressLaw(RateLaw):
         """Return the modulus, nine times."""
         return np.full(9, self.modulus)
 
-    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt, flattened."""
         return self.stress_change(state.reshape(3, 3), rate).ravel()
 
     @abstractmethod
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt in Pa/s, shape (3, 3)."""
 
-    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the state as a tensor."""
         del rate
         return state.reshape(3, 3)
@@ -171,13 +192,13 @@ class Modes(RateLaw):
         """Return the scales, one after another."""
         return np.concatenate([law.scale() for law in self.laws])
 
-    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the time derivatives, one after another."""
         parts = np.split(state, self._cuts)
         changes = [law.change(p, rate) for law, p in zip(self.laws, parts, strict=True)]
         return np.concatenate(changes)
 
-    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the sum of the stresses."""
         parts = np.split(state, self._cuts)
         tensors = [law.stress(p, rate) for law, p in zip(self.laws, parts, strict=True)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from independent.flow import Flow
-from independent.material import RateLaw, Stresses, StressLaw, rate_tensor, stretched
+from independent.material import Rate, RateLaw, Stresses, StressLaw, rate_tensor, stretched
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class UpperConvectedMaxwell(StressLaw):
     modulus: float = 1.0  # G, Pa
     relaxation_time: float = 1.0  # λ, s
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
         return (
             self.modulus * rate_tensor(rate)

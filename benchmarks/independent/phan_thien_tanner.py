@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from independent.material import StressLaw, rate_tensor, stretched
+from independent.material import Rate, StressLaw, rate_tensor, stretched
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class PhanThienTanner(StressLaw):
     modulus: float = 1.0
     relaxation_time: float = 1.0
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
         argument = self.extensibility * np.trace(stress) / self.modulus
         factor = 1 + argument if self.kind == "linear" else np.exp(argument)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import RateLaw, StressLaw, rate_tensor, stretched
+from independent.material import Rate, RateLaw, StressLaw, rate_tensor, stretched, velocity_gradient
 
 
 @dataclass(frozen=True)
@@ -25,11 +25,11 @@ class PomPom(RateLaw):
         """Return A = I/3 and Λ = 1."""
         return np.append(np.eye(3).ravel() / 3, 1.0)
 
-    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dA/dt and dΛ/dt."""
         a, stretch = state[:9].reshape(3, 3), state[9]
         turned = stretched(a, rate) - (a - np.eye(3) / 3) / self.relaxation_time
-        drawn = stretch * rate * a[0, 1] / np.trace(a)
+        drawn = stretch * np.sum(velocity_gradient(rate) * a) / np.trace(a)
         # far outside (0, q) only in trial steps of the integrator
         fast = np.exp(min(2 / self.arms * (stretch - 1), 50.0))
         grown = drawn - (stretch - 1) * fast / self.stretch_time
@@ -37,7 +37,7 @@ class PomPom(RateLaw):
             grown *= min(max((self.arms - stretch) / (0.02 * self.arms), 0.0), 1.0)
         return np.append(turned.ravel(), grown)
 
-    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return 3 G Λ² S − G I."""
         del rate
         a = state[:9].reshape(3, 3)
@@ -58,7 +58,7 @@ class ExtendedPomPom(StressLaw):
     modulus: float = 1.0
     relaxation_time: float = 1.0  # λ_b, s
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
         g, a = self.modulus, self.anisotropy
         square = stress @ stress

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import RateLaw, stretched
+from independent.material import Rate, RateLaw, stretched, velocity_gradient
 
 
 @dataclass(frozen=True)
@@ -25,19 +25,19 @@ class RoliePoly(RateLaw):
         """Return A = I."""
         return np.eye(3).ravel()
 
-    def change(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dA/dt."""
         a, one = state.reshape(3, 3), np.eye(3)
         change = stretched(a, rate) - (a - one) / self.relaxation_time
         if self.stretch_time == 0.0:
-            retraction = 2 / 3 * rate * a[0, 1]
+            retraction = 2 / 3 * np.sum(velocity_gradient(rate) * a)
             return (change - retraction * (a + self.release * (a - one))).ravel()
         trace = max(np.trace(a), 1e-12)  # below 3 only in trial steps
         retraction = 2 / self.stretch_time * (1 - np.sqrt(3 / trace))
         released = self.release * (trace / 3) ** self.exponent
         return (change - retraction * (a + released * (a - one))).ravel()
 
-    def stress(self, state: np.ndarray, rate: float) -> np.ndarray:
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return G (A − I)."""
         del rate
         return self.modulus * (state.reshape(3, 3) - np.eye(3))

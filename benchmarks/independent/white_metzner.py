@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import StressLaw, rate_tensor, stretched
+from independent.material import Rate, StressLaw, rate_tensor, stretched
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,13 @@ class WhiteMetzner(StressLaw):
     modulus: float = 1.0
     relaxation_time: float = 1.0
 
-    def time_at(self, rate: float) -> float:
+    def time_at(self, rate: Rate) -> float:
         """Return λ(γ̇) in s."""
-        thinning = (self.factor * self.relaxation_time * abs(rate)) ** (1 - self.exponent)
+        size = np.sqrt(np.sum(rate_tensor(rate) ** 2) / 2)  # |γ̇| of any flow
+        thinning = (self.factor * self.relaxation_time * size) ** (1 - self.exponent)
         return self.relaxation_time / (1 + thinning)
 
-    def stress_change(self, stress: np.ndarray, rate: float) -> np.ndarray:
+    def stress_change(self, stress: np.ndarray, rate: Rate) -> np.ndarray:
         """Return dσ/dt."""
         production = self.modulus * rate_tensor(rate) + stretched(stress, rate)
         return production - stress / self.time_at(rate)

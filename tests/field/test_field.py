@@ -1,0 +1,75 @@
+"""The benchmark of the field: its judge, its data, and what it keeps."""
+
+import json
+import sys
+
+import field_table
+import numpy as np
+import pytest
+from field import Answer
+from field.cases import training
+from field.contestants import classical_fits, upper_convected_maxwell
+from field.judge import judged, worst_errors
+from independent import Giesekus, JohnsonSegalman, UpperConvectedMaxwell
+from independent.homogeneous import GiesekusFluid
+
+
+def test_a_law_in_the_list_is_named_and_its_normal_stresses_follow_but_not_without_a_fit():
+    fitted = judged(classical_fits, "Giesekus", seed=3)
+    assert fitted["law"] == "giesekus"
+    # 605 samples of 1 % noise determine one constant to better than 1 %
+    assert max(fitted["errors"].values()) < 0.01
+    nothing = judged(upper_convected_maxwell, "Giesekus", seed=3)
+    assert min(nothing["errors"][name] for name in ("sigma12", "N1", "tensile")) > 1.0
+
+
+def test_silence_is_no_error_and_running_away_is_the_largest():
+    def run_away(flow):
+        raise ArithmeticError(flow.name)
+
+    assert set(worst_errors(Answer(lambda _: {}), "Giesekus").values()) == {None}
+    assert set(worst_errors(Answer(run_away), "Giesekus").values()) == {np.inf}
+
+
+def test_who_sees_the_stress_sees_the_same_shear_stress():
+    whole, shear = (training("White–Metzner", 1, seen).records for seen in (True, False))
+    for one, other in zip(whole, shear, strict=True):
+        np.testing.assert_array_equal(one.sigma12, other.sigma12)
+        assert one.stress is not None
+        np.testing.assert_array_equal(one.stress, one.stress.swapaxes(1, 2))
+        assert other.stress is None
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.3])
+def test_extension_from_rest_is_the_closed_form(slip):
+    times, rate, carried = np.linspace(0.0, 3.0, 16), 0.4, (1.0 - slip) * 0.4
+
+    def component(growth, drive):  # s' = drive + (growth − 1) s, s(0) = 0
+        return drive * np.expm1((growth - 1.0) * times) / (growth - 1.0)
+
+    closed = component(2.0 * carried, 2.0 * rate) - component(-carried, -rate)
+    law = JohnsonSegalman(slip) if slip else UpperConvectedMaxwell()
+    np.testing.assert_allclose(law.pull(rate, times), closed, atol=1e-7)  # integrated to 1e-9
+
+
+def test_two_simulators_agree_in_extension():
+    times = np.linspace(0.1, 3.0, 16)
+    other = GiesekusFluid((1.0,), (1.0,), 0.3).recorded("uniaxial", lambda _: 1.0, times)
+    np.testing.assert_allclose(Giesekus(0.3).pull(1.0, times), other, atol=1e-6)
+
+
+def test_a_case_that_is_kept_is_not_run_again_and_is_in_the_table(tmp_path, monkeypatch, capsys):
+    errors = dict.fromkeys(("sigma12", "N1", "N2", "tensile"), 0.125)
+    row = {"law": "giesekus", "words": "kept", "errors": errors, "seconds": 7.0}
+    file = field_table.kept(tmp_path, "classical_fits", "Giesekus")
+    file.write_text(json.dumps(row), encoding="utf-8")
+    before = file.read_bytes()
+    asked = ["--contestants", "classical_fits", "--fluids", "Giesekus"]
+    monkeypatch.setattr(sys, "argv", ["field_table.py", "--out", str(tmp_path), *asked])
+    field_table.main()
+    assert file.read_bytes() == before
+    said = capsys.readouterr().out
+    assert (
+        "(1 of 8 fluids) | 12 % (12 %) | 12 % (12 %) | 12 % (12 %) | 12 % (12 %) | 1 | 0 |" in said
+    )
+    assert "upper convected Maxwell, nothing fitted | not run" in said
