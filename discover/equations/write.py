@@ -8,6 +8,7 @@ from discover.equations.equation import Equation
 from discover.equations.json_format import equation_to_json
 from discover.equations.latex_file import equation_latex
 from discover.equations.rheotool import rheotool_text
+from discover.equations.ufl import ufl_code
 from discover.errors import InputError
 
 
@@ -22,6 +23,7 @@ FORMATS: Mapping[str, Callable[[Equation], str]] = {
     "latex": equation_latex,
     "json": _json_text,
     "rheotool": rheotool_text,
+    "ufl": ufl_code,
 }
 """Functions that write an equation, by the name of the format."""
 

@@ -280,12 +280,12 @@ def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:
 
 
 def _law(result: LoopResult) -> str:
-    """Return the augmented law typeset; empty where it is no sum of library terms."""
+    """Return the augmented law typeset; empty where it cannot be written out."""
     try:
         equation = result.equation()
+        return law_element(equation.terms, equation.linear_relaxation, equation.named)
     except InputError:
         return ""
-    return law_element(equation.terms, equation.linear_relaxation)
 
 
 def _fold(fold: Fold) -> dict[str, Any]:
