@@ -285,6 +285,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
         judged_in = box_of(_numbers(r, time) for r in self.records if r.held_out)
         notes = [f"Verdict of the loop: {self.verdict}."]
         outside = [s.effect for s in self.stages if s.kind != "constitutive"]
+        added = len(outside) < len(self.stages)
         if outside:
             notes.append(
                 f"The record also holds {', '.join(outside)}, which is no part of the fluid and is "
@@ -299,7 +300,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             relaxation_time,
             fluid.law.linear_relaxation,
             float(fluid.solvent_viscosity),
-            title="Declared law with the constitutive effects that a closed loop added.",
+            title=f"Declared law{' with the constitutive effects' * added} of a closed loop.",
             notes=tuple(notes),
             tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
             named=named,

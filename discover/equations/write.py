@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from discover.equations.code import numpy_code, sympy_code
 from discover.equations.equation import Equation
+from discover.equations.in_a_solver import in_a_solver
 from discover.equations.json_format import equation_to_json
 from discover.equations.latex_file import equation_latex
 from discover.equations.rheotool import rheotool_text
@@ -52,6 +54,10 @@ def write_equation(
     """
     if form not in FORMATS:
         raise InputError(f"Unknown format {form!r}; write one of {', '.join(FORMATS)}.")
+    if form != "json":  # which holds what was found, and no more
+        said = in_a_solver(equation)
+        notes = () if said is None else (said.text,)
+        equation = replace(equation, notes=(*equation.notes, *notes))
     options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
     given = {name: value for name, value in options.items() if value is not None}
     if form == "rheotool":
