@@ -15,6 +15,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
+from discover.report.overlay import Overlay
 from discover.report.page import made_by, render
 from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.free_form import free_form_picture
@@ -43,6 +44,7 @@ def write_loop(
     study_text: str = "",
     run: dict | None = None,
     conditions: str = "",
+    overlays: Sequence[Overlay] = (),
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
@@ -60,6 +62,8 @@ def write_loop(
         What the page says of the run that made it, where that was no command.
     conditions
         Material and temperature, for the title.
+    overlays
+        Curves that the study asks for beside the models.
 
     Returns
     -------
@@ -67,8 +71,8 @@ def write_loop(
     """
     pictures = [
         waterfall_picture(result),
-        runs_picture(result),
-        lissajous_picture(result),
+        runs_picture(result, overlays),
+        lissajous_picture(result, overlays),
         free_form_picture(result),
         loop_residual_map(result),
         residual_picture(result),
@@ -84,7 +88,7 @@ def write_loop(
     content += "\n"
     folder.write("loop.json", content)
     folder.write("equations.tex", loop_tex(result))
-    predictions = write_predictions(loop_predictions(result), folder)
+    predictions = write_predictions(loop_predictions(result, overlays), folder)
     page = render(
         "loop.html",
         data={PREDICTIONS: predictions, "loop.json": content},
@@ -93,7 +97,7 @@ def write_loop(
         result=result,
         questions=QUESTIONS,
         sentences=loop_verdict(result),
-        error_rows=_error_rows(result),
+        error_rows=_error_rows(result) + [_overlay_row(result, one) for one in overlays],
         recorded=in_words(record.quantity for record in result.records),
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
@@ -120,6 +124,22 @@ def write_loop(
         ),
     )
     return folder.write("report.html", page)
+
+
+def _overlay_row(result: LoopResult, overlay: Overlay) -> dict[str, Any]:
+    """Return the mean error of an overlay where it covers a run."""
+    row: dict[str, Any] = {"model": f"overlay: {overlay.label}"}
+    for name, held_out in (("fit", False), ("held_out", True)):
+        errors = [
+            float(np.sqrt(np.mean((curve - r.measured) ** 2) / np.mean(r.measured**2)))
+            for r in result.records
+            if r.held_out is held_out
+            and (curve := overlay.of(r.name, r.quantity)) is not None
+            and np.all(np.isfinite(curve))
+            and np.any(r.measured)
+        ]
+        row |= {name: float(np.mean(errors)) if errors else None, f"{name}_range": errors}
+    return row
 
 
 def _error_rows(result: LoopResult) -> list[dict[str, Any]]:

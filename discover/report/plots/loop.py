@@ -8,11 +8,13 @@ from matplotlib.ticker import EngFormatter
 from discover.closed_loop import LoopResult, RunRecord
 from discover.closed_loop.reading import differences
 from discover.protocols.kinematics import MODULI
+from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE,
     GREEN,
     INK,
     NETWORK,
+    OVERLAY_STYLES,
     SPARSE,
     TRUTH,
     Picture,
@@ -73,8 +75,8 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
-def runs_picture(result: LoopResult) -> Picture:
-    """Return every run: measured, declared model, augmented model."""
+def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
+    """Return every run: measured, declared model, augmented model, and overlays."""
     records = result.records
     columns = min(4, len(records))
     rows = -(-len(records) // columns)
@@ -84,6 +86,7 @@ def runs_picture(result: LoopResult) -> Picture:
         for panel, record in zip(axes.ravel(), records, strict=False):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
+            draw_overlays(panel, record, overlays, record.along[1], slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -109,7 +112,9 @@ def runs_picture(result: LoopResult) -> Picture:
             drawing,
             "runs",
             "Every run in the window of the loop. Runs in orange were held out: no fit saw them."
-            + _what_is_drawn(records),
+            + _what_is_drawn(records)
+            + " Overlaid laws are the study's, fitted to nothing and without effects of the "
+            "instrument." * bool(overlays),
         )
 
 
@@ -148,6 +153,16 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
         color=_HELD if record.held_out else _FIT,
         label="augmented, held out" if record.held_out else "augmented, fitted",
     )  # fmt: skip
+
+
+def draw_overlays(
+    panel, record: RunRecord, overlays: Sequence[Overlay], along: np.ndarray, shown: Samples
+) -> None:
+    """Draw the curves that the study asks for in one run; arguments as in `draw_run`."""
+    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
+        curve = overlay.of(record.name, record.quantity)
+        if curve is not None:
+            panel.plot(along[shown], curve[shown], label=literal(overlay.label), **style)
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:

@@ -56,6 +56,12 @@ _LEARNER_STYLES: dict[str, dict[str, Any]] = {
 _OTHERS = (PURPLE, YELLOW, GREEN)
 """Colours of learners of users' own, in their order."""
 
+OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
+    {"color": colour, "linestyle": line, "linewidth": 1.3}
+    for colour, line in ((GREEN, "--"), (PURPLE, ":"), (YELLOW, "--"), (INK, ":"))
+)
+"""Of what a study asks to be drawn beside the rest, in its order."""
+
 TRUTH_STYLE = {"color": TRUTH, "linewidth": 1.3}
 BEFORE_STYLE = {"color": BEFORE, "linewidth": 1.0, "linestyle": "-."}
 
