@@ -29,6 +29,7 @@ from discover.report.plots.loop import (
 )
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import loop_residual_map
+from discover.report.plots.rivals import rivals_picture
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict, named
 from discover.report.wording import effect_title, percent, significant
@@ -76,6 +77,7 @@ def write_loop(
         free_form_picture(result),
         loop_residual_map(result),
         residual_picture(result),
+        rivals_picture(result),
         reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),

@@ -9,6 +9,7 @@ import pytest
 from standing_alone import stands_alone
 
 from discover.closed_loop import CandidateScore
+from discover.closed_loop.explanation import Explanation, Explanations
 from discover.closed_loop.result import (
     ConstantByMode,
     ErrorPair,
@@ -26,6 +27,7 @@ from discover.report.plots.cycles import in_last_cycle
 from discover.report.plots.loop import residual_picture, runs_picture
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
+from discover.report.plots.rivals import rivals_picture
 from discover.report.verdicts import QUESTIONS, loop_verdict
 from discover.study import RunFolder
 
@@ -364,3 +366,34 @@ def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
     two = (oscillating(), oscillating("held.csv", True))
     assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
     assert drawn.svg.count("deepest at") == 2
+
+
+def several_explanations():
+    """Two explanations of the same runs, the second a tenth too high."""
+    result = loop_result()
+    records = tuple(
+        replace(r, by_explanation=np.stack([r.predicted[-1], 1.1 * r.measured]))
+        for r in result.records
+    )
+    told = Explanations(
+        (
+            Explanation(("stress_gain",), 0.6, ErrorPair(0.01, 0.2), {}),
+            Explanation(("wall_slip",), 0.2, ErrorPair(0.1, 0.1), {}),
+        ),
+        0.2,
+    )
+    return replace(result, records=records, explanations=told)
+
+
+def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found():
+    result = several_explanations()
+    drawn = rivals_picture(result)
+    assert drawn is not None
+    assert len(drawn.axes) == 2
+    assert drawn.axes[0]["y"] == drawn.axes[1]["y"]  # one scale
+    # the larger residual, a tenth of each run's size at its end, sets it
+    assert drawn.axes[0]["y"][1] > 10.0
+    assert "found by the search" in drawn.svg
+    # negative control: one explanation has no rival
+    one = replace(result.explanations, likeliest_first=result.explanations.likeliest_first[:1])
+    assert rivals_picture(replace(result, explanations=one)) is None

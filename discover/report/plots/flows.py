@@ -72,7 +72,8 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
             _mark_training(row[0], flow)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
-            for panel in row[1:]:
+            for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
+                _draw_band(panel, comparison, flow, quantity, last, along)
                 _frame(panel, comparison, flow, quantity, last)
             row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
@@ -140,6 +141,7 @@ def training_picture(comparison: Comparison) -> Picture:
                     panel.plot(
                         flow.times, prediction["sigma12"], label=learner_title(name), **style
                     )
+            _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
             if runs_through_decades(flow.times, flow.rate):
                 make_logarithmic(panel.xaxis)
@@ -172,15 +174,19 @@ _FITTING_AS_WELL = {
 }
 
 
-def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
-    """Shade what the data leave open: the intervals of the parameters, rivals, and members."""
+def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
+    """Shade what the data leave open: the intervals of the parameters, rivals, and members.
+
+    Against time, or against what is given of the samples shown.
+    """
+    along = flow.times[shown] if along is None else along
     for name, label in _FITTING_AS_WELL.items():
         outcome = comparison.outcomes.get(name)
         limits = None if outcome is None else outcome.bands.get(flow.key)
         if limits is not None:
             low, high = limits[quantity]
             panel.fill_between(
-                flow.times[shown],
+                along,
                 low[shown],
                 high[shown],
                 color=learner_style(name)["color"],
@@ -193,7 +199,7 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) 
         return
     column = QUANTITIES.index(quantity)
     panel.fill_between(
-        flow.times[shown],
+        along,
         band.rivals_low[shown, column],
         band.rivals_high[shown, column],
         color=SPARSE,

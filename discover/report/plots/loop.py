@@ -31,7 +31,9 @@ from discover.report.wording import FIGURE_SYMBOLS, effect_title, percent, recor
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
 
-_FIT, _HELD = NETWORK, SPARSE
+FIT_COLOUR, HELD_COLOUR = NETWORK, SPARSE
+"""Of runs fitted and held out."""
+
 THOUSANDS = 1e4
 """In Pa, from which digits would crowd an axis."""
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
@@ -135,7 +137,8 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     if record.band is not None and record.is_transient:
         low, high = record.band[:, shown]
         panel.fill_between(
-            along[shown], low, high, color=_HELD if record.held_out else _FIT, alpha=0.18, lw=0,
+            along[shown], low, high, alpha=0.18, lw=0,
+            color=HELD_COLOUR if record.held_out else FIT_COLOUR,
             label="95 % of measurements, all explanations",
         )  # fmt: skip
     panel.plot(
@@ -150,7 +153,7 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
         return
     panel.plot(
         along[shown], record.predicted[-1][shown], lw=1.5,
-        color=_HELD if record.held_out else _FIT,
+        color=HELD_COLOUR if record.held_out else FIT_COLOUR,
         label="augmented, held out" if record.held_out else "augmented, fitted",
     )  # fmt: skip
 
@@ -219,7 +222,7 @@ def residual_picture(result: LoopResult) -> Picture:
             for place, record in enumerate(records):
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
-                    "color": _HELD if record.held_out else _FIT,
+                    "color": HELD_COLOUR if record.held_out else FIT_COLOUR,
                     "lw": 0.9,
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
@@ -257,7 +260,7 @@ def reading_picture(result: LoopResult) -> Picture | None:
     """Return on what the residual depends, before and after."""
     readings = [(result.readings[0], "declared", BEFORE)]
     if result.stages:
-        readings.append((result.readings[1], "augmented", _FIT))
+        readings.append((result.readings[1], "augmented", FIT_COLOUR))
     if not readings[0][0].collapses:
         return None
     waves = any(reading.waves for reading, _, _ in readings)
@@ -297,7 +300,9 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
         panel.set_visible(False)
         return
     values = varied[name]
-    for (model, label), colour in zip(models_of(result.records), (BEFORE, _FIT), strict=False):
+    for (model, label), colour in zip(
+        models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
+    ):
         label = label.removesuffix(" model")
         errors = [100.0 * float(record.errors[model]) for record in result.records]
         panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
@@ -326,10 +331,10 @@ def waterfall_picture(result: LoopResult) -> Picture:
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
         positions = np.arange(len(labels))
-        series = [("fitted runs", _FIT, [p.fit for p in pairs], -0.19)]
+        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19)]
         held_out = [p.held_out for p in pairs if p.held_out is not None]
         if len(held_out) == len(pairs):
-            series.append(("held-out runs", _HELD, held_out, 0.19))
+            series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
@@ -403,7 +408,7 @@ def run_error_picture(result: LoopResult) -> Picture:
         panel = axes[0, 0]
         for position, record in enumerate(records[::-1]):
             before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
-            colour = _HELD if record.held_out else _FIT
+            colour = HELD_COLOUR if record.held_out else FIT_COLOUR
             panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
             panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
             label = "augmented, held out" if record.held_out else "augmented, fitted"
