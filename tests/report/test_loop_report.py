@@ -24,7 +24,7 @@ from discover.effects import make_effect
 from discover.report.loop_report import _noise_range, write_loop
 from discover.report.page import render
 from discover.report.plots.cycles import in_last_cycle
-from discover.report.plots.loop import residual_picture, runs_picture
+from discover.report.plots.loop import residual_picture, run_error_picture, runs_picture
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
 from discover.report.plots.rivals import rivals_picture
@@ -298,7 +298,7 @@ def without_stages():
 
 def test_nothing_is_called_augmented_where_nothing_was_added():
     with_stage, without = loop_result(), without_stages()
-    for draw in (runs_picture, residual_picture, loop_residual_map):
+    for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
         assert "augmented" in draw(with_stage).svg
         assert "augmented" not in draw(without).svg
         assert "declared" in draw(without).svg
@@ -397,3 +397,12 @@ def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found()
     # negative control: one explanation has no rival
     one = replace(result.explanations, likeliest_first=result.explanations.likeliest_first[:1])
     assert rivals_picture(replace(result, explanations=one)) is None
+
+
+def test_a_short_axis_of_errors_has_a_number_to_read():
+    """From 23 to 47 % there is neither a decade nor a 2 or a 5."""
+    result = without_stages()
+    sizes = zip(result.records, (0.23, 0.47), strict=True)
+    records = tuple(replace(r, errors=np.array([e])) for r, e in sizes)
+    drawn = run_error_picture(replace(result, records=records)).svg
+    assert {"30", "40"} <= set(re.findall(r">(\d+)</text>", drawn))

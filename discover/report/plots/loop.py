@@ -402,20 +402,23 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
 
 
 def run_error_picture(result: LoopResult) -> Picture:
-    """Return the error of every run before and after."""
+    """Return the error of every run before and after, or of the declared model alone."""
     records = result.records
+    model = "augmented" if any(len(r.errors) > 1 for r in records) else "declared"
     with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
         panel = axes[0, 0]
         for position, record in enumerate(records[::-1]):
             before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
             colour = HELD_COLOUR if record.held_out else FIT_COLOUR
             panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
-            panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
-            label = "augmented, held out" if record.held_out else "augmented, fitted"
+            if model == "augmented":
+                panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
+            label = f"{model}, {'held out' if record.held_out else 'fitted'}"
             panel.plot(after, position, "o", color=colour, label=label)
         panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
         panel.set_ylim(-0.6, len(records) - 0.4)
         make_percentage(panel.xaxis)
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
-        return picture(drawing, "run_errors", "Residual by run: error before and after.")
+        told = "before and after" if model == "augmented" else "of the declared model"
+        return picture(drawing, "run_errors", f"Residual by run: error {told}.")
