@@ -1,6 +1,7 @@
 r"""Terms as LaTeX: bold tensors, centred dots for contractions, ``\operatorname{tr}``."""
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tensor_library.notation import Notation, greek_letter, printed
@@ -51,7 +52,9 @@ class LatexNotation(Notation[str]):
 
     def letter(self, name: str) -> str:
         """Return a Greek letter, or the name in upright letters."""
-        return rf"\{name}" if greek_letter(name) else rf"\mathrm{{{name}}}"
+        if greek_letter(name):
+            return rf"\{name}"
+        return r"\mathrm{" + name.replace("_", r"\_") + "}"
 
     def exponential(self, rate: str, trace: str) -> str:
         """Return the bracketed exponential minus one."""
@@ -61,13 +64,19 @@ class LatexNotation(Notation[str]):
         """Return a fraction."""
         return rf"\frac{{{trace}}}{{1 + {level} \, \left|{trace}\right|}}"
 
-    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
-        """Return the expression as SymPy typesets it, bracketed where it is a sum."""
+    def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
+        """Return the expression as SymPy typesets it."""
         import sympy
 
-        number = _bracketed(parameter) if " " in parameter else parameter
-        text, brackets = printed(expression, _bracketed(trace), number, sympy.latex)
-        return _bracketed(text) if brackets else text
+        def printer(found: Any) -> str:
+            # thin spaces as between the factors of a term; a power is one of the whole letter
+            text = sympy.latex(found, mul_symbol=r" \, ")
+            return re.sub(r"scalar[a-z]of(?=\^)", lambda one: _bracketed(one[0]), text)
+
+        times = r" \times "
+        known = {n: _bracketed(one) if times in one else one for n, one in letters.items()}
+        text, is_sum = printed(expression, known, printer)
+        return _bracketed(text) if factor and is_sum else text
 
     def product(self, factors: Sequence[str]) -> str:
         """Return the factors with thin spaces between them."""

@@ -6,7 +6,7 @@ brackets. A notation only says how it writes a tensor, a product or a bracket.
 
 import unicodedata
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
@@ -52,8 +52,16 @@ class Notation(ABC, Generic[T]):
         """Return trace/(1 + level |trace|), as a factor."""
 
     @abstractmethod
+    def scalar(self, expression: Any, letters: Mapping[str, T], factor: bool = False) -> T:
+        """Return a SymPy expression with `letters` for its symbols; bracketed to be a factor."""
+
     def function(self, expression: Callable[[Any, Any], Any], trace: T, parameter: T) -> T:
         """Return a closed form of a user's own, given as a SymPy expression, as a factor."""
+        import sympy
+
+        symbols = sympy.symbols("trace parameter", real=True)
+        found = sympy.sympify(expression(*symbols))
+        return self.scalar(found, {"trace": trace, "parameter": parameter}, factor=True)
 
     @abstractmethod
     def product(self, factors: Sequence[T]) -> T:
@@ -61,20 +69,19 @@ class Notation(ABC, Generic[T]):
 
 
 def printed(
-    expression: Callable[[Any, Any], Any],
-    trace: str,
-    parameter: str,
+    expression: Any,
+    letters: Mapping[str, str],
     printer: Callable[[Any], str],
     placeholder: str = "{}",
 ) -> tuple[str, bool]:
-    """Return an expression as a printer of SymPy writes it, with given texts for its two symbols.
+    """Return an expression as a printer of SymPy writes it, with given texts for its symbols.
 
     Parameters
     ----------
     expression
-        Of the trace of the stress and the inner parameter.
-    trace, parameter
-        What stands for them.
+        Over symbols.
+    letters
+        What stands for them, by their names.
     printer
         Takes an expression and returns text.
     placeholder
@@ -86,17 +93,19 @@ def printed(
     """
     import sympy
 
-    symbols = sympy.symbols("traceofstress innerparameter", real=True)
-    found = sympy.sympify(expression(*symbols))
-    text = printer(found)
-    for symbol, instead in zip(symbols, (trace, parameter), strict=True):
-        text = text.replace(placeholder.format(symbol.name), instead)
-    return text, found.is_Add or found.could_extract_minus_sign()
+    symbols = sorted(expression.free_symbols, key=str)
+    # letters alone: printers make accents and indices of what names end in
+    stand_ins = [sympy.Symbol(f"scalar{chr(97 + i)}of", real=True) for i in range(len(symbols))]
+    text = printer(expression.xreplace(dict(zip(symbols, stand_ins, strict=True))))
+    for symbol, stand_in in zip(symbols, stand_ins, strict=True):
+        text = text.replace(placeholder.format(stand_in.name), letters[symbol.name])
+    return text, expression.is_Add or expression.could_extract_minus_sign()
 
 
 def greek_letter(name: str) -> str | None:
-    """Return the small Greek letter of this name, or None."""
+    """Return the Greek letter of this name, a capital one where the name begins so, or None."""
+    size = "CAPITAL" if name[:1].isupper() else "SMALL"
     try:
-        return unicodedata.lookup(f"GREEK SMALL LETTER {name.replace('lambda', 'lamda')}")
+        return unicodedata.lookup(f"GREEK {size} LETTER {name.lower().replace('lambda', 'lamda')}")
     except KeyError:
         return None

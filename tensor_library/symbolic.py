@@ -1,6 +1,6 @@
 """Terms as SymPy expressions over non-commuting tensors."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy
@@ -66,11 +66,11 @@ class SympyNotation(Notation[sympy.Expr]):
         """Return trace/(1 + level |trace|)."""
         return trace / (1 + level * sympy.Abs(trace))
 
-    def function(
-        self, expression: Callable[[Any, Any], Any], trace: sympy.Expr, parameter: sympy.Expr
+    def scalar(
+        self, expression: Any, letters: Mapping[str, sympy.Expr], factor: bool = False
     ) -> sympy.Expr:
         """Return the expression."""
-        return sympy.sympify(expression(trace, parameter))
+        return expression.xreplace({one: letters[one.name] for one in expression.free_symbols})
 
     def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
         """Return the product."""

@@ -107,9 +107,21 @@ def run_compare(
     from discover.comparison.run_comparison import compare
     from discover.report.comparison_report import write_comparison
     from discover.report.comparison_verdict import comparison_verdict
+    from discover.report.overlay import comparison_overlays, read_overlays
+    from discover.study.build import declared_model, load_study_data
 
+    sources = read_overlays(study)
     comparison = compare(study, seed, progress, folder, fit_constants=fit_declared)
-    write_comparison(comparison, folder, study.model.known_relaxation, study.text)
+    overlays = ()
+    if sources:
+        model = declared_model(study, load_study_data(study, seed).dataset)
+        fluid = model.fluid
+        if comparison.known is not None:
+            modes = np.array(comparison.known.modulus), np.array(comparison.known.relaxation_time)
+            fluid = replace(model, modulus=modes[0], relaxation_time=modes[1]).fluid
+        overlays = comparison_overlays(sources, comparison.flows, fluid)
+    relaxes = study.model.known_relaxation
+    write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
     return _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
 
 
@@ -131,10 +143,12 @@ def run_close_loop(
     from discover.closed_loop import run_loop, run_loop_on_each
     from discover.dataset.conditions import material_and_temperature
     from discover.report.loop_report import write_loop
+    from discover.report.overlay import loop_overlays, read_overlays
     from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, forward_model, load_study_data
 
     progress("loading data", 0.0)
+    sources = read_overlays(study)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
@@ -181,7 +195,10 @@ def run_close_loop(
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
     conditions = material_and_temperature(data_of_study.dataset)
-    write_loop(result, folder, study.name, summary, study.text, conditions=conditions)
+    overlays = loop_overlays(sources, result.records, data_of_study.dataset, model.fluid)
+    write_loop(
+        result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays
+    )
     ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
     return ended

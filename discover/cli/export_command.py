@@ -18,7 +18,7 @@ def export(
         typer.Argument(help="Folder that compare or close-loop has finished.", show_default=False),
     ],
     form: Annotated[
-        str, typer.Option("--format", "-f", help="python, sympy, latex, json or rheotool.")
+        str, typer.Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
     ] = "python",
     law: Annotated[
         str | None,
@@ -41,7 +41,7 @@ def export(
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
-    """Write a law that was found as Python, SymPy, LaTeX, JSON or a rheoTool dictionary."""
+    """Write a law that was found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
     from discover.equations.read import choose_law, read_result_laws
     from discover.equations.write import write_equation
     from discover.errors import InputError

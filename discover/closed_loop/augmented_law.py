@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect
-from discover.equations import effect_terms, law_terms
+from discover.equations import effect_terms
 from discover.laws import AbstractConstitutiveLaw
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
@@ -39,15 +39,33 @@ class AugmentedLaw(AbstractConstitutiveLaw):
             extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
         return extra
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[TermShare, ...] | None:
         """Return the terms of the declared law, then those of the effects.
+
+        None if the declared law is no sum of library terms.
 
         Raises
         ------
         InputError
-            If one of them is no sum of library terms.
+            If what an effect adds is none.
         """
-        found = law_terms(self.base)
-        for effect, values in zip(self.effects, self.values, strict=True):
-            found += effect_terms(effect, np.asarray(values))
-        return tuple(TermShare(t.term, t.coefficient, t.inner) for t in found)
+        below = self.base.as_terms()
+        return None if below is None else below + self._added_terms()
+
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[TermShare, ...]]:
+        """Return the declared law, and the terms of the effects.
+
+        Raises
+        ------
+        InputError
+            If what an effect adds is no sum of library terms.
+        """
+        core, terms = self.base.split()
+        return core, terms + self._added_terms()
+
+    def _added_terms(self) -> tuple[TermShare, ...]:
+        return tuple(
+            TermShare(term.term, term.coefficient, term.inner)
+            for effect, values in zip(self.effects, self.values, strict=True)
+            for term in effect_terms(effect, np.asarray(values))
+        )

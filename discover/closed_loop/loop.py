@@ -59,7 +59,7 @@ from discover.effects import (
     make_effect,
     named_effects,
 )
-from discover.equations import Equation, law_terms
+from discover.equations import Equation, law_parts
 from discover.errors import InputError
 from discover.forward import (
     MODULUS,
@@ -532,10 +532,10 @@ def _declared_effects(
 
 
 def _declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
-    """Return the declared law with its modes as fitted; None where it is no sum of terms."""
+    """Return the declared law with its modes as fitted; None where it cannot be written out."""
     law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     try:
-        terms = law_terms(law)
+        named, terms = law_parts(law)
     except InputError:
         return None
     return Equation(
@@ -544,6 +544,7 @@ def _declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
         tuple(map(float, declared.relaxation_time * np.exp(fit.theta[1]))),
         law.linear_relaxation,
         float(declared.solvent_viscosity),
+        named=named,
     )
 
 

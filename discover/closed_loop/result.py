@@ -19,11 +19,20 @@ from discover.closed_loop.law_choice import LawFit
 from discover.closed_loop.next_test import NextTests
 from discover.closed_loop.reading import Reading, read_residual
 from discover.closed_loop.run_record import RunRecord
-from discover.equations import Equation, HasEquation, Tested, equation_to_json, law_terms
+from discover.equations import (
+    Equation,
+    EquationTerm,
+    HasEquation,
+    NamedPart,
+    Tested,
+    equation_to_json,
+    law_parts,
+)
 from discover.equations.box import box_of, flow_numbers
 from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
 from discover.laws import Fluid
+from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
 
@@ -262,16 +271,10 @@ class LoopResult(PageView, HasEquation, NotebookView):
         Raises
         ------
         InputError
-            If an effect gives the fluid a state, or adds what is no sum of library terms.
+            If an effect gives the fluid a state, or adds what is no sum of library terms, or if
+            what it adds differs from mode to mode.
         """
         fluid = self.fluid
-        differing = self.differing_by_mode
-        if differing:
-            raise InputError(
-                f"{', '.join(differing)} differs from one relaxation mode to the next, so the law "
-                "cannot be written out as one equation for all. declared_parameters has the "
-                "constants of each mode."
-            )
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(
@@ -286,6 +289,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
         judged_in = box_of(_numbers(r, time) for r in self.records if r.held_out)
         notes = [f"Verdict of the loop: {self.verdict}."]
         outside = [s.effect for s in self.stages if s.kind != "constitutive"]
+        added = len(outside) < len(self.stages)
         if outside:
             notes.append(
                 f"The record also holds {', '.join(outside)}, which is no part of the fluid and is "
@@ -293,16 +297,44 @@ class LoopResult(PageView, HasEquation, NotebookView):
             )
         held_out = self.error_after.held_out
         errors = {} if held_out is None else {"sigma12 (mean over runs)": held_out}
+        named, terms = self._parts(fluid)
         return Equation(
-            law_terms(fluid.law),
+            terms,
             modulus,
             relaxation_time,
             fluid.law.linear_relaxation,
             float(fluid.solvent_viscosity),
-            title="Declared law with the constitutive effects that a closed loop added.",
+            title=f"Declared law{' with the constitutive effects' * added} of a closed loop.",
             notes=tuple(notes),
             tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
+            named=named,
         )
+
+    def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[EquationTerm, ...]]:
+        """Return the law of the fluid with a name, if it needs one, and its terms."""
+        differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
+        if not differing:
+            return law_parts(fluid.law)
+        core, added = fluid.law.split()
+        named = name_of(core)
+        known = {} if named is None else named[1]
+        # what an effect adds is the same sum in all modes; of a mode beside the declared ones
+        # nothing was said
+        if (
+            named is None
+            or set(differing) - set(known)
+            or fluid.n_modes != len(next(iter(differing.values())))
+        ):
+            raise InputError(
+                f"{', '.join(differing)} differs from one relaxation mode to the next, and the law "
+                "with it cannot be written out: only constants of a law with a name can, without "
+                "an added mode. loop.json has the constants of each mode."
+            )
+        constants = tuple(
+            known | {name: modes[k].value for name, modes in differing.items()}
+            for k in range(fluid.n_modes)
+        )
+        return NamedPart(named[0], constants), tuple(EquationTerm(*one) for one in added)
 
     @cached_property
     def readings(self) -> tuple[Reading, Reading]:

@@ -37,6 +37,8 @@ class RunRecord:
         ``loss_modulus`` in Pa, or ``strain``.
     band
         Where 95 % of the measurements should lie by all explanations together, shape (2, n).
+    by_explanation
+        What each explanation predicts, in the order of their probability, shape (explanations, n).
     control
         What was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
         strain and rate of an oscillation are amplitudes.
@@ -56,6 +58,7 @@ class RunRecord:
     quantity: str = "sigma12"
     band: Float[np.ndarray, "2 n"] | None = None
     control: Control = "rate"
+    by_explanation: Float[np.ndarray, "explanations n"] | None = None
 
     def line(self) -> dict[str, Any]:
         """Return the run as one line of a table: its errors, the declared model's first."""

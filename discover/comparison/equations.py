@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from discover.comparison.flows import QUANTITIES, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
-from discover.equations import Equation, EquationTerm, Tested, combined, law_terms
+from discover.equations import Equation, EquationTerm, Tested, combined, law_parts
 from discover.equations.box import box_of, flow_numbers
 from discover.errors import InputError
 from discover.learners.registry import learner_title
@@ -18,9 +18,9 @@ _PROJECTION = (
 
 
 def known_equation(model: DeclaredModel) -> Equation | None:
-    """Return the known part of a study as an equation; None where it is no sum of terms."""
+    """Return the known part of a study as an equation; None where it cannot be written out."""
     try:
-        terms = law_terms(model.law)
+        named, terms = law_parts(model.law)
     except InputError:
         return None
     return Equation(
@@ -29,6 +29,7 @@ def known_equation(model: DeclaredModel) -> Equation | None:
         tuple(float(time) for time in model.relaxation_time),
         model.law.linear_relaxation,
         float(model.solvent_viscosity),
+        named=named,
     )
 
 

@@ -1,9 +1,10 @@
-"""Laws as they leave this package: SymPy, LaTeX, JSON, Python, rheoTool; and back."""
+"""Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool; and back."""
 
 from discover.equations.equation import Box, Equation, Tested
-from discover.equations.from_law import combined, effect_terms, law_terms
+from discover.equations.from_law import combined, effect_terms, law_parts, law_terms
 from discover.equations.has_equation import HasEquation
 from discover.equations.json_format import equation_from_json, equation_to_json
+from discover.equations.named_part import NamedPart
 from discover.equations.rheotool_reader import read_rheotool
 from discover.equations.term import EquationTerm
 from discover.equations.write import FORMATS, write_equation
@@ -14,11 +15,13 @@ __all__ = [
     "Equation",
     "EquationTerm",
     "HasEquation",
+    "NamedPart",
     "Tested",
     "combined",
     "effect_terms",
     "equation_from_json",
     "equation_to_json",
+    "law_parts",
     "law_terms",
     "read_rheotool",
     "write_equation",

@@ -2,72 +2,92 @@
 
 The text is put together from tables and from `repr` of numbers; no name of a file or study reaches
 it except in comments. Matrices of numpy and of SymPy share ``@`` and ``trace()``, so that one table
-serves both.
+serves both; UFL, in a file of its own, changes a few entries of it.
 """
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.latex_file import header_lines
-from discover.equations.term import EquationTerm
 from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
 
-class _CodeNotation(Notation[str]):
-    """What the numpy text and the SymPy text share."""
+class CodeNotation(Notation[str]):
+    """numpy, and what the other texts in Python share with it."""
 
     def tensor(self, name: str) -> str:
+        """Return the variable that holds the tensor."""
         return {"I": "unit", "sigma": "s", "gammadot": "d"}[name]
 
     def contraction(self, tensors: Sequence[str]) -> str:
+        """Return the matrix product."""
         return " @ ".join(tensors)
 
     def sum(self, summands: Sequence[str]) -> str:
+        """Return the bracketed sum."""
         return f"({' + '.join(summands)})"
 
     def trace(self, tensor: str) -> str:
+        """Return a call of the method of matrices."""
         return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
 
     def power(self, scalar: str, exponent: int) -> str:
+        """Return the power."""
         return f"{scalar} ** {exponent}"
 
     def number(self, value: float) -> str:
+        """Return all digits of a number, bracketed if negative."""
         return f"({float(value)!r})" if value < 0 else repr(float(value))
 
     def letter(self, name: str) -> str:
-        raise ValueError(f"Code needs a number for {name}.")  # every EquationTerm has one
+        """Refuse: every term of an equation has its numbers."""
+        raise ValueError(f"Code needs a number for {name}.")
 
     def exponential(self, rate: str, trace: str) -> str:
-        # the cap is that of tensor_library.closed_forms: beyond it a law is absurd, not infinite
+        """Return exp − 1 with the cap of the library: beyond it a law is absurd, not infinite."""
         return f"np.expm1(min({rate} * {trace}, 60.0))"
 
     def saturating(self, level: str, trace: str) -> str:
+        """Return the bracketed fraction."""
         return f"({trace} / (1 + {level} * abs({trace})))"
 
-    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
-        from sympy.printing.numpy import NumPyPrinter
-
-        text, _ = printed(expression, trace, parameter, lambda e: str(NumPyPrinter().doprint(e)))
-        return f"({text.replace('numpy.', 'np.')})"
+    def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
+        """Return the expression as SymPy prints it."""
+        text, _ = printed(expression, letters, self._text)
+        return f"({text})" if factor else text
 
     def product(self, factors: Sequence[str]) -> str:
+        """Return the product."""
         return " * ".join(factors)
 
+    def _text(self, expression: Any) -> str:
+        from sympy.printing.numpy import NumPyPrinter
 
-class _SympyCodeNotation(_CodeNotation):
+        class Printer(NumPyPrinter):
+            def _print_Max(self, expr: Any) -> str:  # of numbers, not of arrays
+                return f"max({', '.join(map(self._print, expr.args))})"
+
+        return str(Printer().doprint(expression)).replace("numpy.", "np.")
+
+
+class _SympyCodeNotation(CodeNotation):
     def exponential(self, rate: str, trace: str) -> str:
         return f"(sympy.exp({rate} * {trace}) - 1)"
 
     def saturating(self, level: str, trace: str) -> str:
         return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
 
-    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
+    def _text(self, expression: Any) -> str:
         from sympy.printing.pycode import SymPyPrinter
 
-        text, _ = printed(expression, trace, parameter, lambda e: str(SymPyPrinter().doprint(e)))
-        return f"({text})"
+        class Printer(SymPyPrinter):
+            def _print_Max(self, expr: Any) -> str:
+                return f"sympy.Max({', '.join(map(self._print, expr.args))})"
+
+        return re.sub(r"sympy\.functions(\.\w+)+\.", "sympy.", str(Printer().doprint(expression)))
 
 
 _NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.
@@ -88,12 +108,12 @@ MODULUS_PA = np.array({modulus})
 RELAXATION_TIME_S = np.array({time})
 SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
+{constants}
 
-
-def extra_term(s, d):
+def extra_term(s, d{mode}):
     """Return h, dimensionless, shape (3, 3), of scaled stress s and scaled rate d."""
     unit = np.eye(3)
-    return {extra}
+{where}    return {extra}
 
 
 def stress_rate(stress, velocity_gradient):
@@ -106,7 +126,7 @@ def stress_rate(stress, velocity_gradient):
     for k, (modulus, time) in enumerate(zip(MODULUS_PA, RELAXATION_TIME_S)):
         s, gradient = stress[k] / modulus, time * velocity_gradient
         d = gradient + gradient.T
-        change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d)
+        change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode})
         rate[k] = modulus / time * change
     return rate
 
@@ -157,7 +177,8 @@ _SYMPY_TEMPLATE = '''"""Constitutive law in SymPy, written by discover. Needs sy
 
 `extra_term` is h, 3 by 3, in the components of the scaled stress s = stress_k / G_k and of the
 scaled rate d = L + L^T with L = lambda_k * velocity_gradient. `stress_rate` is ds/dt with time in
-lambda_k. Every mode obeys the same law; `modes` holds pairs of G_k in Pa and lambda_k in s.
+lambda_k. Every mode obeys the same law, but for constants in `values`, where there are some.
+`modes` holds pairs of G_k in Pa and lambda_k in s.
 """
 
 import sympy
@@ -173,43 +194,104 @@ unit = sympy.eye(3)
 modes = {modes}
 solvent_viscosity_Pa_s = {solvent}
 tested = {tested}
-
-extra_term = {extra}
+{constants}
+{where}extra_term = {extra}
 stress_rate = d + gradient @ s + s @ gradient.T{relaxation} - extra_term
 '''
 
 
 def numpy_code(equation: Equation) -> str:
-    """Return a module with the law as a function of numpy arrays."""
-    return _NUMPY_TEMPLATE.format(
+    """Return a module with the law as a function of numpy arrays.
+
+    Raises
+    ------
+    InputError
+        If the equation has a named law of which nobody said how it is written.
+    """
+    return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))")
+
+
+def sympy_code(equation: Equation) -> str:
+    """Return a module with the law as SymPy expressions in components.
+
+    Raises
+    ------
+    InputError
+        As for `numpy_code`.
+    """
+    named = equation.named
+    constants = ""
+    if named is not None and named.function.constants:
+        letters = [f'"{n}": sympy.Symbol("{n}", real=True)' for n in named.function.constants]
+        constants = (
+            f"constant = {{{', '.join(letters)}}}\n"
+            "# of each mode: stress_rate.subs(values[0])\n"
+            "values = [\n    {constant[n]: v for n, v in one.items()}\n"
+            f"    for one in {_constants(equation)}\n]\n"
+        )
+    return filled(
+        _SYMPY_TEMPLATE, equation, _SympyCodeNotation(), "sympy.zeros(3, 3)", constants, ""
+    )
+
+
+def filled(
+    template: str,
+    equation: Equation,
+    notation: CodeNotation,
+    nothing: str,
+    constants: str | None = None,
+    indent: str = "    ",
+) -> str:
+    """Return a module: a template with the law in a notation.
+
+    Parameters
+    ----------
+    template
+        With the fields below.
+    equation, notation
+        What to write, and how.
+    nothing
+        h where there is none.
+    constants
+        What holds the constants of a named law; by default a list of one table for each mode.
+    indent
+        Of the lines before h.
+    """
+    named = equation.named
+    pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
+    lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
+    where, table = "", ""
+    if named is not None:
+        function = named.function
+        letters = {name: f'constant["{name}"]' for name in function.constants}
+        defined, summands = function.spell(notation, letters | {n: n for n in function.where})
+        where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
+        lines = summands + lines
+        table = f"CONSTANTS = {_constants(equation)}\n"
+        if indent:
+            where = f"{indent}constant = CONSTANTS[mode]\n" + where
+    return template.format(
         header="\n".join(header_lines(equation)) or "No record of where it was tested.",
         relaxation=" - s" if equation.linear_relaxation else "",
         modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
-        solvent=repr(float(equation.solvent_viscosity)),
-        tested=_tested(equation),
-        extra=_sum(equation.terms, _CodeNotation(), "np.zeros((3, 3))"),
-    )
-
-
-def sympy_code(equation: Equation) -> str:
-    """Return a module with the law as SymPy expressions in components."""
-    pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
-    return _SYMPY_TEMPLATE.format(
-        header="\n".join(header_lines(equation)) or "No record of where it was tested.",
-        relaxation=" - s" if equation.linear_relaxation else "",
         modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
         solvent=repr(float(equation.solvent_viscosity)),
         tested=_tested(equation),
-        extra=_sum(equation.terms, _SympyCodeNotation(), "sympy.zeros(3, 3)"),
+        constants=table if constants is None else constants,
+        mode=", mode=0" if named else "",
+        of_mode=", k" if named else "",
+        where=where,
+        extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
     )
 
 
-def _sum(terms: Sequence[EquationTerm], notation: _CodeNotation, nothing: str) -> str:
-    if not terms:
-        return nothing
-    lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in terms]
-    return "(\n        " + "\n        + ".join(lines) + "\n    )"
+def _constants(equation: Equation) -> str:
+    """Return the constants of the named law, one table for each mode."""
+    assert equation.named is not None
+    each = [equation.named.of_mode(k) for k in range(len(equation.modulus))]
+    rows = [", ".join(f'"{n}": {float(v)!r}' for n, v in one.items()) for one in each]
+    return "[" + ", ".join(f"{{{row}}}" for row in rows) + "]"
 
 
 def _numbers(values: Sequence[float]) -> str:

@@ -1,7 +1,7 @@
 """A law as it leaves this package: terms, modes, and where it was tested."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,9 +9,10 @@ import pandas as pd
 
 from discover.equations.latex import law_latex
 from discover.equations.mathml import law_element
+from discover.equations.named_part import NamedPart
 from discover.equations.term import EquationTerm, Interval
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion, law_of_terms
+from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.notebook_view import NotebookView
 
@@ -87,6 +88,9 @@ class Equation(NotebookView):
         Where the law comes from, and what its user has to know.
     tested
         Where it was learned and judged; None where unknown.
+    named
+        A law that is no sum of terms, to whose h the terms are added; its constants may differ from
+        mode to mode. None for UCM.
 
     Examples
     --------
@@ -107,6 +111,7 @@ class Equation(NotebookView):
     title: str = ""
     notes: tuple[str, ...] = ()
     tested: Tested | None = None
+    named: NamedPart | None = None
 
     def __post_init__(self):
         numbers = [*self.modulus, *self.relaxation_time]
@@ -117,15 +122,36 @@ class Equation(NotebookView):
         values = [v for t in self.terms for v in (t.coefficient, *t.inner.values())]
         if not np.all(np.isfinite([*values, self.solvent_viscosity])):
             raise ValueError("Coefficients of an equation must be finite numbers.")
+        if self.named and len(self.named.constants) not in (1, len(self.modulus)):
+            raise ValueError("An equation needs constants once for all modes, or once for each.")
 
     @property
     def mean_relaxation_time(self) -> float:
         """λ̄ = Σ G λ² / Σ G λ in s, the time in Wi and De."""
         return mean_relaxation_time(self.modulus, self.relaxation_time)
 
-    def law(self) -> LibraryExpansion:
-        """Return h as a law that can be simulated, dimensionless."""
-        law: AbstractConstitutiveLaw | None = None
+    def mode(self, number: int) -> "Equation":
+        """Return the equation of one mode alone, counted from 0, without the solvent."""
+        named = self.named
+        return replace(
+            self,
+            modulus=(self.modulus[number],),
+            relaxation_time=(self.relaxation_time[number],),
+            solvent_viscosity=0.0,
+            named=None if named is None else NamedPart(named.law, (named.of_mode(number),)),
+        )
+
+    def law(self) -> AbstractConstitutiveLaw:
+        """Return h as a law that can be simulated, dimensionless.
+
+        Raises
+        ------
+        InputError
+            If constants differ from mode to mode.
+        """
+        law = None if self.named is None else self.named.built()
+        if law is not None and not self.terms:
+            return law
         # one expansion has one value of each inner parameter; terms that differ stack
         groups: list[tuple[dict[str, float], list[EquationTerm]]] = []
         for term in self.terms:
@@ -144,30 +170,40 @@ class Equation(NotebookView):
                 self.linear_relaxation,
                 law,
             )
-        assert isinstance(law, LibraryExpansion)
+        assert law is not None
         return law
 
     def fluid(self) -> Fluid:
-        """Return the fluid, with units, ready to simulate."""
+        """Return the fluid, with units, ready to simulate.
+
+        Raises
+        ------
+        InputError
+            If constants differ from mode to mode.
+        """
         return Fluid(self.law(), self.modulus, self.relaxation_time, self.solvent_viscosity)
 
     def sympy(self) -> "sympy.Expr":
         """Return h as a SymPy expression over non-commuting tensors."""
         from discover.equations.symbolic import extra_term_expression
 
-        return extra_term_expression(self.terms)
+        return extra_term_expression(self.terms, self.named)
 
     def latex(self) -> str:
         """Return the dimensionless law as one LaTeX equation."""
-        return law_latex(self.terms, self.linear_relaxation)
+        return law_latex(self.terms, self.linear_relaxation, named=self.named)
 
     def modes_table(self) -> pd.DataFrame:
-        """Return G_k in Pa and λ_k in s, one line for each mode."""
-        return pd.DataFrame({"G_Pa": self.modulus, "lambda_s": self.relaxation_time})
+        """Return G_k in Pa and λ_k in s, one line for each mode, and what differs by mode."""
+        table = pd.DataFrame({"G_Pa": self.modulus, "lambda_s": self.relaxation_time})
+        if self.named is not None:
+            for name in self.named.differing:
+                table[name] = [one[name] for one in self.named.constants]
+        return table
 
     def _repr_html_(self) -> str:
         # markup of this package, not a sentence to be escaped
-        return law_element(self.terms, self.linear_relaxation) + super()._repr_html_()
+        return law_element(self.terms, self.linear_relaxation, self.named) + super()._repr_html_()
 
     def _shown(self) -> Iterable[Any]:
         if (self.modulus, self.relaxation_time) != ((1.0,), (1.0,)):

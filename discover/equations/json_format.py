@@ -5,6 +5,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from discover.equations.equation import Box, Equation, Tested
+from discover.equations.named_part import NamedPart
 from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.validation import Section, validated
@@ -38,6 +39,11 @@ class _Tested(Section):
     worst_errors: dict[str, float] = Field(default_factory=dict)
 
 
+class _Named(Section):
+    law: str = Field(max_length=200)
+    constants: tuple[dict[str, float], ...] = Field(min_length=1, max_length=1000)
+
+
 class _Law(Section):
     format: Literal["discover law 1"]
     title: str = ""
@@ -47,12 +53,15 @@ class _Law(Section):
     modes: tuple[_Mode, ...] = Field(min_length=1, max_length=1000)
     solvent_viscosity_Pa_s: float = Field(default=0.0, ge=0)
     tested: _Tested | None = None
+    named: _Named | None = None
 
 
 def equation_to_json(equation: Equation) -> dict[str, Any]:
     """Return an equation as JSON-able values; `equation_from_json` undoes it exactly."""
-    tested = equation.tested
-    return {
+    tested, named = equation.tested, equation.named
+    # only where there is one: results without stay as they were
+    below = {"law": named.law, "constants": [dict(c) for c in named.constants]} if named else None
+    return ({} if below is None else {"named": below}) | {
         "format": FORMAT,
         "title": equation.title,
         "notes": list(equation.notes),
@@ -101,7 +110,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
         law = validated(_Law, content, where)
     except InputError as error:
         raise InputError(f"{error} {again}") from None
-    tested = law.tested
+    tested, named = law.tested, law.named
     try:
         return Equation(
             terms=tuple(EquationTerm(t.term, t.coefficient, t.inner, t.ci95) for t in law.terms),
@@ -118,6 +127,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
                 None if tested.judged_in is None else tested.judged_in.box(),
                 tested.worst_errors,
             ),
+            named=None if named is None else NamedPart(named.law, named.constants),
         )
     except ValueError as error:
         raise InputError(f"{where}: {error} {again}") from None

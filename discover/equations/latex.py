@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from discover.equations.named_part import NamedPart
 from discover.equations.term import TermLike
 from tensor_library.latex import LatexNotation, latex_number
 from tensor_library.terms import parse_term
@@ -11,8 +12,16 @@ PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time ov
 """
 """First lines of a file with laws."""
 
+SEPARATOR = r", \qquad "
+"""Stands before each scalar that a law defines beside itself."""
 
-def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 5) -> str:
+
+def law_latex(
+    terms: Sequence[TermLike],
+    linear_relaxation: bool,
+    digits: int = 5,
+    named: NamedPart | None = None,
+) -> str:
     """Return a dimensionless law as one LaTeX equation.
 
     Parameters
@@ -23,11 +32,22 @@ def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 
         Whether the −σ is there beside h.
     digits
         Significant digits of the numbers.
+    named
+        A law with a name to whose h the terms are added.
     """
     text = r"\overset{\nabla}{\boldsymbol{\sigma}} = \dot{\boldsymbol{\gamma}}"
     if linear_relaxation:
         text += r" - \boldsymbol{\sigma}"
     notation = LatexNotation(digits)
+    defined: list[tuple[str, str]] = []
+    if named is not None:
+        spelled = latex_letters(named, notation)
+        defined, summands = named.function.spell(notation, spelled)
+        text += "".join(f" - {summand}" for summand in summands)
+        defined = [(spelled[name], value) for name, value in defined]
+        constants = named.constants[0].items()
+        fixed = [(spelled[n], v) for n, v in constants if n not in named.differing]
+        defined += [(letter, latex_number(value, digits)) for letter, value in fixed]
     letters: dict[str, float] = {}
     for term in terms:
         # a letter has one value in an equation; where it has another, that number stands itself
@@ -36,6 +56,21 @@ def law_latex(terms: Sequence[TermLike], linear_relaxation: bool, digits: int = 
         }
         sign = "-" if term.coefficient >= 0 else "+"
         text += f" {sign} {parse_term(term.term).spell(notation, abs(term.coefficient), other)}"
-    for name, value in letters.items():
-        text += rf", \qquad {notation.letter(name)} = {latex_number(value, digits)}"
-    return text
+    defined += [(notation.letter(n), latex_number(v, digits)) for n, v in letters.items()]
+    return text + "".join(f"{SEPARATOR}{letter} = {value}" for letter, value in defined)
+
+
+def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
+    """Return how LaTeX writes the constants and the defined scalars of a law with a name.
+
+    What differs from mode to mode has the index k.
+    """
+    function = named.function
+
+    def letter(name: str) -> str:
+        if name in function.letters:
+            return function.letters[name]
+        return name if len(name) == 1 else notation.letter(name)
+
+    found = {name: letter(name) for name in (*function.constants, *function.where)}
+    return found | {name: f"{found[name]}_{{k}}" for name in named.differing}

@@ -1,8 +1,9 @@
 """Terms of a law as MathML, which browsers typeset without any script."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from discover.equations.named_part import NamedPart
 from discover.equations.term import TermLike
 from tensor_library.notation import Notation, greek_letter, printed
 from tensor_library.terms import parse_term
@@ -11,6 +12,7 @@ _BOLD = '<mi mathvariant="normal" style="font-weight:bold">{}</mi>'
 # the combining dot sits well in every font, an accent over a letter only in mathematical ones
 _TENSORS = {"I": _BOLD.format("I"), "sigma": _BOLD.format("σ"), "gammadot": _BOLD.format("γ̇")}
 _APPLIED = "<mo>&#x2061;</mo>"
+_TRACE = f'<mi mathvariant="normal">tr</mi>{_APPLIED}'
 _SPACE = "<mspace width='0.15em'/>"
 
 
@@ -42,7 +44,7 @@ class MathmlNotation(Notation[str]):
 
     def trace(self, tensor: str) -> str:
         """Return tr of the bracketed contraction."""
-        return f'<mi mathvariant="normal">tr</mi>{_APPLIED}{_bracketed(tensor)}'
+        return f"{_TRACE}{_bracketed(tensor)}"
 
     def power(self, scalar: str, exponent: int) -> str:
         """Return the bracketed trace and its exponent: tr(σ)² could be taken for tr(σ²)."""
@@ -69,15 +71,19 @@ class MathmlNotation(Notation[str]):
         below = f"<mn>1</mn><mo>+</mo>{level}{_SPACE}{size}"
         return f"<mfrac><mrow>{trace}</mrow><mrow>{below}</mrow></mfrac>"
 
-    def function(self, expression: Callable[[Any, Any], Any], trace: str, parameter: str) -> str:
-        """Return the expression as SymPy typesets it, bracketed where it is a sum."""
+    def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
+        """Return the expression as SymPy typesets it."""
         import sympy
 
         def printer(found: Any) -> str:
             return sympy.mathml(found, printer="presentation")
 
-        text, brackets = printed(expression, _bracketed(trace), parameter, printer, "<mi>{}</mi>")
-        return _bracketed(text) if brackets else f"<mrow>{text}</mrow>"
+        known = {
+            name: _bracketed(text) if text.startswith(_TRACE) else text
+            for name, text in letters.items()
+        }
+        text, is_sum = printed(expression, known, printer, "<mi>{}</mi>")
+        return _bracketed(text) if factor and is_sum else f"<mrow>{text}</mrow>"
 
     def product(self, factors: Sequence[str]) -> str:
         """Return the factors with thin spaces between them."""
@@ -110,7 +116,9 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
     return f"<math>{term_mathml(name, inner)}</math>"
 
 
-def law_element(terms: Sequence[TermLike], linear_relaxation: bool) -> str:
+def law_element(
+    terms: Sequence[TermLike], linear_relaxation: bool, named: NamedPart | None = None
+) -> str:
     """Return the whole dimensionless law as a displayed `math` element."""
     stress, rate = _TENSORS["sigma"], _TENSORS["gammadot"]
     convected = f"<mover><mrow>{stress}</mrow><mo style='font-size:70%'>▽</mo></mover>"
@@ -120,5 +128,17 @@ def law_element(terms: Sequence[TermLike], linear_relaxation: bool) -> str:
         + term_mathml(t.term, t.inner, abs(t.coefficient))
         for t in terms
     )
-    right = f"<mo>=</mo>{rate}{relaxation}{extra}"
+    where = ""
+    if named is not None:
+        notation, function = MathmlNotation(), named.function
+        letters = {n: notation.letter(n) for n in (*function.constants, *function.where)}
+        defined, summands = function.spell(notation, letters)
+        extra = "".join(f"<mo>−</mo>{one}" for one in summands) + extra
+        first = named.constants[0]
+        fixed = [(n, number(first[n])) for n in first if n not in named.differing]
+        where = "".join(
+            f"<mo>,</mo><mspace width='1em'/>{letters[n]}<mo>=</mo>{value}"
+            for n, value in [*defined, *fixed]
+        )
+    right = f"<mo>=</mo>{rate}{relaxation}{extra}{where}"
     return f'<math display="block"><mrow>{convected}{right}</mrow></math>'

@@ -5,11 +5,10 @@ import re
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.from_law import EXPONENTIAL
-from discover.equations.rheotool import extension_factor
-from discover.equations.term import EquationTerm
+from discover.equations.from_law import law_parts
+from discover.equations.named_part import NamedPart
+from discover.equations.rheotool import extension_factor, rheotool_law, unit_of
 from discover.errors import InputError
-from discover.laws.fene_p import fene_p_terms
 
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 _TOKEN = re.compile(r"[{}()\[\];]|[^\s{}()\[\];]+")
@@ -41,20 +40,26 @@ def read_rheotool(text: str) -> Equation:
             raise InputError("multiMode needs models ( NAME { ... } ... );.")
     else:
         modes = [parameters]
-    read = [_mode(mode) for mode in modes]
-    terms = read[0][0]
-    if any(other != terms for other, *_ in read):
+    laws, constants, moduli, times, solvents = zip(*map(_mode, modes), strict=True)
+    if len(set(laws)) > 1:
         raise InputError("The modes have different laws; this package takes one law for all.")
+    named, terms = NamedPart(laws[0], constants), ()
+    if not named.differing:
+        # what is a sum of terms is written as one
+        named, found = law_parts(named.built())
+        terms = tuple(t for t in found if t.coefficient and t.inner.get("epsilon") != 0.0)
     return Equation(
         terms,
-        tuple(modulus for _, modulus, _, _ in read),
-        tuple(time for _, _, time, _ in read),
-        solvent_viscosity=sum(solvent for *_, solvent in read),
+        moduli,
+        times,
+        solvent_viscosity=sum(solvents),
         title="rheoTool constitutiveProperties",
+        named=named,
     )
 
 
-def _mode(entries: dict[str, Any]) -> tuple[tuple[EquationTerm, ...], float, float, float]:
+def _mode(entries: dict[str, Any]) -> tuple[str, dict[str, float], float, float, float]:
+    """Return law, constants, modulus, relaxation time and solvent viscosity of a mode."""
     kind = " ".join(_words(entries, "type"))
     limit = _number(entries, "L2") if kind == "FENE-P" else None
     if limit is not None and limit <= 3.0:
@@ -63,35 +68,38 @@ def _mode(entries: dict[str, Any]) -> tuple[tuple[EquationTerm, ...], float, flo
     time = time / extension_factor(limit)
     if viscosity <= 0 or time <= 0:
         raise InputError("etaP and lambda must be positive.")
-    terms: tuple[EquationTerm, ...]
+    modulus = viscosity / time
+
+    def value(name: str) -> float:
+        # without the last digits, so that what was the same in all modes still is
+        return float(f"{_number(entries, name) / unit_of(name, modulus, time):.14g}")
+
+    found: tuple[str, dict[str, float]] | None
     if kind == "Oldroyd-B":
-        terms = ()
+        found = "ucm", {}
     elif kind == "Giesekus":
-        terms = (EquationTerm("sigma.sigma", _number(entries, "alpha")),)
+        found = "giesekus", {"alpha": value("alpha")}
     elif kind == "PTT":
-        terms = _ptt(entries)
+        found = _ptt(entries)
     elif limit is not None:
-        terms = tuple(EquationTerm(*share) for share in fene_p_terms(1.0 / limit))
+        found = "fene_p", {"L2": limit}
     else:
+        found = rheotool_law(kind, value)
+    if found is None:
         raise InputError(
-            f"The type {kind[:60]!r} is not one of Oldroyd-B, Giesekus, PTT, FENE-P, multiMode."
+            f"The type {kind[:60]!r} is not one of Oldroyd-B, Giesekus, PTT, FENE-P, Rolie-Poly, "
+            "XPomPom, WhiteMetznerCY, Saramito, multiMode."
         )
-    return terms, viscosity / time, time, _number(entries, "etaS")
+    law, constants = found
+    return law, constants, modulus, time, _number(entries, "etaS")
 
 
-def _ptt(entries: dict[str, Any]) -> tuple[EquationTerm, ...]:
-    epsilon, zeta = _number(entries, "epsilon"), _number(entries, "zeta")
+def _ptt(entries: dict[str, Any]) -> tuple[str, dict[str, float]]:
     function = " ".join(_words(entries, "destructionFunctionType"))
     if function not in ("linear", "exponential"):
         raise InputError(f"destructionFunctionType {function[:60]!r} is not linear or exponential.")
-    terms = []
-    if epsilon and function == "linear":
-        terms.append(EquationTerm("tr(sigma)*sigma", epsilon))
-    elif epsilon:
-        terms.append(EquationTerm(EXPONENTIAL, 1.0, {"epsilon": epsilon}))
-    if zeta:
-        terms.append(EquationTerm("sigma.gammadot+gammadot.sigma", 0.5 * zeta))
-    return tuple(terms)
+    constants = {"epsilon": _number(entries, "epsilon"), "xi": _number(entries, "zeta")}
+    return f"ptt_{function}_non_affine", constants
 
 
 def _words(entries: dict[str, Any], key: str) -> list[str]:

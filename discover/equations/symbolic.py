@@ -4,15 +4,28 @@ from collections.abc import Sequence
 
 import sympy
 
+from discover.equations.named_part import NamedPart
 from discover.equations.term import TermLike
 from tensor_library.symbolic import SympyNotation
 from tensor_library.terms import parse_term
 
 
-def extra_term_expression(terms: Sequence[TermLike]) -> sympy.Expr:
-    """Return h as an expression over the non-commuting tensors of `tensor_library.symbolic`."""
+def extra_term_expression(terms: Sequence[TermLike], named: NamedPart | None = None) -> sympy.Expr:
+    """Return h as an expression over the non-commuting tensors of `tensor_library.symbolic`.
+
+    Constants of a named law that differ from mode to mode stay letters.
+    """
     total: sympy.Expr = sympy.Integer(0)
     notation = SympyNotation()
+    if named is not None:
+        letters = {name: sympy.Float(value) for name, value in named.constants[0].items()}
+        letters |= {name: sympy.Symbol(name) for name in named.differing}
+        function = named.function
+        letters |= {name: sympy.Symbol(name) for name in function.where}
+        where, summands = function.spell(notation, letters)
+        total = sympy.Add(*summands)
+        for name, value in reversed(where):
+            total = total.subs(letters[name], value)
     for term in terms:
         total = total + parse_term(term.term).spell(notation, term.coefficient, term.inner)
     return total

@@ -2,12 +2,15 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from discover.equations.code import numpy_code, sympy_code
 from discover.equations.equation import Equation
+from discover.equations.in_a_solver import in_a_solver
 from discover.equations.json_format import equation_to_json
 from discover.equations.latex_file import equation_latex
 from discover.equations.rheotool import rheotool_text
+from discover.equations.ufl import ufl_code
 from discover.errors import InputError
 
 
@@ -22,6 +25,7 @@ FORMATS: Mapping[str, Callable[[Equation], str]] = {
     "latex": equation_latex,
     "json": _json_text,
     "rheotool": rheotool_text,
+    "ufl": ufl_code,
 }
 """Functions that write an equation, by the name of the format."""
 
@@ -50,6 +54,10 @@ def write_equation(
     """
     if form not in FORMATS:
         raise InputError(f"Unknown format {form!r}; write one of {', '.join(FORMATS)}.")
+    if form != "json":  # which holds what was found, and no more
+        said = in_a_solver(equation)
+        notes = () if said is None else (said.text,)
+        equation = replace(equation, notes=(*equation.notes, *notes))
     options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
     given = {name: value for name, value in options.items() if value is not None}
     if form == "rheotool":

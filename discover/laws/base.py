@@ -62,6 +62,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         """
         return None
 
+    def split(self) -> tuple["AbstractConstitutiveLaw", tuple[TermShare, ...]]:
+        """Return the law below, and the library terms that are added to its h."""
+        return self, ()
+
     def trace_relaxation(self, stress: Symmetric) -> Float[Array, ""]:
         """Return the rate, over 1/λ, at which h lets the trace of this stress relax beside −σ.
 

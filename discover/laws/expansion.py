@@ -46,14 +46,23 @@ class LibraryExpansion(AbstractConstitutiveLaw):
 
     def as_terms(self) -> tuple[TermShare, ...] | None:
         """Return the terms whose coefficients differ from zero, behind those of the base law."""
+        below = () if self.base is None else self.base.as_terms()
+        return None if below is None else below + self._own_terms()
+
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[TermShare, ...]]:
+        """Return the base law, and the terms."""
+        if self.base is None:
+            return self, ()
+        core, terms = self.base.split()
+        return core, terms + self._own_terms()
+
+    def _own_terms(self) -> tuple[TermShare, ...]:
         inner = dict(zip(self.library.inner_names, map(float, self.inner), strict=True))
-        own = tuple(
+        return tuple(
             TermShare(term.name, float(value), {name: inner[name] for name in term.inner_names})
             for term, value in zip(self.library.terms, self.coefficients, strict=True)
             if float(value) != 0.0
         )
-        below = () if self.base is None else self.base.as_terms()
-        return None if below is None else below + own
 
 
 def law_of_terms(

@@ -8,6 +8,7 @@ from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from discover.laws.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, square
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 
 
 class ExtendedPomPom(AbstractConstitutiveLaw):
@@ -43,6 +44,20 @@ class ExtendedPomPom(AbstractConstitutiveLaw):
         return self.anisotropy * square(stress) + excess * (stress + identity_like(stress))
 
 
+def _written() -> IsotropicFunction:
+    import sympy
+
+    arms, ratio, alpha = scalars("q", "stretch_time_ratio", "alpha")
+    stretch, f, squared = scalars("Lambda", "f", "tr(sigma.sigma)")
+    retraction = 2 / ratio * sympy.exp(2 * (stretch - 1) / arms) * (1 - 1 / stretch)
+    where = {
+        "Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3),
+        "f": retraction + (1 - alpha * squared / 3) / stretch**2,
+    }
+    coefficients = {"sigma.sigma": alpha, "sigma": f - 1, "I": f - 1}
+    return IsotropicFunction(coefficients, where, {"stretch_time_ratio": r"\theta"})
+
+
 NAMED = {
     "xpp": NamedLaw(
         "extended pom-pom",
@@ -57,5 +72,6 @@ NAMED = {
             "Peters & Baaijens 2001 have up to 0.3",
         },
         source="Verbeeten, Peters & Baaijens 2001, J. Rheol. 45, 823",
+        written=_written,
     )
 }

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 from tensor_library.terms import TermShare
 
 
@@ -52,6 +53,13 @@ def fene_p_terms(inverse: float) -> tuple[TermShare, ...]:
     )
 
 
+def _written() -> IsotropicFunction:
+    limit, trace, power, f, w = scalars("L2", "tr(sigma)", "tr(sigma.gammadot)", "f", "w")
+    # with L² − tr A = (L² − 3)/f
+    where = {"f": 1 + trace / limit, "w": (power - f * trace) / (limit - 3)}
+    return IsotropicFunction({"sigma": f - 1 - w, "I": -w}, where, {"L2": "L^{2}"})
+
+
 NAMED = {
     "fene_p": NamedLaw(
         "FENE-P",
@@ -62,5 +70,6 @@ NAMED = {
             "longer than of any polymer, the springs are Hooke's"
         },
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
+        written=_written,
     )
 }

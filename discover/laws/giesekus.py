@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, square
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 from tensor_library.terms import TermShare
 
 
@@ -32,5 +33,6 @@ NAMED = {
         {"alpha": (0.0, 1.0)},
         {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
         source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
+        written=lambda: IsotropicFunction({"sigma.sigma": scalars("alpha")}),
     )
 }

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, anticommutator
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 from tensor_library.terms import TermShare
 
 
@@ -31,5 +32,6 @@ NAMED = {
         {"xi": (0.0, 2.0)},
         {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
         source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
+        written=lambda: IsotropicFunction({"sigma.gammadot+gammadot.sigma": scalars("xi") / 2}),
     )
 }

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.terms import TermShare
 
 
@@ -30,5 +31,6 @@ NAMED = {
         UpperConvectedMaxwell,
         {},
         source="Oldroyd 1950, Proc. R. Soc. London A 200, 523",
+        written=lambda: IsotropicFunction({}),
     )
 }

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from discover.laws.base import AbstractConstitutiveLaw
+from tensor_library.isotropic_function import IsotropicFunction
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,9 @@ class NamedLaw:
         Where each range comes from: literature, or the argument in a sentence.
     source
         Literature on the law.
+    written
+        Returns h with its constants as letters, by the names of `parameters`, so that the law can
+        be written out; None where nobody said.
     """
 
     title: str
@@ -29,6 +33,7 @@ class NamedLaw:
     parameters: Mapping[str, tuple[float, float]]
     range_sources: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
+    written: Callable[[], IsotropicFunction] | None = None
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

@@ -11,6 +11,7 @@ from discover.laws.johnson_segalman import NAMED as JOHNSON_SEGALMAN
 from discover.laws.named import NamedLaw
 from discover.laws.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
 from tensor_library.algebra import Symmetric, anticommutator
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.terms import TermShare
 
 
@@ -40,6 +41,12 @@ def _with_slip(named: NamedLaw) -> NamedLaw:
     def build(constant, xi) -> NonAffine:
         return NonAffine(affine=named.build(constant), slip_parameter=xi)
 
+    def written() -> IsotropicFunction:
+        assert named.written is not None
+        assert slip.written is not None
+        affine, slipping = named.written(), slip.written()
+        return IsotropicFunction({**affine.coefficients, **slipping.coefficients}, affine.where)
+
     made: Callable[..., AbstractConstitutiveLaw] = build
     return NamedLaw(
         f"{named.title} with slip",
@@ -47,6 +54,7 @@ def _with_slip(named: NamedLaw) -> NamedLaw:
         {**named.parameters, **ranges},
         {**named.range_sources, **slip.range_sources},
         source=f"{named.source}; {slip.source}",
+        written=written,
     )
 
 

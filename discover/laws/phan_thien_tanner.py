@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 from tensor_library.terms import TermShare
 
 
@@ -43,6 +44,16 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
         return (TermShare("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
 
 
+def _written_linear() -> IsotropicFunction:
+    return IsotropicFunction({"sigma": scalars("epsilon") * scalars("tr(sigma)")})
+
+
+def _written_exponential() -> IsotropicFunction:
+    import sympy
+
+    return IsotropicFunction({"sigma": sympy.exp(scalars("epsilon") * scalars("tr(sigma)")) - 1})
+
+
 _RANGE = {"epsilon": (0.0, 10.0)}
 _RANGE_SOURCE = {
     "epsilon": "Phan-Thien & Tanner 1977: fast extension of linear PTT ends at 2 Gλ/ε, which ten "
@@ -56,6 +67,7 @@ NAMED = {
         _RANGE,
         _RANGE_SOURCE,
         source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
+        written=_written_linear,
     ),
     "ptt_exponential": NamedLaw(
         "exponential PTT",
@@ -63,5 +75,6 @@ NAMED = {
         _RANGE,
         _RANGE_SOURCE,
         source="Phan-Thien 1978, J. Rheol. 22, 259",
+        written=_written_exponential,
     ),
 }

@@ -20,6 +20,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from discover.new_names import require_new_name
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.registry import Registry
 
 if TYPE_CHECKING:
@@ -106,6 +107,7 @@ def register_law(
     parameters: Mapping[str, tuple[float, float]] | None = None,
     title: str = "",
     source: str = "",
+    written: Callable[[], IsotropicFunction] | None = None,
 ) -> NamedLaw:
     """Make a law of one's own known by name, to studies, loops and exports in this process.
 
@@ -121,6 +123,9 @@ def register_law(
         Name and admissible range (low, high) of each parameter; they are dimensionless.
     title, source
         Name for readers, by default `name` in words, and literature.
+    written
+        Returns h written out, for exports of a law that is no sum of terms; see
+        `tensor_library.isotropic_function`.
 
     Raises
     ------
@@ -146,7 +151,8 @@ def register_law(
             )
         ranges[str(key)] = (low, high)
     _require_law(name, build, ranges)
-    entry = NamedLaw(title or name.replace("_", " "), build, ranges, source=source)
+    shown = title or name.replace("_", " ")
+    entry = NamedLaw(shown, build, ranges, source=source, written=written)
     LAWS[name] = entry
     return entry
 

@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 
 _EXPONENT = -0.5  # δ of Likhtman & Graham
 
@@ -104,6 +105,43 @@ def stretch_of(stress: Symmetric) -> Float[Array, ""]:
     return jnp.sqrt(jnp.maximum(1.0 + trace(stress) / 3.0, 1e-12))
 
 
+def _written() -> IsotropicFunction:
+    import sympy
+
+    ratio, beta, stretch, r = scalars("stretch_time_ratio", "beta", "Lambda", "r")
+    where = {
+        "Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3),
+        "r": 2 / ratio * (1 - 1 / stretch),
+    }
+    return IsotropicFunction({"I": r, "sigma": r * (1 + beta / stretch)}, where, _LETTERS)
+
+
+def _written_finite() -> IsotropicFunction:
+    import sympy
+
+    ratio, beta, limit = scalars("stretch_time_ratio", "beta", "maximum_stretch")
+    m, share, linear, constant, squared = scalars("m", "a", "b", "c", "x")
+    stretch, stiffening, r, p, w = scalars("Lambda", "f", "r", "p", "w")
+    trace, power = scalars("tr(sigma)", "tr(sigma.gammadot)")
+    growth = (power - trace) / stiffening - 3 * r - p * trace
+    slope = 2 / (m * (3 - squared / m) * (1 - squared / m))
+    where = {
+        "m": limit**2,
+        "a": (1 - 1 / m) / (3 - 1 / m),
+        "b": share * (3 + 1 / m) + trace / (3 * m),
+        "c": 3 * share + trace / 3,
+        "x": 2 * constant / (linear + sympy.sqrt(linear**2 - 4 * share * constant / m)),
+        "Lambda": sympy.sqrt(squared),
+        "f": share * (3 - squared / m) / (1 - squared / m),
+        "r": 2 / ratio * stiffening * (1 - 1 / stretch),
+        "p": r * (1 + beta / stretch) / stiffening,
+        "w": slope * growth / 3,
+    }
+    coefficients = {"gammadot": 1 - stiffening, "I": stiffening * r, "sigma": stiffening * p - w}
+    return IsotropicFunction(coefficients, where, _LETTERS)
+
+
+_LETTERS = {"stretch_time_ratio": r"\theta", "maximum_stretch": r"\Lambda_\mathrm{m}"}
 _RANGES = {"stretch_time_ratio": (1e-3, 1.0), "beta": (0.0, 1.0)}
 _RANGE_SOURCES = {
     "stretch_time_ratio": "Likhtman & Graham 2003: τ_R/τ_d is 1/(3Z) of a chain with Z "
@@ -119,6 +157,7 @@ NAMED = {
         _RANGES,
         _RANGE_SOURCES,
         source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
+        written=_written,
     ),
     "rolie_poly_fene": NamedLaw(
         "Rolie–Poly with finite extensibility",
@@ -130,5 +169,6 @@ NAMED = {
             "number of Kuhn steps between entanglements; at 100 springs are Hooke's"
         },
         source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
+        written=_written_finite,
     ),
 }

@@ -7,6 +7,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 
 
 class Saramito(AbstractConstitutiveLaw):
@@ -30,6 +31,17 @@ class Saramito(AbstractConstitutiveLaw):
         return -jnp.where(yielded, self.yield_strain / size, 1.0) * stress
 
 
+def _written() -> IsotropicFunction:
+    import sympy
+
+    yielding, size = scalars("yield_strain", "size")
+    squared = scalars("tr(sigma.sigma)") / 2 - scalars("tr(sigma)") ** 2 / 6
+    # bounded, so that the derivative is finite where nothing flows
+    where = {"size": sympy.sqrt(sympy.Max(squared, 1e-24))}
+    letters = {"yield_strain": "Y", "size": r"\left|\sigma_\mathrm{d}\right|"}
+    return IsotropicFunction({"sigma": -yielding / sympy.Max(yielding, size)}, where, letters)
+
+
 NAMED = {
     "saramito": NamedLaw(
         "Saramito",
@@ -40,5 +52,6 @@ NAMED = {
             "yield at a tenth to a few"
         },
         source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
+        written=_written,
     )
 }

@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, inner
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 
 
 class WhiteMetzner(AbstractConstitutiveLaw):
@@ -24,6 +25,11 @@ class WhiteMetzner(AbstractConstitutiveLaw):
         return ((1.0 + squared) ** (0.5 * (1.0 - self.exponent)) - 1.0) * stress
 
 
+def _written() -> IsotropicFunction:
+    k, n, squared = scalars("k", "n", "tr(gammadot.gammadot)")
+    return IsotropicFunction({"sigma": (1 + k**2 * squared / 2) ** ((1 - n) / 2) - 1})
+
+
 NAMED = {
     "white_metzner": NamedLaw(
         "White–Metzner",
@@ -35,5 +41,6 @@ NAMED = {
             "Newtonian fluid's (1) to one that does not rise (0)",
         },
         source="White & Metzner 1963, J. Appl. Polym. Sci. 7, 1867",
+        written=_written,
     )
 }

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Num
 
-from discover.equations import Equation, EquationTerm, HasEquation, combined, law_terms
+from discover.equations import Equation, EquationTerm, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.term_tables import TermTables
@@ -66,10 +66,11 @@ class LearnerResult(HasEquation, TermTables):
         found = tuple(
             EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in self.terms
         )
-        known = () if base is None else law_terms(base)
+        named, known = (None, ()) if base is None else law_parts(base)
         return Equation(
             combined(known + found) if known else found,
             linear_relaxation=self.law.linear_relaxation,
+            named=named,
         )
 
     def _shown(self) -> Iterable[Any]:

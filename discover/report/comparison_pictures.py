@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from discover.comparison.comparison import Comparison
+from discover.report.overlay import Overlay
 from discover.report.parts import Missing, attempt
 from discover.report.plots.flows import flow_picture, start_up_picture, training_picture
 from discover.report.plots.next_experiment import next_picture
@@ -16,14 +17,16 @@ from discover.report.plots.style import Picture
 Drawn = Picture | Missing
 
 
-def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn]]:
+def comparison_pictures(
+    comparison: Comparison, overlays: Sequence[Overlay] = ()
+) -> tuple[list[Drawn], list[Drawn]]:
     """Return the pictures of what was found, and those of training."""
     sparse = comparison.outcomes.get("tensor_sindy")
     details = {} if sparse is None else sparse.details
     found: list[tuple[str, Callable[[], Picture | None]]] = []
     for flow in comparison.judged:
         draw = flow_picture if flow.oscillatory else start_up_picture
-        found.append((f"The picture of {flow.title}", partial(draw, comparison, flow)))
+        found.append((f"The picture of {flow.title}", partial(draw, comparison, flow, overlays)))
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
         ("The map of identifiability", partial(identifiability_picture, comparison)),

@@ -1,6 +1,7 @@
 """The report on a comparison: page, figures, JSON and LaTeX."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from discover.comparison.comparison import Comparison
@@ -8,6 +9,7 @@ from discover.report.comparison_pictures import comparison_pictures
 from discover.report.comparison_sections import sections
 from discover.report.comparison_verdict import comparison_verdict
 from discover.report.equations import equations_tex
+from discover.report.overlay import Overlay
 from discover.report.page import made_by, render
 from discover.report.parts import Missing, attempt
 from discover.report.plots.style import Picture
@@ -22,6 +24,7 @@ def write_comparison(
     linear_relaxation: bool,
     study_text: str = "",
     run: dict | None = None,
+    overlays: Sequence[Overlay] = (),
 ) -> Path:
     """Write ``comparison.json``, ``predictions.csv``, ``equations.tex``, the figures and the page.
 
@@ -40,6 +43,8 @@ def write_comparison(
         The study file, shown at the end.
     run
         What the page says of the run that made it, where that was no command.
+    overlays
+        Curves that the study asks for beside the learners'.
 
     Returns
     -------
@@ -48,9 +53,9 @@ def write_comparison(
     content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
     content += "\n"
     folder.write("comparison.json", content)
-    predictions = write_predictions(comparison_predictions(comparison), folder)
+    predictions = write_predictions(comparison_predictions(comparison, overlays), folder)
     folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
-    pictures, training = comparison_pictures(comparison)
+    pictures, training = comparison_pictures(comparison, overlays)
     for drawn in (*pictures, *training):
         if isinstance(drawn, Picture):
             folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)

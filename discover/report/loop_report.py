@@ -14,6 +14,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import in_words
 from discover.report.comparison_report import safe_name
 from discover.report.mathtext import formula
+from discover.report.overlay import Overlay
 from discover.report.page import made_by, render
 from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.free_form import free_form_picture
@@ -28,6 +29,7 @@ from discover.report.plots.loop import (
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.next_test import next_test_picture
 from discover.report.plots.residual_map import loop_residual_map
+from discover.report.plots.rivals import rivals_picture
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.verdicts import KINDS, QUESTIONS, loop_verdict, named
 from discover.report.wording import (
@@ -49,6 +51,7 @@ def write_loop(
     study_text: str = "",
     run: dict | None = None,
     conditions: str = "",
+    overlays: Sequence[Overlay] = (),
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
@@ -66,6 +69,8 @@ def write_loop(
         What the page says of the run that made it, where that was no command.
     conditions
         Material and temperature, for the title.
+    overlays
+        Curves that the study asks for beside the models.
 
     Returns
     -------
@@ -73,11 +78,12 @@ def write_loop(
     """
     pictures = [
         waterfall_picture(result),
-        runs_picture(result),
-        lissajous_picture(result),
+        runs_picture(result, overlays),
+        lissajous_picture(result, overlays),
         free_form_picture(result),
         loop_residual_map(result),
         residual_picture(result),
+        rivals_picture(result),
         reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),
@@ -91,7 +97,7 @@ def write_loop(
     content += "\n"
     folder.write("loop.json", content)
     folder.write("equations.tex", loop_tex(result))
-    predictions = write_predictions(loop_predictions(result), folder)
+    predictions = write_predictions(loop_predictions(result, overlays), folder)
     page = render(
         "loop.html",
         data={PREDICTIONS: predictions, "loop.json": content},
@@ -100,7 +106,7 @@ def write_loop(
         result=result,
         questions=QUESTIONS,
         sentences=loop_verdict(result),
-        error_rows=_error_rows(result),
+        error_rows=_error_rows(result) + [_overlay_row(result, one) for one in overlays],
         recorded=in_words(record.quantity for record in result.records),
         noise_range=_noise_range(result),
         run_rows=_run_rows(result),
@@ -128,6 +134,22 @@ def write_loop(
         ),
     )
     return folder.write("report.html", page)
+
+
+def _overlay_row(result: LoopResult, overlay: Overlay) -> dict[str, Any]:
+    """Return the mean error of an overlay where it covers a run."""
+    row: dict[str, Any] = {"model": f"overlay: {overlay.label}"}
+    for name, held_out in (("fit", False), ("held_out", True)):
+        errors = [
+            float(np.sqrt(np.mean((curve - r.measured) ** 2) / np.mean(r.measured**2)))
+            for r in result.records
+            if r.held_out is held_out
+            and (curve := overlay.of(r.name, r.quantity)) is not None
+            and np.all(np.isfinite(curve))
+            and np.any(r.measured)
+        ]
+        row |= {name: float(np.mean(errors)) if errors else None, f"{name}_range": errors}
+    return row
 
 
 def _error_rows(result: LoopResult) -> list[dict[str, Any]]:
@@ -304,12 +326,12 @@ def _declared_effects(result: LoopResult) -> list[dict[str, Any]]:
 
 
 def _law(result: LoopResult) -> str:
-    """Return the augmented law typeset; empty where it is no sum of library terms."""
+    """Return the augmented law typeset; empty where it cannot be written out."""
     try:
         equation = result.equation()
+        return law_element(equation.terms, equation.linear_relaxation, equation.named)
     except InputError:
         return ""
-    return law_element(equation.terms, equation.linear_relaxation)
 
 
 def _fold(fold: Fold) -> dict[str, Any]:

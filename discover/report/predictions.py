@@ -1,6 +1,6 @@
 """``predictions.csv``: every curve that a report draws, one line a sample."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import BANDS_ONLY
+from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder
 
 COLUMNS = (
@@ -33,7 +34,9 @@ _ROLES["high_deborah"] = "prediction"
 _SOURCES = {"before": "declared"}
 
 
-def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
+def comparison_predictions(
+    comparison: Comparison, overlays: Sequence[Overlay] = ()
+) -> pd.DataFrame:
     """Return the curves of a comparison: the declared law's and each learner's, in every flow.
 
     Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` hold what the data leave
@@ -44,19 +47,24 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
     ----------
     comparison
         Flows over which only errors are mapped are left out.
+    overlays
+        Curves that the study asks for; their sources are their labels.
     """
+    curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
+    curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
+    curves |= {overlay.label: overlay.curves for overlay in overlays}
     parts = []
     for flow in comparison.flows:
         if flow.kind not in _ROLES:
             continue
-        for who in ("before", *comparison.outcomes):
-            known = who == "before"
-            predictions = comparison.before if known else comparison.outcomes[who].predictions
+        for who, predictions in curves.items():
             predicted = predictions.get(flow.key)
             if predicted is None:
                 continue
             limits = _limits(comparison, who, flow)
             for quantity in QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]:
+                if quantity not in predicted:
+                    continue
                 low, high = limits.get(quantity, (np.nan, np.nan))
                 parts.append(
                     _lines(
@@ -76,14 +84,14 @@ def comparison_predictions(comparison: Comparison) -> pd.DataFrame:
     return _table(parts)
 
 
-def loop_predictions(result: LoopResult) -> pd.DataFrame:
+def loop_predictions(result: LoopResult, overlays: Sequence[Overlay] = ()) -> pd.DataFrame:
     """Return the curves of a closed loop, by the declared model and by the augmented one.
 
     Units as in `comparison_predictions`. Where nothing was added there is only the declared model.
     The limits hold where 95 % of the measurements should lie by all explanations together; they
     stand with the model that was found.
     """
-    return _table([part for record in result.records for part in _record_parts(record)])
+    return _table([part for r in result.records for part in _record_parts(r, overlays)])
 
 
 def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
@@ -94,12 +102,15 @@ def write_predictions(table: pd.DataFrame, folder: RunFolder) -> str:
     return text
 
 
-def _record_parts(record: RunRecord) -> Iterator[pd.DataFrame]:
+def _record_parts(record: RunRecord, overlays: Sequence[Overlay]) -> Iterator[pd.DataFrame]:
     sources = {"declared": record.predicted[0]}
     if len(record.predicted) > 1:
         sources["augmented"] = record.predicted[-1]
+    found = [*sources][-1]
+    curves = {overlay.label: overlay.of(record.name, record.quantity) for overlay in overlays}
+    sources |= {label: curve for label, curve in curves.items() if curve is not None}
     for source, predicted in sources.items():
-        band = record.band if source == [*sources][-1] else None
+        band = record.band if source == found else None
         low, high = (np.nan, np.nan) if band is None else band
         yield _lines(
             run=record.name,

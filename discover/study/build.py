@@ -339,11 +339,15 @@ def _from_earlier(found: EarlierResult, own: Sequence[KnownEffect]) -> DeclaredM
     equation = found.equation
     names = {known.name for known in own}
     kept = (known for known in found.effects if known.name not in names)
-    plain = not equation.terms
+    law, name, constants = equation.law(), FOUND_LAW, {}
+    if not equation.terms and equation.named is None:
+        law, name = UpperConvectedMaxwell(equation.linear_relaxation), "ucm"
+    elif equation.named is not None and not equation.terms:
+        name, constants = equation.named.law, dict(equation.named.constants[0])
     return DeclaredModel(
-        UpperConvectedMaxwell(equation.linear_relaxation) if plain else equation.law(),
-        "ucm" if plain else FOUND_LAW,
-        {},
+        law,
+        name,
+        constants,
         np.array(equation.modulus),
         np.array(equation.relaxation_time),
         (),

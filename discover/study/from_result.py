@@ -11,6 +11,7 @@ from discover.equations import Equation
 from discover.equations.json_format import equation_from_json
 from discover.equations.read import COMPARISON, LOOP, read_json
 from discover.errors import InputError
+from discover.laws.registry import LAWS
 from discover.study.run_folder import STATE_FILE, STATE_FOLDER
 
 _SPARSE = "tensor_sindy"
@@ -121,7 +122,8 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
     if declared.get("law") is None:
         raise InputError(
             f"[model] from: the law that the loop of {file} started from is no sum of library "
-            "terms, so it cannot be taken from a file. Declare it with law and its constants."
+            "terms and has no name, so it cannot be taken from a file. Declare it with law and its "
+            "constants."
         )
     unexplained = content.get("verdict") == "unexplained"
     if unexplained and not content["stages"]:
@@ -174,8 +176,12 @@ def _effects(rows: Any, file: Path) -> tuple[KnownEffect, ...]:
 
 def _text(file: Path, law: str, equation: Equation, effects: tuple[KnownEffect, ...]) -> str:
     n, modes = len(equation.terms), len(equation.modulus)
-    terms = f"{n} term{'s' if n != 1 else ''} beside the Maxwell part" if n else "upper convected "
-    terms += "" if n else "Maxwell"
+    named = equation.named
+    below = "the Maxwell part"
+    if named is not None:
+        below = LAWS[named.law].described(named.constants[0])
+    terms = f"{n} term{'s' if n != 1 else ''} beside {below}" if n else below
+    terms = terms if n or named else "upper convected Maxwell"
     text = f"Taken from {file.parent.name}: {law} ({terms}) with {modes} relaxation mode"
     text += "s" if modes != 1 else ""
     if effects:

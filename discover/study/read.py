@@ -73,7 +73,9 @@ def fingerprint(study: Study, *extra: object) -> str:
     InputError
         If the data folder or a file in it cannot be read.
     """
-    digest = hashlib.sha256(study.model_dump_json().encode())
+    # a page without overlays is what it was before there were any
+    left_out = None if study.report.overlay else {"report"}
+    digest = hashlib.sha256(study.model_dump_json(exclude=left_out).encode())
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())
     if study.data.folder is not None:
@@ -84,4 +86,8 @@ def fingerprint(study: Study, *extra: object) -> str:
     if study.model.from_ is not None:
         earlier = result_file(study.model.from_, study.path)
         digest.update(read_bytes(earlier, earlier.name))
+    for asked in study.report.overlay:
+        if asked.file is not None:
+            base = Path() if study.path is None else study.path.parent
+            digest.update(read_bytes(base / asked.file, asked.file))
     return digest.hexdigest()[:16]

@@ -255,6 +255,43 @@ class Compare(Section):
         return self
 
 
+Modes = Positive | Annotated[tuple[Positive, ...], Field(min_length=1)] | None
+"""One number, or one for each mode."""
+
+
+def _count(modes: Modes) -> int:
+    return len(modes) if isinstance(modes, tuple) else int(modes is not None)
+
+
+class OverlayAsked(Section):
+    """A curve that the user wants beside the others: a law, or what a file holds."""
+
+    label: Annotated[str, Field(max_length=60)] = ""
+    law: SyntheticLaw | None = None
+    parameters: dict[str, float] = Field(default_factory=dict)
+    modulus_Pa: Modes = None
+    relaxation_time_s: Modes = None
+    file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if (self.law is None) == (self.file is None):
+            raise ValueError('an overlay has either law = "..." or file = "...", not both or none')
+        if self.file is not None and (self.parameters or self.modulus_Pa or self.relaxation_time_s):
+            raise ValueError("parameters and modes belong to a law, and this overlay is a file")
+        if _count(self.modulus_Pa) != _count(self.relaxation_time_s):
+            raise ValueError("modulus_Pa and relaxation_time_s go together, with as many values")
+        if self.label in ("declared", "augmented", *learner_names()):
+            raise ValueError(f"the label {self.label!r} names a curve of the report itself")
+        return self
+
+
+class Report(Section):
+    """What the page shows beside the results."""
+
+    overlay: Annotated[tuple[OverlayAsked, ...], Field(max_length=4)] = ()
+
+
 class Study(Section):
     """One study: data, declared model, and what to do with them."""
 
@@ -262,6 +299,7 @@ class Study(Section):
     model: Model = Model()
     loop: Loop = Loop()
     compare: Compare = Compare()
+    report: Report = Report()
     _path: Path | None = PrivateAttr(default=None)
     _text: str = PrivateAttr(default="")
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 from dataclasses import replace
 
 import jax.numpy as jnp
@@ -12,6 +13,7 @@ from typer.testing import CliRunner
 from discover.cli import app
 from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.closed_loop.augmented_law import AugmentedLaw
+from discover.closed_loop.result import ConstantByMode, DeclaredEffect, ModeConstant
 from discover.effects import make_effect
 from discover.equations import Box, Equation, EquationTerm, equation_to_json
 from discover.equations import Tested as Where
@@ -51,7 +53,7 @@ def test_a_comparison_becomes_a_function_that_says_where_it_was_tested(results, 
 
 
 def test_every_form_and_either_learner_can_be_asked_for(results):
-    for form in ("python", "sympy", "latex", "json", "rheotool"):
+    for form in ("python", "sympy", "latex", "json", "rheotool", "ufl"):
         done = invoke("export", results, "--format", form)
         assert done.exit_code == 0, done.output
         assert "0.2" in done.stdout
@@ -98,7 +100,7 @@ def test_results_that_hold_no_law_say_so(tmp_path, name, text, word):
     assert "Traceback" not in done.output
 
 
-def loop_result(*added):
+def loop_result(*added, base=("giesekus", {"alpha": 0.1}), **more):
     """A closed loop that added effects, given as (name, parameters...)."""
     effects = tuple(make_effect(name) for name, *_ in added)
     stages = tuple(
@@ -120,7 +122,7 @@ def loop_result(*added):
         if e.kind == "constitutive"
     ]  # fmt: skip
     law = AugmentedLaw(
-        make_law("giesekus", {"alpha": 0.1}),
+        make_law(*base),
         tuple(v for _, v in inside),
         tuple(e for e, _ in inside),
     )
@@ -131,7 +133,7 @@ def loop_result(*added):
     )
     return LoopResult(
         "effects_added", ErrorPair(0.4, 0.4), ErrorPair(0.01, 0.02), 0.005, stages, {},
-        records=records, fluid=Fluid(law, [10.0, 20.0], [0.5, 2.0], 1.0),
+        records=records, fluid=Fluid(law, [10.0, 20.0], [0.5, 2.0], 1.0), **more,
     )  # fmt: skip
 
 
@@ -152,6 +154,49 @@ def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
         "Wi": pytest.approx([4 * time] * 2),
         "De": pytest.approx([time / 10] * 2),
     }
+
+
+XPP = {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1}
+
+
+def test_a_loop_from_a_law_with_a_name_leaves_with_what_was_added_to_it(tmp_path):
+    result = loop_result(("non_affine_motion", 0.2), ("rate_gain", 0.1), base=("xpp", XPP))
+    result.write_json(tmp_path / "loop.json")
+    for form in ("python", "sympy", "latex", "ufl"):
+        done = invoke("export", tmp_path, "--format", form)
+        assert done.exit_code == 0, done.output
+        assert "rate_gain" in done.stdout
+    content = json.loads(invoke("export", tmp_path, "--format", "json").stdout)
+    assert content["named"] == {"law": "xpp", "constants": [XPP]}
+    (term,) = content["terms"]
+    assert term["term"] == "sigma.gammadot+gammadot.sigma"
+    assert "none beside xpp" in invoke("export", tmp_path, "--format", "rheotool").stderr
+    assert "<math" in result._repr_html_()
+
+
+def by_mode(values):
+    times = (0.5, 2.0)
+    modes = tuple(ModeConstant(*one, None, True) for one in zip(times, values, strict=True))
+    return ConstantByMode(values[0], (0.0, 1.0), "", 1.0, 1, (0.0, 5.0), modes)
+
+
+def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
+    """Of a law that is no sum of terms, and of one that is."""
+    for base in (("xpp", XPP), ("giesekus", {"alpha": 0.1})):
+        differing = {"alpha": by_mode((0.1, 0.3))}
+        loop_result(base=base, declared_parameters=differing).write_json(tmp_path / "loop.json")
+        done = invoke("export", tmp_path, "--format", "rheotool")
+        assert done.exit_code == 0, done.output
+        values = re.findall(r"alpha \[0 0 0 0 0 0 0\] (\S+);", done.stdout)
+        assert [float(v) for v in values] == [0.1, 0.3]
+        content = json.loads(invoke("export", tmp_path, "--format", "json").stdout)
+        assert [one["alpha"] for one in content["named"]["constants"]] == [0.1, 0.3]
+
+
+def test_what_an_effect_adds_by_mode_is_refused_with_its_name(tmp_path):
+    effect = DeclaredEffect("giesekus_mobility", "constitutive", {"alpha": by_mode((0.1, 0.3))})
+    loop_result(declared_effects=(effect,)).write_json(tmp_path / "loop.json")
+    assert "giesekus_mobility differs" in invoke("export", tmp_path).stderr
 
 
 @pytest.mark.parametrize("case", ["yield", "state"])

@@ -189,6 +189,17 @@ def test_the_band_stands_in_the_predictions_with_what_was_found(giesekus):
     assert table[table.source == "declared"].low95.isna().all()
 
 
+def test_each_explanation_keeps_what_it_predicts_of_every_run(giesekus):
+    told = giesekus.explanations
+    place = [*told.likeliest_first].index(told.holding([s.effect for s in giesekus.stages]))
+    for record in giesekus.records:
+        assert len(record.by_explanation) == len(told.likeliest_first)
+        # what was found is fitted once more on finer steps, a thousandth of the noise away
+        found = record.by_explanation[place]
+        size = np.sqrt(np.mean(record.measured**2))
+        assert np.max(np.abs(found - record.predicted[-1])) < 1e-3 * NOISE * size + 1e-4 * size
+
+
 @pytest.mark.parametrize("value", ["0", "65", '"many"'])
 def test_a_number_of_explanations_that_cannot_be_is_refused(value):
     loop = tomllib.loads(f"explanations = {value}")

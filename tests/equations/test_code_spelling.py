@@ -6,11 +6,20 @@ import json
 import numpy as np
 import pytest
 import sympy
-from spelled_laws import BOTH_SIGNS, LIBRARY, STATES, agree, sum_of
+from spelled_laws import (
+    BOTH_SIGNS,
+    LIBRARY,
+    LIBRARY_LAWS,
+    NAMED_LAWS,
+    STATES,
+    agree,
+    sum_of,
+)
 
 from discover.equations import Equation, EquationTerm, equation_from_json, write_equation
 from discover.errors import InputError
 from tensor_library.symbolic import RATE, STRESS, UNIT, Trace
+from tensor_library.terms import parse_term
 
 every_law = pytest.mark.parametrize("name", BOTH_SIGNS)
 
@@ -36,6 +45,27 @@ def test_the_sympy_text_of_every_term_law_and_effect_says_it(name):
         names = {"sympy": sympy, "unit": sympy.eye(3), "s": s, "d": d}
         found.append(eval(code, names).evalf())
     assert agree(found, spelled.extra)
+
+
+# the pieces of those of degree two are those of degree one, and powers
+SPELLED_IN_UFL = [
+    name for name in LIBRARY_LAWS if parse_term(name).degree < 2 or "^2" in name
+] + [*NAMED_LAWS]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPELLED_IN_UFL)
+def test_the_ufl_text_of_terms_laws_and_effects_says_them(name):
+    ufl = pytest.importorskip("ufl")
+    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+    from ufl.utils.stacks import StackDict
+
+    spelled, module = (LIBRARY_LAWS | NAMED_LAWS)[name], {}
+    exec(write_equation(spelled.equation, "ufl"), module)
+    stress, rate = STATES[1]
+    extra = module["extra_term"](*(ufl.as_matrix(x.tolist()) for x in (stress, rate)))
+    extra = apply_algebra_lowering(extra)
+    found = [[extra.evaluate((), {}, (i, j), StackDict()) for j in range(3)] for i in range(3)]
+    assert agree(found, spelled.extra[1])
 
 
 @every_law

@@ -9,6 +9,7 @@ import pytest
 from standing_alone import stands_alone
 
 from discover.closed_loop import CandidateScore
+from discover.closed_loop.explanation import Explanation, Explanations
 from discover.closed_loop.result import (
     ConstantByMode,
     ErrorPair,
@@ -23,9 +24,10 @@ from discover.effects import make_effect
 from discover.report.loop_report import _noise_range, write_loop
 from discover.report.page import render
 from discover.report.plots.cycles import in_last_cycle
-from discover.report.plots.loop import residual_picture, runs_picture
+from discover.report.plots.loop import residual_picture, run_error_picture, runs_picture
 from discover.report.plots.loop_lissajous import lissajous_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
+from discover.report.plots.rivals import rivals_picture
 from discover.report.verdicts import QUESTIONS, loop_verdict
 from discover.study import RunFolder
 
@@ -296,7 +298,7 @@ def without_stages():
 
 def test_nothing_is_called_augmented_where_nothing_was_added():
     with_stage, without = loop_result(), without_stages()
-    for draw in (runs_picture, residual_picture, loop_residual_map):
+    for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
         assert "augmented" in draw(with_stage).svg
         assert "augmented" not in draw(without).svg
         assert "declared" in draw(without).svg
@@ -364,3 +366,43 @@ def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
     two = (oscillating(), oscillating("held.csv", True))
     assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
     assert drawn.svg.count("deepest at") == 2
+
+
+def several_explanations():
+    """Two explanations of the same runs, the second a tenth too high."""
+    result = loop_result()
+    records = tuple(
+        replace(r, by_explanation=np.stack([r.predicted[-1], 1.1 * r.measured]))
+        for r in result.records
+    )
+    told = Explanations(
+        (
+            Explanation(("stress_gain",), 0.6, ErrorPair(0.01, 0.2), {}),
+            Explanation(("wall_slip",), 0.2, ErrorPair(0.1, 0.1), {}),
+        ),
+        0.2,
+    )
+    return replace(result, records=records, explanations=told)
+
+
+def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found():
+    result = several_explanations()
+    drawn = rivals_picture(result)
+    assert drawn is not None
+    assert len(drawn.axes) == 2
+    assert drawn.axes[0]["y"] == drawn.axes[1]["y"]  # one scale
+    # the larger residual, a tenth of each run's size at its end, sets it
+    assert drawn.axes[0]["y"][1] > 10.0
+    assert "found by the search" in drawn.svg
+    # negative control: one explanation has no rival
+    one = replace(result.explanations, likeliest_first=result.explanations.likeliest_first[:1])
+    assert rivals_picture(replace(result, explanations=one)) is None
+
+
+def test_a_short_axis_of_errors_has_a_number_to_read():
+    """From 23 to 47 % there is neither a decade nor a 2 or a 5."""
+    result = without_stages()
+    sizes = zip(result.records, (0.23, 0.47), strict=True)
+    records = tuple(replace(r, errors=np.array([e])) for r, e in sizes)
+    drawn = run_error_picture(replace(result, records=records)).svg
+    assert {"30", "40"} <= set(re.findall(r">(\d+)</text>", drawn))

@@ -86,6 +86,27 @@ def test_a_law_without_terms_is_the_maxwell_law(tmp_path):
     assert declared(write(tmp_path, "loop.json", plain)).law_name == "ucm"
 
 
+def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(tmp_path):
+    constants = {"stretch_time_ratio": 0.2, "beta": 0.5}
+    law = {**LAW, "named": {"law": "rolie_poly", "constants": [constants]}}
+    loop = {**LOOP, "declared": {"law": {**law, "terms": []}, "effects": []}}
+    found = declared(write(tmp_path, "loop.json", loop))
+    assert (found.law_name, found.parameters) == ("rolie_poly", constants)
+    assert "Rolie–Poly (stretch_time_ratio = 0.2, beta = 0.5)" in found.source
+    model = forward_model(found)
+    assert model.free_positions == []
+    assert dict(model.parameters) == constants
+    # with a term
+    found = declared(
+        write(tmp_path, "loop.json", {**loop, "declared": {"law": law, "effects": []}})
+    )
+    core, terms = found.law.split()
+    assert type(core).__name__ == "RoliePoly"
+    assert [share.term for share in terms] == ["sigma.sigma"]
+    assert "1 term beside Rolie–Poly" in found.source
+    assert forward_model(found).free_positions == []
+
+
 def test_an_effect_of_the_study_stands_in_place_of_the_one_that_was_found(tmp_path):
     model = 'from = "earlier"\neffects = { stress_gain = "fit" }'
     found = declared(write(tmp_path, "loop.json", LOOP, model))

@@ -65,7 +65,7 @@ def with_band(
     judgement: Judgement,
     candidates: Sequence[str],
 ) -> list[RunRecord]:
-    """Return the records of runs with the band that the explanations predict together.
+    """Return the records of runs with what the explanations predict, each and together.
 
     Parameters
     ----------
@@ -87,8 +87,14 @@ def with_band(
         model, batch, mixed, [of[one.effects] for one in mixed], [held for held, _ in told],
         judgement.left.noise, judgement.structured, candidates,
     )  # fmt: skip
+    thetas = [one.fit.theta for one in sorted(mixed, key=lambda one: [*of].index(one.effects))]
+    each = [model.predictions(thetas, held) for held, _ in told]
     return [
-        replace(record, band=band[:, i, : len(record.time)])
-        for (_, records), band in zip(told, bands, strict=True)
+        replace(
+            record,
+            band=band[:, i, : len(record.time)],
+            by_explanation=predicted[:, i, : len(record.time)],
+        )
+        for (_, records), band, predicted in zip(told, bands, each, strict=True)
         for i, record in enumerate(records)
     ]

@@ -1,14 +1,18 @@
 """Stresses in one flow: against time, as Lissajous curves, and in start-up."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
+from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.style import (
     BEFORE_STYLE,
     MEASURED,
+    OVERLAY_STYLES,
     SHADE,
     SPARSE,
     TRUTH_STYLE,
@@ -33,7 +37,7 @@ def units(comparison: Comparison) -> tuple[str, str, str]:
     return " (Pa)", "t (s)", "γ̇ (1/s)"
 
 
-def curves(comparison: Comparison, flow: Flow):
+def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()):
     """Yield label, style and stresses of everything known in a flow, in drawing order."""
     before = comparison.before[flow.key]
     if before is not None:
@@ -46,9 +50,12 @@ def curves(comparison: Comparison, flow: Flow):
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
             yield learner_title(name), learner_style(name), prediction
+    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
+        if flow.key in overlay.curves:
+            yield literal(overlay.label), style, overlay.curves[flow.key]
 
 
-def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
+def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()) -> Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
@@ -57,7 +64,7 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
     with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
-            for label, style, stresses in curves(comparison, flow):
+            for label, style, stresses in curves(comparison, flow, overlays):
                 if quantity in stresses:
                     row[0].plot(flow.times, stresses[quantity], label=label, **style)
                     for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
@@ -65,7 +72,8 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
             _mark_training(row[0], flow)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
-            for panel in row[1:]:
+            for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
+                _draw_band(panel, comparison, flow, quantity, last, along)
                 _frame(panel, comparison, flow, quantity, last)
             row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
         axes[-1, 0].set_xlabel(time_label)
@@ -86,7 +94,9 @@ def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
         )
 
 
-def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
+def start_up_picture(
+    comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
+) -> Picture:
     """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
     stress_unit, time_label, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
@@ -95,7 +105,7 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
         if not flow.is_truth:
             shown = np.ones_like(shown)
         for panel, quantity in zip(axes[0], quantities, strict=True):
-            for label, style, stresses in curves(comparison, flow):
+            for label, style, stresses in curves(comparison, flow, overlays):
                 if quantity in stresses:
                     panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
@@ -131,6 +141,7 @@ def training_picture(comparison: Comparison) -> Picture:
                     panel.plot(
                         flow.times, prediction["sigma12"], label=learner_title(name), **style
                     )
+            _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
             if runs_through_decades(flow.times, flow.rate):
                 make_logarithmic(panel.xaxis)
@@ -163,15 +174,19 @@ _FITTING_AS_WELL = {
 }
 
 
-def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
-    """Shade what the data leave open: the intervals of the parameters, rivals, and members."""
+def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
+    """Shade what the data leave open: the intervals of the parameters, rivals, and members.
+
+    Against time, or against what is given of the samples shown.
+    """
+    along = flow.times[shown] if along is None else along
     for name, label in _FITTING_AS_WELL.items():
         outcome = comparison.outcomes.get(name)
         limits = None if outcome is None else outcome.bands.get(flow.key)
         if limits is not None:
             low, high = limits[quantity]
             panel.fill_between(
-                flow.times[shown],
+                along,
                 low[shown],
                 high[shown],
                 color=learner_style(name)["color"],
@@ -184,7 +199,7 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown) 
         return
     column = QUANTITIES.index(quantity)
     panel.fill_between(
-        flow.times[shown],
+        along,
         band.rivals_low[shown, column],
         band.rivals_high[shown, column],
         color=SPARSE,

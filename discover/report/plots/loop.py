@@ -8,11 +8,13 @@ from matplotlib.ticker import EngFormatter
 from discover.closed_loop import LoopResult, RunRecord
 from discover.closed_loop.reading import differences
 from discover.protocols.kinematics import MODULI
+from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE,
     GREEN,
     INK,
     NETWORK,
+    OVERLAY_STYLES,
     SPARSE,
     TRUTH,
     Picture,
@@ -29,7 +31,9 @@ from discover.report.wording import FIGURE_SYMBOLS, effect_title, percent, recor
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
 
-_FIT, _HELD = NETWORK, SPARSE
+FIT_COLOUR, HELD_COLOUR = NETWORK, SPARSE
+"""Of runs fitted and held out."""
+
 THOUSANDS = 1e4
 """In Pa, from which digits would crowd an axis."""
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
@@ -73,8 +77,8 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
-def runs_picture(result: LoopResult) -> Picture:
-    """Return every run: measured, declared model, augmented model."""
+def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
+    """Return every run: measured, declared model, augmented model, and overlays."""
     records = result.records
     columns = min(4, len(records))
     rows = -(-len(records) // columns)
@@ -84,6 +88,7 @@ def runs_picture(result: LoopResult) -> Picture:
         for panel, record in zip(axes.ravel(), records, strict=False):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
+            draw_overlays(panel, record, overlays, record.along[1], slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -109,7 +114,9 @@ def runs_picture(result: LoopResult) -> Picture:
             drawing,
             "runs",
             "Every run in the window of the loop. Runs in orange were held out: no fit saw them."
-            + _what_is_drawn(records),
+            + _what_is_drawn(records)
+            + " Overlaid laws are the study's, fitted to nothing and without effects of the "
+            "instrument." * bool(overlays),
         )
 
 
@@ -130,7 +137,8 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     if record.band is not None and record.is_transient:
         low, high = record.band[:, shown]
         panel.fill_between(
-            along[shown], low, high, color=_HELD if record.held_out else _FIT, alpha=0.18, lw=0,
+            along[shown], low, high, alpha=0.18, lw=0,
+            color=HELD_COLOUR if record.held_out else FIT_COLOUR,
             label="95 % of measurements, all explanations",
         )  # fmt: skip
     panel.plot(
@@ -145,9 +153,19 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
         return
     panel.plot(
         along[shown], record.predicted[-1][shown], lw=1.5,
-        color=_HELD if record.held_out else _FIT,
+        color=HELD_COLOUR if record.held_out else FIT_COLOUR,
         label="augmented, held out" if record.held_out else "augmented, fitted",
     )  # fmt: skip
+
+
+def draw_overlays(
+    panel, record: RunRecord, overlays: Sequence[Overlay], along: np.ndarray, shown: Samples
+) -> None:
+    """Draw the curves that the study asks for in one run; arguments as in `draw_run`."""
+    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
+        curve = overlay.of(record.name, record.quantity)
+        if curve is not None:
+            panel.plot(along[shown], curve[shown], label=literal(overlay.label), **style)
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
@@ -204,7 +222,7 @@ def residual_picture(result: LoopResult) -> Picture:
             for place, record in enumerate(records):
                 relative = 100.0 * record.relative_residual[stage]
                 style = {
-                    "color": _HELD if record.held_out else _FIT,
+                    "color": HELD_COLOUR if record.held_out else FIT_COLOUR,
                     "lw": 0.9,
                     "alpha": 0.8,
                     "label": "held out" if record.held_out else "fitted",
@@ -242,7 +260,7 @@ def reading_picture(result: LoopResult) -> Picture | None:
     """Return on what the residual depends, before and after."""
     readings = [(result.readings[0], "declared", BEFORE)]
     if result.stages:
-        readings.append((result.readings[1], "augmented", _FIT))
+        readings.append((result.readings[1], "augmented", FIT_COLOUR))
     if not readings[0][0].collapses:
         return None
     waves = any(reading.waves for reading, _, _ in readings)
@@ -282,7 +300,9 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
         panel.set_visible(False)
         return
     values = varied[name]
-    for (model, label), colour in zip(models_of(result.records), (BEFORE, _FIT), strict=False):
+    for (model, label), colour in zip(
+        models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
+    ):
         label = label.removesuffix(" model")
         errors = [100.0 * float(record.errors[model]) for record in result.records]
         panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
@@ -311,10 +331,10 @@ def waterfall_picture(result: LoopResult) -> Picture:
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
         positions = np.arange(len(labels))
-        series = [("fitted runs", _FIT, [p.fit for p in pairs], -0.19)]
+        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19)]
         held_out = [p.held_out for p in pairs if p.held_out is not None]
         if len(held_out) == len(pairs):
-            series.append(("held-out runs", _HELD, held_out, 0.19))
+            series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
             bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
@@ -382,20 +402,23 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
 
 
 def run_error_picture(result: LoopResult) -> Picture:
-    """Return the error of every run before and after."""
+    """Return the error of every run before and after, or of the declared model alone."""
     records = result.records
+    model = "augmented" if any(len(r.errors) > 1 for r in records) else "declared"
     with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
         panel = axes[0, 0]
         for position, record in enumerate(records[::-1]):
             before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
-            colour = _HELD if record.held_out else _FIT
+            colour = HELD_COLOUR if record.held_out else FIT_COLOUR
             panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
-            panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
-            label = "augmented, held out" if record.held_out else "augmented, fitted"
+            if model == "augmented":
+                panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
+            label = f"{model}, {'held out' if record.held_out else 'fitted'}"
             panel.plot(after, position, "o", color=colour, label=label)
         panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
         panel.set_ylim(-0.6, len(records) - 0.4)
         make_percentage(panel.xaxis)
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
-        return picture(drawing, "run_errors", "Residual by run: error before and after.")
+        told = "before and after" if model == "augmented" else "of the declared model"
+        return picture(drawing, "run_errors", f"Residual by run: error {told}.")

@@ -1,17 +1,20 @@
 """Lissajous curves of the oscillating runs of a closed loop: measured, before and after."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discover.closed_loop.result import LoopResult
 from discover.closed_loop.waves import oscillation
+from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle
-from discover.report.plots.loop import draw_run, short_title
+from discover.report.plots.loop import draw_overlays, draw_run, short_title
 from discover.report.plots.style import MEASURED, Picture, figure, legend_above, picture
 
 _MOST = 4
 
 
-def lissajous_picture(result: LoopResult) -> Picture | None:
+def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture | None:
     """Return σ12 against strain and against rate in the last cycle, or None without oscillation.
 
     The widest runs are shown, those held out before those fitted.
@@ -32,6 +35,7 @@ def lissajous_picture(result: LoopResult) -> Picture | None:
                         label="measured, all cycles", zorder=1,
                     )  # fmt: skip
                 draw_run(panel, record, along, last, last)
+                draw_overlays(panel, record, overlays, along, last)
                 _frame(panel, record.measured)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")

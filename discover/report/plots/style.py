@@ -56,6 +56,12 @@ _LEARNER_STYLES: dict[str, dict[str, Any]] = {
 _OTHERS = (PURPLE, YELLOW, GREEN)
 """Colours of learners of users' own, in their order."""
 
+OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
+    {"color": colour, "linestyle": line, "linewidth": 1.3}
+    for colour, line in ((GREEN, "--"), (PURPLE, ":"), (YELLOW, "--"), (INK, ":"))
+)
+"""Of what a study asks to be drawn beside the rest, in its order."""
+
 TRUTH_STYLE = {"color": TRUTH, "linewidth": 1.3}
 BEFORE_STYLE = {"color": BEFORE, "linewidth": 1.0, "linestyle": "-."}
 
@@ -261,12 +267,14 @@ _FEW_DECADES = 20.0
 
 
 def make_percentage(axis) -> None:
-    """Make an axis of per cents logarithmic, with plain numbers; 2 and 5 too where it is short."""
+    """Make an axis of per cents logarithmic, with plain numbers; more of them where it is short."""
     make_logarithmic(axis)
 
     def between(value: float, position: int | None = None) -> str:
         low, high = axis.get_view_interval()
-        wanted = high < _FEW_DECADES * low and f"{value:e}"[0] in "25"
+        # between 2 and 5 there may be no number that is either
+        digits = "25" if high > 3.0 * low else "23456789"
+        wanted = high < _FEW_DECADES * low and f"{value:e}"[0] in digits
         return f"{value:g}" if wanted else ""
 
     axis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))

@@ -1,0 +1,80 @@
+"""Laws of melts, solutions and gels as their authors write them, on full tensors.
+
+Each function returns what the upper convected derivative of the conformation A = I + σ is, with
+time over the relaxation time; `stress` integrates it with scipy.
+"""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+ONE = np.eye(3)
+
+
+def rolie_poly(a, gradient, stretch_time_ratio, beta):
+    stretch = np.sqrt(np.trace(a) / 3)
+    retraction = 2 / stretch_time_ratio * (1 - 1 / stretch)
+    return -(a - ONE) - retraction * (a + beta / stretch * (a - ONE))
+
+
+def cohen(squared, limit):
+    """Return Cohen's approximation of the inverse Langevin function, over that at rest."""
+
+    def spring(ratio):
+        return (3 - ratio) / (1 - ratio)
+
+    return spring(squared / limit) / spring(1 / limit)
+
+
+def rolie_poly_fene(a, gradient, stretch_time_ratio, beta, maximum_stretch):
+    stretch = np.sqrt(np.trace(a) / 3)
+    k = cohen(stretch**2, maximum_stretch**2)
+    retraction = 2 / stretch_time_ratio * k * (1 - 1 / stretch)
+    return -(a - ONE) - retraction * (a + beta / stretch * (a - ONE))
+
+
+def xpp(a, gradient, q, stretch_time_ratio, alpha):
+    s = a - ONE
+    stretch = np.sqrt(1 + abs(np.trace(s)) / 3)
+    f = 2 / stretch_time_ratio * np.exp(2 / q * (stretch - 1)) * (1 - 1 / stretch)
+    f += (1 - alpha * np.trace(s @ s) / 3) / stretch**2
+    return -(alpha * s @ s + f * s + (f - 1) * ONE)
+
+
+def white_metzner(a, gradient, k, n):
+    rate = gradient + gradient.T
+    size = np.sqrt(0.5 * np.trace(rate @ rate))
+    return -(a - ONE) * (1 + (k * size) ** 2) ** ((1 - n) / 2)
+
+
+def saramito(a, gradient, yield_strain):
+    s = a - ONE
+    deviator = s - np.trace(s) / 3 * ONE
+    size = np.sqrt(0.5 * np.trace(deviator @ deviator))
+    return -max(0.0, 1 - yield_strain / size if size > 0 else 0.0) * s
+
+
+def giesekus_non_affine(a, gradient, alpha, xi):
+    s, rate = a - ONE, gradient + gradient.T
+    return -s - alpha * s @ s - xi / 2 * (s @ rate + rate @ s)
+
+
+def ptt_exponential_non_affine(a, gradient, epsilon, xi):
+    s, rate = a - ONE, gradient + gradient.T
+    return -np.exp(epsilon * np.trace(s)) * s - xi / 2 * (s @ rate + rate @ s)
+
+
+def stress(law, constants, gradient, times, relaxation_time=1.0):
+    """Return σ/G in a start-up, (n, 3, 3)."""
+    scaled = gradient * relaxation_time
+
+    def change(t, y):
+        a = y.reshape(3, 3)
+        return ((scaled @ a + a @ scaled.T + law(a, scaled, **constants)) / relaxation_time).ravel()
+
+    # Radau: retraction is stiff
+    found = solve_ivp(change, (0, times[-1]), ONE.ravel(), "Radau", times, rtol=1e-9, atol=1e-11)
+    conformation = found.y.T.reshape(-1, 3, 3)
+    if law is not rolie_poly_fene:
+        return conformation - ONE
+    squared = np.trace(conformation, axis1=1, axis2=2) / 3
+    return cohen(squared, constants["maximum_stretch"] ** 2)[:, None, None] * (conformation - ONE)

@@ -1,0 +1,121 @@
+"""What a flow solver has to know of a law: how short its steps must be, and whether A stays one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.integrate import solve_ivp
+
+from discover.equations.equation import Equation
+from discover.laws.base import AbstractConstitutiveLaw
+
+_PERIODS, _SAMPLES = 3.0, 200
+_TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits a step
+
+
+@dataclass(frozen=True)
+class InASolver:
+    """The extremes over the edge of a law's box.
+
+    Attributes
+    ----------
+    weissenberg
+        Largest Wi of the box, at which the flows were.
+    smallest_eigenvalue, of_mode
+        Of I + σ_k/G_k, dimensionless, and its mode counted from 1; NaN where the law ran away.
+    largest_step, limiting_mode
+        Longest stable step of explicit Euler for the stress of a mode, in s; infinite where nothing
+        decays.
+    """
+
+    weissenberg: float
+    smallest_eigenvalue: float
+    of_mode: int
+    largest_step: float
+    limiting_mode: int
+
+    @property
+    def text(self) -> str:
+        """The same in one sentence."""
+        flows = f"At Wi {self.weissenberg:.3g}, the edge of the box, in start-up and oscillation"
+        if not np.isfinite(self.smallest_eigenvalue):
+            return f"{flows} of shear, mode {self.of_mode} runs away."
+        lost = "" if self.smallest_eigenvalue > 0.0 else ", no conformation any more"
+        smallest = f"{self.smallest_eigenvalue:.3g}{lost} (mode {self.of_mode})"
+        step = f"{self.largest_step:.3g} s (mode {self.limiting_mode})"
+        return (
+            f"{flows} of shear: smallest eigenvalue of I + stress/G {smallest}; explicit Euler of "
+            f"the stress alone is stable up to {step}."
+        )
+
+
+def in_a_solver(equation: Equation) -> InASolver | None:
+    """Return how a law behaves at the edge of the box in which it was learned; None without one.
+
+    Each mode goes through start-up of shear at the largest Wi, and through oscillation at the
+    largest Wi and the least and the largest De. A step is stable where |1 + Δt μ| ≤ 1 for every
+    eigenvalue μ of the linearised stress equation that decays.
+
+    Parameters
+    ----------
+    equation
+        The law.
+    """
+    if equation.tested is None:
+        return None
+    mean, box = equation.mean_relaxation_time, equation.tested.learned_in
+    amplitude = box.weissenberg[1] / mean
+    eigenvalues, steps = [], []
+    for k, time in enumerate(equation.relaxation_time):
+        law = equation.mode(k).law()
+        flows = [(0.0, 10.0 * max(1.0, mean / time))]
+        for deborah in dict.fromkeys(box.deborah):
+            frequency = deborah / mean * time
+            flows.append((frequency, _PERIODS * 2.0 * np.pi / frequency))
+        lowest, longest = np.transpose([_extremes(law, time * amplitude, *flow) for flow in flows])
+        eigenvalues.append(lowest.min())
+        steps.append(time * longest.min())
+    worst = int(np.argmin(eigenvalues))  # a NaN counts as the least
+    limiting = int(np.argmin(steps))
+    return InASolver(
+        weissenberg=box.weissenberg[1],
+        smallest_eigenvalue=float(eigenvalues[worst]),
+        of_mode=worst + 1,
+        largest_step=float(steps[limiting]),
+        limiting_mode=limiting + 1,
+    )
+
+
+@jax.jit
+def _rate(law: AbstractConstitutiveLaw, stress: Float[Array, "4"], shear_rate: Float[Array, ""]):
+    return law.stress_rate(stress, shear_rate)
+
+
+_jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(None, 0, 0)))
+
+
+def _extremes(
+    law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float
+) -> tuple[float, float]:
+    """Return the smallest eigenvalue of I + σ/G and the longest step; NaN if σ runs away."""
+    times = np.linspace(0.0, end, _SAMPLES)
+
+    def rate_at(t):
+        return jnp.asarray(amplitude * np.cos(frequency * t))
+
+    found = solve_ivp(
+        lambda t, y: np.asarray(_rate(law, jnp.asarray(y), rate_at(t))),
+        (0.0, end), np.zeros(4), "LSODA", times, rtol=1e-6, atol=1e-9,
+    )  # fmt: skip
+    if not found.success or not np.all(np.isfinite(found.y)):
+        return np.nan, np.inf
+    s11, s22, s33, s12 = found.y
+    in_plane = 1.0 + 0.5 * (s11 + s22) - np.hypot(0.5 * (s11 - s22), s12)
+    rates = rate_at(times)
+    mu = np.linalg.eigvals(np.asarray(_jacobians(law, jnp.asarray(found.y.T), rates)))
+    decaying = mu[mu.real < -_TRUE_RATE]
+    steps = -2.0 * decaying.real / np.abs(decaying) ** 2
+    return float(min(in_plane.min(), 1.0 + s33.min())), float(steps.min(initial=np.inf))

@@ -1,0 +1,107 @@
+"""An isotropic tensor function written out, so that a law that is no sum of terms can leave too."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tensor_library.integrity_basis import TENSOR_NAMES
+from tensor_library.invariants import INVARIANT_NAMES
+from tensor_library.notation import Notation, T
+
+if TYPE_CHECKING:
+    import sympy
+
+RESERVED = ("s", "d", "unit", "constant", "mode", "np", "sympy")
+"""Names that the exported text has for its own."""
+
+
+def scalars(*names: str) -> Any:
+    """Return the SymPy symbols of invariants, constants and defined scalars; one alone as itself.
+
+    Examples
+    --------
+    >>> from tensor_library.isotropic_function import scalars
+    >>> scalars("tr(sigma)") / scalars("L2")
+    tr(sigma)/L2
+    """
+    import sympy
+
+    found = tuple(sympy.Symbol(name, real=True) for name in names)
+    return found[0] if len(found) == 1 else found
+
+
+@dataclass(frozen=True)
+class IsotropicFunction:
+    """h = Σ gₙ Tₙ(σ, γ̇), with each gₙ an expression in the invariants and in constants.
+
+    Attributes
+    ----------
+    coefficients
+        gₙ by the name of the tensor in `TENSOR_NAMES`, SymPy expressions over `scalars`.
+    where
+        Scalars defined on the way, in order, each over what stands before it.
+    letters
+        LaTeX of those constants and scalars whose names are no letters.
+
+    Raises
+    ------
+    ValueError
+        If there is no such tensor, or a name is none that a program could have.
+
+    Examples
+    --------
+    >>> from tensor_library.isotropic_function import IsotropicFunction, scalars
+    >>> IsotropicFunction({"sigma": scalars("epsilon") * scalars("tr(sigma)")}).constants
+    ('epsilon',)
+    """
+
+    coefficients: Mapping[str, "sympy.Expr"]
+    where: Mapping[str, "sympy.Expr"] = field(default_factory=dict)
+    letters: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        unknown = [name for name in self.coefficients if name not in TENSOR_NAMES]
+        if unknown:
+            raise ValueError(f"{unknown[0]!r} is not one of {', '.join(TENSOR_NAMES)}.")
+        names = [*self.where, *self.constants]
+        wrong = [name for name in names if name in RESERVED or not name.isidentifier()]
+        if wrong:
+            raise ValueError(
+                f"{wrong[0]!r} cannot name a constant; write a word other than "
+                f"{', '.join(RESERVED)}."
+            )
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of the constants, in alphabetical order."""
+        expressions = [*self.coefficients.values(), *self.where.values()]
+        names = {str(symbol) for one in expressions for symbol in one.free_symbols}
+        return tuple(sorted(names - {*INVARIANT_NAMES, *self.where}))
+
+    def spell(
+        self, notation: Notation[T], letters: Mapping[str, T]
+    ) -> tuple[list[tuple[str, T]], list[T]]:
+        """Return what is defined on the way, by name, and the summands of h, in a notation.
+
+        Parameters
+        ----------
+        notation
+            How to write it.
+        letters
+            How the constants and the scalars defined on the way are written.
+        """
+        known = {**letters}
+        for name in INVARIANT_NAMES:
+            inside = name.removeprefix("tr(").removesuffix(")").split(".")
+            known[name] = notation.trace(notation.contraction([*map(notation.tensor, inside)]))
+        defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]
+        summands = []
+        for name, coefficient in self.coefficients.items():
+            parts = [
+                notation.contraction([*map(notation.tensor, part.split("."))])
+                for part in name.split("+")
+            ]
+            tensor = parts[0] if len(parts) == 1 else notation.sum(parts)
+            one = notation.scalar(coefficient, known, factor=True)
+            summands.append(notation.product([one, tensor]))
+        return defined, summands

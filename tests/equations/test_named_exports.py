@@ -1,0 +1,402 @@
+"""Laws with a name, in two modes whose constants differ, read back from every format.
+
+The reference is each law as its authors write it, integrated by scipy; every text is read by what
+would run it, and integrated by scipy too.
+"""
+
+import functools
+import json
+import re
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import sympy
+from independent import authors
+from independent.homogeneous import UNIT
+from scipy.integrate import solve_ivp
+from sympy.parsing.latex import parse_latex
+
+from discover.equations import (
+    FORMATS,
+    Equation,
+    EquationTerm,
+    NamedPart,
+    equation_from_json,
+    equation_to_json,
+    law_parts,
+    read_rheotool,
+    write_equation,
+)
+from discover.equations.mathml import law_element
+from discover.errors import InputError
+from discover.laws import LAWS, make_law
+from discover.laws.registry import starting_values
+
+MODULUS, TIME = (40.0, 5.0), (0.3, 1.5)
+TIMES = np.linspace(0.1, 1.5, 8)
+GRADIENTS = {"shear": 2.5 * UNIT["shear"], "extension": 0.6 * UNIT["uniaxial"]}
+# of each mode; what is alike in both is written once in LaTeX
+CONSTANTS = {
+    "rolie_poly": tuple({"stretch_time_ratio": ratio, "beta": 0.7} for ratio in (0.3, 0.2)),
+    "rolie_poly_fene": (
+        {"stretch_time_ratio": 0.3, "beta": 0.5, "maximum_stretch": 2.0},
+        {"stretch_time_ratio": 0.3, "beta": 0.5, "maximum_stretch": 3.0},
+    ),
+    "xpp": (
+        {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1},
+        {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.2},
+    ),
+    "white_metzner": ({"k": 0.8, "n": 0.4}, {"k": 0.5, "n": 0.4}),
+    "saramito": ({"yield_strain": 0.4}, {"yield_strain": 0.2}),
+    "giesekus_non_affine": ({"alpha": 0.2, "xi": 0.1}, {"alpha": 0.3, "xi": 0.1}),
+    "ptt_exponential_non_affine": ({"epsilon": 0.2, "xi": 0.15}, {"epsilon": 0.1, "xi": 0.15}),
+}  # fmt: skip
+every_law = pytest.mark.parametrize("name", CONSTANTS)
+
+
+def equation(name, constants=None):
+    return Equation((), MODULUS, TIME, named=NamedPart(name, constants or CONSTANTS[name]))
+
+
+def reference(name, gradient):
+    law = getattr(authors, name)
+    modes = zip(MODULUS, TIME, CONSTANTS[name], strict=True)
+    return sum(g * authors.stress(law, c, gradient, TIMES, time) for g, time, c in modes)
+
+
+def integrated(rate, gradient):
+    """Return the stress of both modes, of d(stress)/dt = rate(mode, stress, gradient)."""
+    total = 0.0
+    for k in range(2):
+        found = solve_ivp(
+            lambda t, y, k=k: np.asarray(rate(k, y.reshape(3, 3), gradient)).ravel(),
+            (0, TIMES[-1]), np.zeros(9), "LSODA", TIMES, rtol=1e-8, atol=1e-8,
+        )  # fmt: skip
+        total = total + found.y.T.reshape(-1, 3, 3)
+    return total
+
+
+def by_python(text):
+    module = {}
+    exec(text, module)
+
+    def rate(k, stress, gradient):
+        state = np.zeros((2, 3, 3))
+        state[k] = stress
+        return module["stress_rate"](state, gradient)[k]
+
+    return rate
+
+
+def by_sympy(text):
+    module = {}
+    exec(text, module)
+    symbols = [*module["stress_symbols"], *module["gradient_symbols"]]
+    functions = [
+        sympy.lambdify(symbols, [*module["stress_rate"].subs(values)], "math", cse=True)
+        for values in module["values"]
+    ]
+
+    def rate(k, stress, gradient):
+        modulus, time = module["modes"][k]
+        s = stress / modulus
+        components = (s[0, 0], s[0, 1], s[0, 2], s[1, 1], s[1, 2], s[2, 2])
+        found = functions[k](*components, *(time * gradient).ravel())
+        return modulus / time * np.reshape(found, (3, 3))
+
+    return rate
+
+
+def by_json(text):
+    """The name and the constants; the equation is the authors' in the stress, by A = I + σ."""
+    content = json.loads(text)["named"]
+    law = getattr(authors, content["law"])
+
+    def rate(k, stress, gradient):
+        assert content["law"] != "rolie_poly_fene"  # where σ is not A − I
+        scaled, s = gradient * TIME[k], stress / MODULUS[k]
+        a = np.eye(3) + s
+        change = scaled @ a + a @ scaled.T + law(a, scaled, **content["constants"][k])
+        return MODULUS[k] / TIME[k] * change
+
+    return rate
+
+
+def by_rheotool(text):
+    """RoliePoly.C, XPomPom.C, WhiteMetznerCY.C, Saramito.C and PTT.C of rheoTool, mode by mode."""
+    modes = [
+        dict(re.findall(r"^\s*(\w+)\s.*?(\S+);$", mode, re.M))
+        for mode in re.findall(r"M\d+\s*\{(.*?)\}", text, re.S)
+    ]
+
+    def rate(k, tau, gradient):
+        words = modes[k]
+        e = {n: float(v) for n, v in words.items() if re.fullmatch(r"-?[\d.]+(e-?\d+)?", v)}
+        twice, one = gradient + gradient.T, np.eye(3)
+        convected, eta = gradient @ tau + tau @ gradient.T, e["etaP"]
+        if words["type"] == "XPomPom":
+            time = e["lambdaB"]
+            stretch = np.sqrt(1 + np.trace(tau) * time / (3 * eta))
+            f = 2 * time / e["lambdaS"] * np.exp(2 / e["q"] * (stretch - 1)) * (1 - 1 / stretch)
+            f += (1 - e["alpha"] / 3 * np.trace(tau @ tau) * (time / eta) ** 2) / stretch**2
+            left = f / time * tau + e["alpha"] / eta * tau @ tau + eta / time**2 * (f - 1) * one
+            return convected - left + eta / time * twice
+        if words["type"] == "WhiteMetznerCY":
+            size = np.sqrt(2) * np.linalg.norm(twice / 2)
+            viscosity = eta * (1 + (e["K"] * size) ** e["a"]) ** ((e["n"] - 1) / e["a"])
+            time = e["lambda"] * (1 + (e["L"] * size) ** e["b"]) ** ((e["m"] - 1) / e["b"])
+            return convected - tau / time + viscosity / time * twice
+        time = e["lambda"]
+        if words["type"] == "Saramito":
+            assert words["PTTfunction"] == "none"
+            assert "(1 1 1);" in text
+            size = np.linalg.norm(tau - np.trace(tau) / 3 * one) / np.sqrt(2)
+            factor = max(0.0, (size - e["tau0"]) / (eta * size + 1e-16))
+            return convected + eta / time * twice - factor * eta / time * tau
+        assert words["type"] == "PTT"
+        assert words["destructionFunctionType"] == "exponential"
+        slip = 0.5 * e["zeta"] * (tau @ twice + twice @ tau)
+        loss = np.exp(e["epsilon"] * time / eta * np.trace(tau)) / time * tau
+        return convected + eta / time * twice - slip - loss
+
+    return rate
+
+
+def rolie_poly_by_rheotool(text, gradient):
+    """RoliePoly.C, in the conformation."""
+    total = np.zeros((len(TIMES), 3, 3))
+    for mode in re.findall(r"M\d+\s*\{(.*?)\}", text, re.S):
+        e = dict(re.findall(r"^\s*(\w+)\s.*?(\S+);$", mode, re.M))
+        assert e.pop("type") == "Rolie-Poly"
+        e = {n: float(v) for n, v in e.items() if n != "stabilization"}
+
+        def spring(trace, limit=e["chiMax"]):
+            squared = trace / 3.0
+            if limit <= 1.0:
+                return 1.0
+            m = limit**2
+            return (3 - squared / m) * (1 - 1 / m) / ((1 - squared / m) * (3 - 1 / m))
+
+        def rate(t, y, e=e, spring=spring):
+            a, one = y.reshape(3, 3), np.eye(3)
+            trace = np.trace(a)
+            m1 = 2 * (1 - np.sqrt(3 / trace)) / e["lambdaR"] * spring(trace)
+            released = e["beta"] * (trace / 3) ** e["delta"] * (a - one)
+            return (
+                gradient @ a + a @ gradient.T - (a - one) / e["lambdaD"] - m1 * (a + released)
+            ).ravel()
+
+        start = np.eye(3).ravel()
+        y = solve_ivp(rate, (0, TIMES[-1]), start, "LSODA", TIMES, rtol=1e-8, atol=1e-10).y
+        factor = e["etaP"] / e["lambdaD"]
+        total = total + [
+            factor * spring(np.trace(a)) * (a - np.eye(3)) for a in y.T.reshape(-1, 3, 3)
+        ]
+    return total
+
+
+READERS = {"python": by_python, "sympy": by_sympy, "json": by_json, "rheotool": by_rheotool}
+
+
+@every_law
+def test_every_text_flows_as_the_law_in_shear_and_in_extension(name):
+    texts = {form: write_equation(equation(name), form) for form in FORMATS if form != "rheotool"}
+    if name == "giesekus_non_affine":
+        with pytest.raises(InputError, match="rheoTool cannot take this law"):
+            write_equation(equation(name), "rheotool")
+    else:
+        texts["rheotool"] = write_equation(equation(name), "rheotool")
+    for gradient in GRADIENTS.values():
+        wanted = reference(name, gradient)
+        scale = np.max(np.abs(wanted))
+        for form, reader in READERS.items():
+            if form not in texts or (form == "json" and name == "rolie_poly_fene"):
+                continue
+            if form == "rheotool" and name.startswith("rolie_poly"):
+                found = rolie_poly_by_rheotool(texts[form], gradient)
+            else:
+                found = integrated(reader(texts[form]), gradient)
+            # rtol of the integrations, 1e-8, with room for ten times as fast a retraction
+            assert np.max(np.abs(found - wanted)) < 1e-6 * scale, form
+
+
+def test_constants_that_are_exchanged_between_modes_would_show():
+    """Negative control of the test above."""
+    other = equation("xpp", CONSTANTS["xpp"][::-1])
+    wanted = reference("xpp", GRADIENTS["extension"])
+    found = integrated(by_python(write_equation(other, "python")), GRADIENTS["extension"])
+    assert np.max(np.abs(found - wanted)) > 1e-3 * np.max(np.abs(wanted))
+
+
+def states(seed=1, number=3):
+    """Return stresses of fluids that flow, I + σ positive definite, and rates without trace."""
+    generator = np.random.default_rng(seed)
+    for _ in range(number):
+        root = 0.6 * generator.normal(size=(3, 3)) + np.eye(3)
+        rate = generator.normal(size=(3, 3))
+        rate = rate + rate.T
+        yield root @ root.T - np.eye(3), rate - np.trace(rate) / 3 * np.eye(3)
+
+
+def extra_of(name, constants, stress, rate):
+    law = make_law(name, constants)
+    return np.asarray(law.extra_term(jnp.asarray(stress), jnp.asarray(rate)))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_ufl_says_every_law_that_has_a_name(name):
+    ufl = pytest.importorskip("ufl")
+    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+    from ufl.utils.stacks import StackDict
+
+    module = {}
+    exec(write_equation(equation(name, (starting_values(name),)), "ufl"), module)
+    for stress, rate in states():
+        gradient = 0.5 * rate + 0.3 * (UNIT["shear"] - UNIT["shear"].T)
+        arguments = (
+            ufl.as_matrix((g * x).tolist()) for g, x in ((MODULUS[1], stress), (1, gradient))
+        )
+        expression = apply_algebra_lowering(module["stress_rate"](*arguments, 1))
+        place = [(i, j) for i in range(3) for j in range(3)]
+        found = [float(expression.evaluate((), {}, ij, StackDict())) for ij in place]
+        scaled = TIME[1] * gradient
+        d = scaled + scaled.T
+        wanted = d + scaled @ stress + stress @ scaled.T - stress
+        wanted = wanted - extra_of(name, starting_values(name), stress, d)
+        wanted *= MODULUS[1] / TIME[1]
+        np.testing.assert_allclose(
+            np.reshape(found, (3, 3)), wanted, atol=1e-10 * np.max(abs(wanted))
+        )
+
+
+# what SymPy's reader of LaTeX knows: letters and functions of one letter
+_WORDS = (
+    (r"\dot{\boldsymbol{\gamma}}", r"\gamma"), (r"\boldsymbol{\sigma}", r"\sigma"),
+    (r"\boldsymbol{I}", "I"), (r"\operatorname{tr}", "T"), (r"\max", "M"),
+    (r"\left|\sigma_\mathrm{d}\right|", "D"), (r"\Lambda_\mathrm{m}", r"\Omega"),
+    ("L^{2}", "N"), ("_{k}", ""), (r"\left", ""), (r"\right", ""),
+    (r" \, ", r" \cdot "),
+)  # fmt: skip
+
+
+@functools.cache
+def read_latex(text):
+    for old, new in _WORDS:
+        text = text.replace(old, new)
+    return parse_latex(text, strict=True)
+
+
+def value(tree, letters):
+    """Evaluate a tree, with matrices for the tensors."""
+    if tree.is_Symbol:
+        return letters[tree.name]
+    if tree.is_number:
+        return float(tree)
+    parts = [value(part, letters) for part in tree.args]
+    if tree.is_Add:
+        return sum(parts)
+    if tree.is_Mul:
+        product = parts[0]
+        for part in parts[1:]:
+            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
+        return product
+    if tree.is_Pow:
+        return parts[0] ** parts[1]
+    name = tree.func.__name__
+    if name in ("exp", "Abs"):
+        return {"exp": np.exp, "Abs": abs}[name](parts[0])
+    return {"T": np.trace, "M": max}[name](*parts)
+
+
+@every_law
+def test_latex_says_the_law_and_has_the_constants_of_each_mode(name):
+    text = write_equation(equation(name), "latex")
+    law = text.split("\\begin{equation}\n")[1].split("\n\\end{equation}")[0].strip()
+    where, modes = (
+        part.split("\n\\end{align}")[0].splitlines() for part in text.split("\\begin{align}\n")[1:]
+    )
+    for k, constants in enumerate(CONSTANTS[name]):
+        numbers = [entry.split("&=") for entry in modes[k].split(r"\\")[0].split(", & ")]
+        own = {
+            read_latex(left.strip().replace(f"_{{{k + 1}}}", "")).name: float(right)
+            for left, right in numbers[2:]
+        }
+        assert set(own.values()) == {
+            v for n, v in constants.items() if v != CONSTANTS[name][1 - k][n]
+        }
+        lines = [line.removesuffix(r" \\").split(" &= ") for line in where]
+        # constants stand last
+        numbers = [line for line in lines if re.fullmatch(r"[\d.]+", line[1])]
+        for stress, rate in states():
+            letters = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **own}
+            for left, right in [*numbers, *(line for line in lines if line not in numbers)]:
+                letters[read_latex(left).name] = value(read_latex(right), letters)
+            found = rate - stress - value(read_latex(law.partition(" = ")[2]), letters)
+            wanted = extra_of(name, constants, stress, rate)
+            np.testing.assert_allclose(
+                found, wanted, atol=1e-7 * np.max(abs(wanted))
+            )  # nine digits
+
+
+@every_law
+def test_json_and_rheotool_give_back_the_constants_of_each_mode(name):
+    one = equation(name)
+    assert equation_from_json(json.loads(write_equation(one, "json"))) == one
+    if name == "giesekus_non_affine":
+        return
+    again = read_rheotool(write_equation(one, "rheotool"))
+    assert again.named is not None
+    for found, wanted in zip(again.named.constants, CONSTANTS[name], strict=True):
+        assert found == pytest.approx(wanted, rel=1e-12)
+    np.testing.assert_allclose(again.relaxation_time, TIME)
+
+
+def test_terms_are_added_to_a_law_with_a_name():
+    law = make_law("rolie_poly", CONSTANTS["rolie_poly"][0])
+    term = EquationTerm("sigma.gammadot+gammadot.sigma", 0.1)
+    both = Equation((term,), named=law_parts(law)[0])
+    again = equation_from_json(equation_to_json(both))
+    module = {}
+    exec(write_equation(again, "python"), module)
+    for stress, rate in states():
+        wanted = extra_of("rolie_poly", CONSTANTS["rolie_poly"][0], stress, rate)
+        wanted = wanted + 0.1 * (stress @ rate + rate @ stress)
+        np.testing.assert_allclose(module["extra_term"](stress, rate), wanted, rtol=1e-12)
+        by_law = again.law().extra_term(jnp.asarray(stress), jnp.asarray(rate))
+        np.testing.assert_allclose(by_law, wanted, rtol=1e-12)
+    with pytest.raises(InputError, match="none beside rolie_poly"):
+        write_equation(again, "rheotool")
+    assert "<msqrt>" in law_element(both.terms, True, both.named)
+    assert "scalar" not in law_element(both.terms, True, both.named)
+
+
+def test_a_law_of_the_users_own_that_nobody_wrote_out_is_kept_by_name_and_refused_as_text():
+    from discover.laws import NamedLaw
+
+    LAWS["of_this_test"] = NamedLaw("of this test", LAWS["xpp"].build, LAWS["xpp"].parameters)
+    try:
+        one = equation("of_this_test", CONSTANTS["xpp"][:1])
+        assert equation_from_json(equation_to_json(one)) == one
+        for form in ("python", "sympy", "ufl", "latex"):
+            with pytest.raises(InputError, match="`written`"):
+                write_equation(one, form)
+    finally:
+        del LAWS["of_this_test"]
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"law": "nobody"}, "Unknown law 'nobody'"),
+        ({"constants": [{"q": 4.0}]}, "needs its parameter"),
+        ({"constants": [{"q": -4.0, "stretch_time_ratio": 0.2, "alpha": 0.1}]}, "from 1 to 100"),
+        ({"constants": [CONSTANTS["xpp"][0]] * 3}, "once for each"),
+        ({"constants": []}, "named.constants"),
+    ],
+)
+def test_a_name_or_a_constant_that_is_none_is_refused(change, word):
+    content = equation_to_json(equation("xpp"))
+    content["named"] |= change
+    with pytest.raises(InputError, match=word):
+        equation_from_json(content)
