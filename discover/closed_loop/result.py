@@ -104,7 +104,8 @@ class Stage:
     parameters
         Its parameters in the final model.
     aliases
-        Effects that these data cannot tell from it.
+        Effects that these data cannot tell from it, and `relaxation_time_factor` where one factor
+        on all declared times does as well.
     error
         Errors after this stage.
     evidence
