@@ -1,6 +1,7 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
