@@ -226,6 +226,10 @@ class Comparison(PageView, NotebookView):
             yield "Laws that these data do not tell from the one found by sparse regression:"
             yield self.rivals_table()
 
+    def known_part_of(self, learner: str) -> Equation:
+        """Return the known part below what a learner found; upper convected Maxwell if unsaid."""
+        return self.known_of.get(learner, self.known) or Equation(())
+
     def equation(self, learner: str) -> Equation:
         """Return the law that a learner found, with its modes and the box where it was tested."""
         known = self.known_of.get(learner, self.known)

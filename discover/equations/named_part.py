@@ -66,6 +66,11 @@ class NamedPart:
         return tuple(n for n in first if any(one[n] != first[n] for one in self.constants))
 
     @property
+    def is_written(self) -> bool:
+        """Whether somebody said how the law is written."""
+        return LAWS[self.law].written is not None
+
+    @property
     def function(self) -> IsotropicFunction:
         """The law written out.
 

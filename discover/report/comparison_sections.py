@@ -107,7 +107,10 @@ def sections(comparison: Comparison, run: Content, linear_relaxation: bool) -> l
 def _outline(comparison: Comparison, linear_relaxation: bool):
     def laws() -> Content:
         outcomes = comparison.outcomes.values()
-        drawn = [tables.law(outcome, linear_relaxation) for outcome in outcomes]
+        drawn = [
+            tables.law(outcome, linear_relaxation, comparison.known_part_of(outcome.learner))
+            for outcome in outcomes
+        ]
         return {"laws": drawn, "standing": _STANDING[comparison.verdict]}
 
     def terms() -> Content:

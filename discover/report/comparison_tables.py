@@ -9,6 +9,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.constant import in_words as constant_in_words
 from discover.comparison.identifiability import EXACT, Rival
 from discover.comparison.outcome import LearnerOutcome
+from discover.equations import Equation
 from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
@@ -190,16 +191,20 @@ def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: row["constant"])
 
 
-def law(outcome: LearnerOutcome, linear_relaxation: bool) -> dict[str, Any]:
-    """Return a law found, as mathematics, with how its fit ended."""
+def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> dict[str, Any]:
+    """Return a law found with the known part below it, as mathematics, and how its fit ended."""
     message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
     shown = _shown_terms(outcome)
     if len(shown) < len(outcome.terms):
         message += f". Shown are the {len(shown)} terms largest along the runs"
+    named = known.named
+    if named is not None and not named.is_written:
+        message += f". The h of the known law {named.law} is to be added: nobody wrote it out"
+        named = None
     return {
         "title": learner_title(outcome.learner),
         "colour": learner_colour(outcome.learner),
-        "math": law_element(shown, linear_relaxation),
+        "math": law_element([*known.terms, *shown], linear_relaxation, named),
         "message": message,
         "seconds": outcome.train_seconds,
     }

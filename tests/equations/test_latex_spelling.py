@@ -11,7 +11,7 @@ from spelled_laws import EFFECTS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agr
 from sympy.parsing.latex import parse_latex
 
 from discover.comparison.comparison import Comparison
-from discover.equations import Equation, EquationTerm, write_equation
+from discover.equations import Equation, EquationTerm, NamedPart, write_equation
 from discover.report.equations import equations_tex
 from tensor_library.terms import CandidateTerm, parse_term
 
@@ -150,8 +150,15 @@ def test_equations_tex_writes_what_latex_writes():
     outcome = SimpleNamespace(terms=spelled.equation.terms)
     comparison = object.__new__(Comparison)  # of a comparison only this is written
     object.__setattr__(comparison, "outcomes", {"tensor_sindy": outcome})
+    object.__setattr__(comparison, "known_of", {})
     text = equations_tex(comparison, True)
     assert spelled.equation.latex() in text
+    # the known part is part of the law
+    named = NamedPart("rolie_poly", ({"stretch_time_ratio": 0.2, "beta": 1.0},))
+    below = (EquationTerm("sigma.sigma", 0.3),)
+    object.__setattr__(comparison, "known", Equation(below, named=named))
+    whole = Equation(below + spelled.equation.terms, named=named)
+    assert whole.latex() in equations_tex(comparison, True)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)

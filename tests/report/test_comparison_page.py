@@ -112,7 +112,7 @@ def page_of(comparison, folder):
 def no_pictures(monkeypatch):
     """Leave pictures out where only words are asked for."""
     module = "discover.report.comparison_report.comparison_pictures"
-    monkeypatch.setattr(module, lambda comparison: ([], []))
+    monkeypatch.setattr(module, lambda *_: ([], []))
 
 
 @pytest.mark.parametrize("number", NOT_THERE[:2])
