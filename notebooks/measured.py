@@ -154,7 +154,7 @@ if found is not None:
 #   better than a sixth of their stress; Giesekus's mobility goes to the end of its range. The laws
 #   that fit about as well differ in runs that they did not see, and neither N1 nor N2 follows from σ12.
 # - **What is missing** is a loss of network with strain: the second loop takes most of the error on the
-#   fitted runs, much less of that on the judges, and so ends in *unexplained*. An effect that fits and
+#   fitted runs and on the slower judge, makes the faster one worse, and so ends in *unexplained*. An effect that fits and
 #   does not carry over is a description of these runs, not a mechanism.
 # - **What would settle it**: runs at −10 °C as fast, on the chains' own time, as those at −23 °C, and N1
 #   from an instrument stiff enough to measure it.
