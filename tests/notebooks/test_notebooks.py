@@ -75,6 +75,7 @@ def test_the_batch_notebook_goes_on_after_a_stop_and_lists_the_failure(monkeypat
 
 
 @pytest.mark.measured
+@pytest.mark.slow
 def test_the_measured_notebook_goes_round_the_circle(measured_data, monkeypatch):
     del measured_data  # only whether it is there
     text = executed_text("measured", monkeypatch)
