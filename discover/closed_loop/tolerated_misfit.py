@@ -1,7 +1,7 @@
 """What a fit leaves, held against what a complete model would leave."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -10,8 +10,14 @@ from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.forward import even
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left
-from discover.statistics.residual import STRUCTURE, Expectation, tells_noise
-from discover.statistics.whiteness import SIGNIFICANCE
+from discover.statistics.residual import (
+    FEWEST_FAST,
+    STRUCTURE,
+    Expectation,
+    fast_part,
+    tells_noise,
+)
+from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,31 @@ class ToleratedMisfit:
             seen = w[w > 0]
             rows.append(row[w > 0] / seen / even(seen))
             records.append(record[w > 0] / even(seen))
-        return what_is_left(rows, records, self.expectation)
+        return self._of_separate_samples(
+            what_is_left(rows, records, self.expectation), rows, records
+        )
+
+    def _of_separate_samples(self, left: LackOfFit, rows, records) -> LackOfFit:
+        """Return the same, but for a pattern in flow curves and sweeps, which no noise has."""
+        kinds = [run.protocol.control in ("steady", "oscillation") for run in self.resolution.runs]
+        separate = [
+            (row, float(np.sqrt(np.mean(record**2))) or 1.0)
+            for row, record, kind in zip(rows, records, kinds, strict=True)
+            if kind and len(row) >= FEWEST_FAST
+        ]
+        if left.verdict != "explained" or not separate:
+            return left
+        probability = separate_probability([row for row, _ in separate])
+        fast = np.array([fast_part(row) / size for row, size in separate])
+        sizes = np.array([np.sqrt(np.mean(row**2)) / size for row, size in separate])
+        pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
+        known = self.expectation.noise is not None and left.misfit <= left.expected
+        if probability > SIGNIFICANCE or known:
+            return left
+        if pattern <= STRUCTURE * self.expectation.linear_error:
+            return left
+        reason = f"what is left ({100 * left.misfit:.2g} %) has a pattern that noise has not"
+        return replace(left, verdict="unexplained", probability=probability, reason=reason)
 
     def explained(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves is what a complete model may leave."""

@@ -25,6 +25,7 @@ SIGNIFICANCE = 0.01
 and of what noise leaves once in a thousand times nobody would say that it is noise."""
 
 _SAMPLES_PER_LAG = 4
+_NEAREST, _LOTS = 3, 4000
 _TRIED = 10
 _LARGEST = 3.0  # robust standard deviations up to which one innovation counts
 _NEIGHBOURHOOD = FEWEST_TESTED + 1
@@ -92,6 +93,31 @@ def noise_probability(
         tests.append(_repeats(white, count, cycles))
     tests.append(smooth_misfit_probability(rows))
     return float(min(1.0, len(tests) * min(tests)))
+
+
+def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
+    """Return how probable neighbours that agree as much as these are, if each sample is separate.
+
+    The points of a flow curve or of a sweep are experiments of their own: their noise has no
+    correlation, however smooth what a law leaves of them is, and few points tell it. Products of
+    the nearest neighbours are held against those of the same numbers with signs drawn by lot, so it
+    holds whatever their size does along the series   [Liu 1988, Ann. Stat. 16, 1696]. Always the
+    same lots are drawn.
+
+    Parameters
+    ----------
+    rows
+        Residuals of each series in the order of its rates, in any unit.
+    """
+    generator = np.random.default_rng(0)
+    own, drawn = 0.0, np.zeros(_LOTS)
+    for values in rows:
+        row = values / _spread(values)
+        lots = generator.choice([-1.0, 1.0], (_LOTS, len(row))) * row
+        for lag in range(1, (_NEAREST if len(row) >= FEWEST_TESTED else 1) + 1):
+            own += float(row[lag:] @ row[:-lag])
+            drawn += np.einsum("dt,dt->d", lots[:, lag:], lots[:, :-lag])
+    return float((1 + np.count_nonzero(drawn >= own)) / (1 + _LOTS))
 
 
 def cycle(record: Float[np.ndarray, " n"]) -> float | None:

@@ -107,3 +107,15 @@ def test_the_page_of_a_flow_curve_has_the_rate_below_it_and_not_time(tmp_path):
     page = loop.to_html(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "shear rate (1/s)" in page
     assert "time (s)" not in page
+
+
+# the points are separate experiments: what is smooth in what is left of them is no noise
+def test_a_flow_curve_that_no_law_has_is_not_explained_by_the_nearest(tmp_path):
+    generator, rates = np.random.default_rng(1), np.geomspace(0.05, 10.0, 25)
+    # thins as none of the candidates does   [Carreau 1972]
+    stress = MODULUS * TIME * rates * (1.0 + (TIME * rates) ** 2) ** -0.3
+    noisy = stress * (1.0 + NOISE * generator.standard_normal(25))
+    write_table(tmp_path / "flow_curve.csv", {"shear_rate_1_s": rates, "stress_Pa": noisy})
+    data = dc.load_dataset(tmp_path).with_material_functions()
+    loop = dc.close_loop(data, BASE, effects=EFFECTS, explanations=1, max_effects=1)
+    assert loop.verdict == "unexplained"

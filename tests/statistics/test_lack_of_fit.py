@@ -5,7 +5,7 @@ import pytest
 
 from discover.statistics import holds_signal, lack_of_fit
 from discover.statistics.residual import Expectation
-from discover.statistics.whiteness import cycle, noise_probability
+from discover.statistics.whiteness import cycle, noise_probability, separate_probability
 
 SAMPLES = 300
 TIMES = np.linspace(0.1, 60.0, SAMPLES)
@@ -137,3 +137,19 @@ def test_one_steady_flow_does_not_tell_a_constant_from_an_answer():
 def test_a_model_that_misses_all_of_a_record_explains_nothing():
     found = lack_of_fit([-correlated(0.0, 0)], [correlated(0.0, 0)], Expectation())
     assert found.verdict == "no_signal"
+
+
+def test_separate_points_of_noise_alone_agree_as_seldom_as_the_level_says():
+    generator = np.random.default_rng(2)
+    # louder where the stress is large, as of a flow curve
+    rows = [generator.standard_normal(n) * np.geomspace(1.0, 3.0, n) for n in [7, 12, 25] * 100]
+    low = sum(separate_probability([row]) <= 0.05 for row in rows)
+    # 5 % of 300, within three standard deviations of a binomial count
+    assert low <= 15 + 3 * np.sqrt(300 * 0.05 * 0.95)
+
+
+def test_a_smooth_misfit_of_separate_points_is_no_noise_though_few_are_tested_otherwise():
+    smooth = np.cos(np.linspace(0.0, 2.0 * np.pi, 20))
+    left = 3.0 * smooth + np.random.default_rng(0).standard_normal(20)
+    assert noise_probability(left[None], np.ones((1, 20))) is None
+    assert separate_probability([left]) < 0.01
