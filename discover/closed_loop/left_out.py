@@ -9,6 +9,8 @@ from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, gauss_newton_step
 
 _MISSED = 10.0
+_WORSE = 2.0
+"""Squared misfit of what is kept, over that of the whole fit, from which on a step is no fit."""
 
 
 def left_out_errors(
@@ -65,6 +67,14 @@ def left_out_parts(
         trials.append(theta)
     with np.errstate(over="ignore", invalid="ignore"):
         squares = [residual**2 for residual in model.residuals(trials, batch)]
+        # what is left has to fit better without the others than with them: a step that does not is
+        # too long for a first derivative, as of a constant that the data leave open
+        own = fit.residual**2
+        for i, left_out in enumerate(folds):
+            kept = weighted & ~left_out
+            cost = np.sum(squares[i][kept])
+            if np.isfinite(cost) and cost > _WORSE * np.sum(own[kept]):
+                squares[i] = own
     squares = [np.where(np.isfinite(missed), missed, np.inf) for missed in squares]
     return list(zip(folds, squares, strict=True))
 

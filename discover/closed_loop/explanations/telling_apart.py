@@ -130,7 +130,7 @@ def _varied(model: AugmentedModel, one: Carried, batch: Batch) -> list[np.ndarra
 
 def _predicted(
     model: AugmentedModel, varied: Sequence[Sequence[np.ndarray]], batch: Batch
-) -> list[Float[np.ndarray, "varied runs n"]]:
+) -> list[Float[np.ndarray, "_ runs n"]]:
     flat = [theta for thetas in varied for theta in thetas]
     ends = np.cumsum([len(thetas) for thetas in varied])[:-1]
     return np.split(model.predictions(flat, batch), ends)
@@ -166,7 +166,7 @@ def _elsewhere(model: AugmentedModel):
 
 def _weighed(
     test: PossibleTest,
-    predicted: Sequence[Float[np.ndarray, "varied n"]],
+    predicted: Sequence[Float[np.ndarray, "_ n"]],
     share: Float[np.ndarray, " e"],
     noise: float,
     fresh: float,
