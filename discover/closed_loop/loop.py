@@ -253,6 +253,7 @@ def run_loop(
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
+    fluid = _fluid(model, current, [*active, *known])
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),
@@ -287,7 +288,8 @@ def run_loop(
         next_tests=following,
         laws=tried_laws,
         free_form=forms,
-        fluid=None if differ else _fluid(model, current, [*active, *known]),
+        fluid=None if differ else fluid,
+        fluid_at_mean=fluid if differ else None,
         seconds=time.perf_counter() - started,
     )
 

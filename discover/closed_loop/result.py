@@ -203,7 +203,9 @@ class LoopResult(PageView, HasEquation, NotebookView):
         written out.
     fluid
         The augmented fluid, without instrument effects; None where an effect gives it a state that
-        no law of stress and rate can carry.
+        no law of stress and rate can carry, or where its constants differ from mode to mode.
+    fluid_at_mean
+        The same with constants that differ from mode to mode at the mean relaxation time.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
     next_tests
@@ -233,6 +235,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_effects: tuple[DeclaredEffect, ...] = ()
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
+    fluid_at_mean: Fluid | None = field(repr=False, default=None)
     explanations: Explanations = field(default_factory=Explanations)
     next_tests: NextTests = field(repr=False, default_factory=NextTests)
     laws: tuple[LawFit, ...] = ()
@@ -275,7 +278,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             If an effect gives the fluid a state, or adds what is no sum of library terms, or if
             what it adds differs from mode to mode.
         """
-        fluid = self.fluid
+        fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(

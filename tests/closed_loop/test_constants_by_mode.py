@@ -205,10 +205,15 @@ def test_the_picture_says_what_is_determined_and_what_is_not():
     assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=())) is None
 
 
-def test_a_law_by_mode_is_not_written_out_as_one():
-    with pytest.raises(InputError, match="alpha differs from one relaxation mode to the next"):
-        loop((0.1, 0.3, 0.6)).equation()
-    assert loop((0.1, 0.3, 0.6)).to_json()["declared"] == {
+def test_a_law_by_mode_is_written_out_with_the_constants_of_each():
+    result = loop((0.1, 0.3, 0.6))
+    assert result.fluid is None
+    named = result.equation().named
+    assert named is not None
+    assert named.law == "giesekus"
+    found = [mode.value for mode in result.declared_parameters["alpha"].modes]
+    assert [one["alpha"] for one in named.constants] == pytest.approx(found)
+    assert result.to_json()["declared"] == {
         "law": None, "effects": [], "by_mode": ["alpha"],
     }  # fmt: skip
 
