@@ -156,6 +156,7 @@ def test_what_ended_before_an_interruption_is_on_the_page(studies, calm, tmp_pat
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp_path):
     pytest.importorskip("distributed")
     psutil = pytest.importorskip("psutil")

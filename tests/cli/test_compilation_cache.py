@@ -4,6 +4,8 @@ import subprocess
 import sys
 import zlib
 
+import pytest
+
 from discover.compilation_cache import remove_cut_short
 
 SIMULATE = """
@@ -24,6 +26,7 @@ def start(folder):
     return subprocess.run(command, check=True, timeout=300, capture_output=True, text=True).stderr
 
 
+@pytest.mark.slow
 def test_a_program_with_a_solver_in_it_is_kept_and_one_cut_short_is_made_again(tmp_path):
     # a check that calls back to Python would make it one that cannot be kept
     start(tmp_path)

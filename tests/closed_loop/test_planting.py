@@ -116,6 +116,7 @@ def test_a_flaw_of_eight_times_the_noise_is_named_and_held_out_runs_are_predicte
     assert result.error_after.held_out < 0.015 < 0.03 < result.error_before.held_out
 
 
+@pytest.mark.slow
 def test_two_flaws_that_only_together_explain_the_data_are_both_named(planter):
     effects = ("yield_stress", "tool_compliance")
     case = planter.plant(effects, size=0.1, noise=Noise(0.01, 0.6), seed=4)
@@ -145,6 +146,7 @@ def test_a_mechanism_that_is_in_no_dictionary_is_unexplained(planter, mechanism)
     assert result.remaining["structured"]
 
 
+@pytest.mark.slow
 def test_an_effect_that_stood_in_for_another_gives_way_to_it(planter, monkeypatch):
     exchanged = []
     exchange = Search._exchange

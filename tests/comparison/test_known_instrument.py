@@ -170,6 +170,7 @@ def test_the_classical_laws_have_the_gain_too(with_gain):
     assert all(fit.criterion > giesekus.criterion for fit in others)
 
 
+@pytest.mark.slow
 def test_python_takes_what_a_study_does(weak):
     options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, "held_out": weak.names[:1]}
     with pytest.MonkeyPatch.context() as patch:

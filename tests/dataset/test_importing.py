@@ -306,6 +306,7 @@ def test_a_comma_that_may_be_decimal_or_thousands_is_asked_for(tmp_path):
     assert block.cells[0][:2] == ("1.234", "5.678")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("writer", [trios, rheocompass, german])
 def test_a_hundred_damaged_exports_are_imported_or_explained(tmp_path, writer):
     from pathlib import Path

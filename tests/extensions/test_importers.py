@@ -28,6 +28,7 @@ def commands():
     return [shlex.split(line)[1:] for line in blocks(PAGE, "sh")[0].splitlines()]
 
 
+@pytest.mark.slow
 def test_the_importer_of_the_page_makes_a_folder_that_loads(workplace):
     workplace.follow(PAGE)
     time = archives(workplace.folder)
@@ -42,6 +43,7 @@ def test_the_importer_of_the_page_makes_a_folder_that_loads(workplace):
     np.testing.assert_allclose(data[1].stress, stress)
 
 
+@pytest.mark.slow
 def test_the_format_is_kept_with_the_import_so_that_it_can_be_repeated(workplace):
     workplace.follow(PAGE)
     archives(workplace.folder)
@@ -54,6 +56,7 @@ def test_the_format_is_kept_with_the_import_so_that_it_can_be_repeated(workplace
     assert one.read_text() == other.read_text()
 
 
+@pytest.mark.slow
 def test_a_file_that_the_importer_cannot_read_is_refused(workplace):
     workplace.follow(PAGE)
     (workplace.folder / "run1.npz").write_bytes(b"nothing of the kind")
@@ -64,6 +67,7 @@ def test_a_file_that_the_importer_cannot_read_is_refused(workplace):
     assert not (workplace.folder / "melt").exists()
 
 
+@pytest.mark.slow
 def test_without_the_package_the_commands_of_the_page_are_refused(workplace):
     # negative control of the first test
     archives(workplace.folder)

@@ -94,6 +94,7 @@ def test_the_reference_prints_the_effect_too(workplace):
     assert "### `transducer_saturation`" in workplace.run(script=script).stdout
 
 
+@pytest.mark.slow
 def test_without_the_package_the_study_is_refused(workplace):
     # negative control of the tests above
     study = workplace.study(LAW)

@@ -32,6 +32,7 @@ def test_the_learner_of_the_page_is_trained_judged_reported_and_exported(workpla
     assert "Law found by one term" in latex
 
 
+@pytest.mark.slow
 def test_a_learner_may_be_asked_alone(workplace):
     install(workplace.packages, "mine", LEARNER_CODE, project("learners", mine="mine"))
     study = workplace.study(PAGE, more="high_deborah = [1.5]\n")
@@ -44,6 +45,7 @@ def test_a_learner_may_be_asked_alone(workplace):
     assert "mine" in (workplace.folder / "out" / "report.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_what_returns_no_result_is_an_error_that_names_the_learner(workplace):
     code = "import discover as dc\ndc.register_learner('mine', lambda task: None)\n"
     install(workplace.packages, "mine", code, project("learners", mine="mine"))

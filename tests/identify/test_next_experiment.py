@@ -63,6 +63,7 @@ def test_shear_stress_suffices_where_it_separates(about_giesekus):
     assert about_giesekus[0].evidence["network"] > DECISIVE
 
 
+@pytest.mark.slow
 def test_evidence_falls_with_noise_squared_and_with_parameters_that_can_be_readjusted():
     def evidence(noise, covariance):
         laws = [Contender("a", {"sigma.sigma": 0.2}, covariance=covariance)]
@@ -84,6 +85,7 @@ def test_the_squared_distance_is_that_of_the_dense_matrix():
     assert squared_distance(difference, factor) == pytest.approx(dense, rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "laws", "quantities"),
     [

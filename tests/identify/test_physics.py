@@ -48,6 +48,7 @@ def slip():
     return report(JohnsonSegalman(0.4))
 
 
+@pytest.mark.slow
 def test_maxwell_is_sound_except_in_extension_beyond_half(maxwell):
     failed = {c.name for c in maxwell.checks if not c.passed}
     assert failed == {EXTENSION}
@@ -55,6 +56,7 @@ def test_maxwell_is_sound_except_in_extension_beyond_half(maxwell):
     assert maxwell[EXTENSION].value == pytest.approx(0.5, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_slip_without_solvent_bands_from_the_rate_of_its_maximum(slip):
     # σ12 = γ̇/(1 + ξ(2 − ξ)γ̇²), largest at 1/√0.64 = 1.25; the grid is 4 % fine
     assert slip[FLOW_CURVE].passed is False
@@ -98,6 +100,7 @@ def test_steady_maxwell_extension_is_analytic_until_it_is_unstable():
     assert is_stable(np.asarray(jacobian)).tolist() == [True, True, True, False]
 
 
+@pytest.mark.slow
 def test_a_linear_term_is_seen_in_the_small_strain_limit():
     assert report(expansion(quadratic=0.2))["small-strain limit"].passed
     changed = report(expansion(linear=0.1))["small-strain limit"]

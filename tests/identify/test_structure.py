@@ -41,6 +41,7 @@ def at(structure, fragment):
     return next(law for law in structure.laws if fragment in law.name)
 
 
+@pytest.mark.slow
 def test_in_maxwell_n1_follows_from_the_assumed_derivative_and_not_from_data(structure):
     law = at(structure, "known part")
     assert law.verdict("N1") == "undetermined"

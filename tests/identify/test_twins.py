@@ -44,6 +44,7 @@ def slip_twins():
     return find_twins(LIBRARY, LawTerms({SLIP: 0.2}))
 
 
+@pytest.mark.slow
 def test_both_twins_of_johnson_segalman_are_found_and_proved(slip_twins):
     single = {next(iter(t.law.coefficients)): t for t in slip_twins if t.proof == "series"}
     assert set(single) == {"tr(sigma)*gammadot", "tr(sigma.gammadot)*I"}

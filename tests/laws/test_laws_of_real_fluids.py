@@ -59,6 +59,7 @@ def test_four_components_say_what_full_tensors_say(law, constants):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "constants"), LAWS_AND_CONSTANTS[:2], ids=["rolie_poly", "xpp"])
 @pytest.mark.parametrize(("kind", "rate"), [("shear", 2.0), ("uniaxial", 0.5)])
 def test_fast_modes_of_a_retracting_law_need_no_small_steps(law, constants, kind, rate):

@@ -42,6 +42,7 @@ def test_correlated_noise_seldom_brings_in_a_term():
     assert all(15 < model.search_.n_independent < 80 for model in models if not model.terms_)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_every_sample_counts_in_white_noise(seed):
     model = fitted(0.0, seed)

@@ -18,6 +18,7 @@ from discover.simulate import simulate
 FEW = {"fast": oscillatory_shear(2.0, 1.0), "slow": oscillatory_shear(1.0, 0.5)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("teacher", "paper", "debiased"),
     [
@@ -57,6 +58,7 @@ def test_the_penalised_minimum_is_one():
         assert objective(g2 + step[0], g3 + step[1]) > best
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("teacher", "student", "truth"),
     [

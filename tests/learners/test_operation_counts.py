@@ -32,6 +32,7 @@ def data(law, parameters, seed):
     return small_dataset(law, parameters, noise=0.02, seed=seed)
 
 
+@pytest.mark.slow
 def test_no_support_and_no_data_set_needs_a_program_of_its_own(compiled):
     first_data = data("giesekus", {"alpha": 0.2}, 1)
     second_data = data("ptt_linear", {"epsilon": 0.4}, 2)

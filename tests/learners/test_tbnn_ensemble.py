@@ -52,6 +52,7 @@ def others(problem, first):
     return train_others(problem, first, jax.random.split(jax.random.key(1), 2), RECIPE)[0]
 
 
+@pytest.mark.slow
 def test_members_differ_in_their_tensors_and_in_their_weights(first, others):
     masks = [np.flatnonzero(np.asarray(member.law.network_mask)) for member in others]
     np.testing.assert_array_equal(masks[0], [STRESS])  # what came next in the race

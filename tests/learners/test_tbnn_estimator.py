@@ -84,6 +84,7 @@ def test_units_come_in_through_modulus_and_relaxation_time(data):
     assert model.score(slow) > 0.9999
 
 
+@pytest.mark.slow
 def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
     fluid = Fluid(Giesekus(0.3), [70.0, 30.0], [1.0, 0.2])
     times = np.linspace(0.0, 10.0, 51)

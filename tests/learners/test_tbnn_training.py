@@ -183,6 +183,7 @@ def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus
     assert losses[50] > losses[49]  # the peak of a series added
 
 
+@pytest.mark.slow
 def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
     recipe = PaperRecipe(width=4, iterations_per_series=50)
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)

@@ -36,6 +36,7 @@ def test_the_comparison_notebook_finds_the_giesekus_term(monkeypatch):
     assert r"\boldsymbol{\sigma} \cdot \boldsymbol{\sigma}" in text
 
 
+@pytest.mark.slow
 def test_the_loop_notebook_finds_what_was_planted_and_what_a_melt_lacks(monkeypatch):
     text = executed_text("closed_loop", monkeypatch)
     assert "effects_added" in text

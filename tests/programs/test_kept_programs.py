@@ -56,6 +56,7 @@ def programs(folder):
     return sorted(path for path in folder.glob("programs/*/*") if not path.name.startswith("."))
 
 
+@pytest.mark.slow
 def test_a_second_start_gives_the_same_bits_without_tracing_the_solver(tmp_path):
     command = [sys.executable, "-c", ONE_START, str(tmp_path)]
     first, second = (

@@ -29,6 +29,7 @@ def limit(tmp_path, monkeypatch):
     return file
 
 
+@pytest.mark.slow
 def test_programs_make_room_for_others_and_answers_stay(limit):
     limit.write_text(str(10**9))
     before = pieces()

@@ -121,6 +121,7 @@ def test_a_record_in_samples_begins_as_the_wave_that_they_are_of():
     assert bool(jnp.all(protocol.cycle == jnp.array([3.0 - PERIOD, 3.0])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampled", [False, True])
 def test_learners_wait_until_the_slowest_mode_is_periodic(sampled):
     time = 100.0

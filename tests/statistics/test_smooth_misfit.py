@@ -35,6 +35,7 @@ NOISES = {
 }
 
 
+@pytest.mark.slow
 def test_a_smooth_misfit_larger_than_the_noise_is_no_slow_noise(stresses):
     exact, near = stresses
     # two to three times the noise: so much correlated noise would explain, were it not for its form
