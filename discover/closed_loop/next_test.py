@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from discover.identify.next_experiment import DECISIVE
 from discover.protocols.kinematics import RecordedQuantity
-
-DECISIVE = 5.0
-"""Natural logarithm of the odds, 150 to 1, from which a test counts as deciding between two."""
 
 
 @dataclass(frozen=True)

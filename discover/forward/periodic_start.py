@@ -7,15 +7,17 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-# Cycles from rest before Newton's steps, most iterations in all, and the relative change below
-# which the next step would change nothing that is seen: Newton's error goes as its square
-_FROM_REST, _MOST, _TOLERANCE = 2, 40, 1e-7
+from discover.forward.modified_newton import (
+    FROM_REST,
+    Approximation,
+    first_approximation,
+    next_approximation,
+    relative_change,
+)
 
-# A step that made things worse is tried again this much shorter; below the other, it is rounding
-_SHORTER, _EXACT = 0.25, 1e-12
-
-# Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
-_ROUNDING = 1e-13
+# Most iterations in all, and the relative change below which the next step would change nothing
+# that is seen: Newton's error goes as its square
+_MOST, _TOLERANCE = 40, 1e-7
 
 Levels = tuple[Float[Array, ""], ...]
 
@@ -37,15 +39,10 @@ class Cycle(NamedTuple):
 
 
 class _Iterate(NamedTuple):
-    """An approximation to the state, and the best one of each mode that was tried."""
+    """An approximation to modes and states, and by how much it changed last."""
 
-    stress: Float[Array, "4 k"]
+    modes: Approximation
     levels: Levels
-    best: Float[Array, "4 k"]
-    best_misfit: Float[Array, " k"]
-    best_step: Float[Array, "4 k"]
-    share: Float[Array, " k"]
-    number: Float[Array, ""]
     change: Float[Array, ""]
 
 
@@ -59,9 +56,8 @@ def periodic_start(
 
     It is solved for and not waited for: a mode that relaxes over a thousand cycles takes no more
     steps than another. Newton's steps take the derivative of the cycle along the four components of
-    each mode, and along each state, which change nearly by themselves; a step that leads astray is
-    shortened   [shooting and the modified Newton method: Stoer & Bulirsch 2002, Introduction to
-    Numerical Analysis, sections 7.3 and 5.4].
+    each mode, and along each state, which change nearly by themselves   [shooting: Stoer & Bulirsch
+    2002, Introduction to Numerical Analysis, section 7.3; `next_approximation`].
 
     Parameters
     ----------
@@ -92,60 +88,30 @@ def periodic_start(
         return ends[0], tuple(level[0] for level in levels_ends), jacobian, own
 
     def improved(now: _Iterate) -> _Iterate:
-        after, levels_after, jacobian, own = with_derivative(now.stress, now.levels)
-        difference = after - now.stress
-        misfit = _size(difference) / (1.0 + _size(now.stress))
-        begins = now.number <= _FROM_REST
-        # never where it is not a number
-        better = (misfit <= now.best_misfit) | (misfit < _EXACT) | (begins & jnp.isfinite(misfit))
-        matrix = jnp.eye(4) - jnp.swapaxes(jacobian, 1, 2)
-        step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
-        step = jnp.where(now.number < _FROM_REST, difference, step)
-        step = jnp.where(better, step, now.best_step)
-        best = jnp.where(better, now.stress, now.best)
-        share = jnp.where(better, 1.0, _SHORTER * now.share)
-        stress = best + share * step
+        after, levels_after, jacobian, own = with_derivative(now.modes.stress, now.levels)
+        modes, better = next_approximation(now.modes, after, jacobian)
         levels = tuple(
             before + (end - before) / (1.0 - slope)
             for before, end, slope in zip(now.levels, levels_after, own, strict=True)
         )
-        told = 1.0 + _ROUNDING / _TOLERANCE * slowness
         changes = [
-            jnp.max(_size(stress - now.stress) / (1.0 + _size(now.stress)) / told),
+            relative_change(now.modes, modes, slowness, _TOLERANCE),
             *(jnp.abs(a - b) for a, b in zip(levels, now.levels, strict=True)),
         ]
         largest = jnp.max(jnp.stack(changes))
-        return _Iterate(
-            stress=stress,
-            levels=levels,
-            best=best,
-            best_misfit=jnp.where(better, misfit, now.best_misfit),
-            best_step=step,
-            share=share,
-            number=now.number + 1.0,
-            change=jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0),
-        )
+        change = jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0)
+        return _Iterate(modes, levels, change)
 
     stress, levels = rest
-    start = _Iterate(
-        stress=stress,
-        levels=levels,
-        best=stress,
-        best_misfit=jnp.full(stress.shape[1], jnp.inf),
-        best_step=jnp.zeros_like(stress),
-        share=jnp.ones(stress.shape[1]),
-        number=jnp.zeros(()),
-        change=jnp.asarray(jnp.inf),
-    )
+    start = _Iterate(first_approximation(stress), levels, jnp.asarray(jnp.inf))
     end = jax.lax.while_loop(
-        lambda now: (now.number < _MOST) & ~((now.number > _FROM_REST) & (now.change < _TOLERANCE)),
+        lambda now: (
+            (now.modes.number < _MOST)
+            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
+        ),
         improved,
         start,
     )
-    found = jnp.where(end.change < _TOLERANCE, end.stress, jnp.nan)
+    found = jnp.where(end.change < _TOLERANCE, end.modes.stress, jnp.nan)
     levels = tuple(jnp.where(is_periodic, a, b) for a, b in zip(end.levels, levels, strict=True))
     return jnp.where(is_periodic, found, stress), levels
-
-
-def _size(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
-    return jnp.max(jnp.abs(stress), axis=0)

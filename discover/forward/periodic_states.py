@@ -8,20 +8,21 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from discover.forward.dynamics import Dynamics
+from discover.forward.modified_newton import (
+    FROM_REST,
+    Approximation,
+    first_approximation,
+    next_approximation,
+    relative_change,
+)
 from discover.simulate.exponential_runge_kutta import relax
 
-# Half cycles from rest before Newton's steps, most iterations in all, and the relative step below
-# which the next one would change nothing that is seen: Newton's error goes as its square
-_FROM_REST, _MOST, _TOLERANCE = 2, 60, 1e-8
-
-# A step that made things worse is tried again this much shorter; below the other, it is rounding
-_SHORTER, _EXACT = 0.25, 1e-12
+# Most iterations in all, and the relative step below which the next one would change nothing that
+# is seen: Newton's error goes as its square
+_MOST, _TOLERANCE = 60, 1e-8
 
 # Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
 _SHARE, _SECANT = 10.0, (0.2, 5.0)
-
-# Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
-_ROUNDING = 1e-13
 
 # Half a period later the flow is its own mirror image in the plane across it
 _MIRROR = jnp.array([1.0, 1.0, 1.0, -1.0])[:, None]
@@ -37,19 +38,14 @@ class _Half(NamedTuple):
 
 
 class _Iterate(NamedTuple):
-    """An approximation to the state at zero strain, and the best one that was tried."""
+    """An approximation to the state at zero strain, and what is felt there of the amplitude."""
 
-    stress: Float[Array, "4 k"]
+    modes: Approximation
     levels: tuple[Float[Array, ""], ...]
     felt: Float[Array, ""]
     felt_before: Float[Array, ""]
     lacking_before: Float[Array, ""]
     moved: Float[Array, ""]
-    best: Float[Array, "4 k"]
-    best_misfit: Float[Array, " k"]
-    best_step: Float[Array, "4 k"]
-    share: Float[Array, " k"]
-    number: Float[Array, ""]
     change: Float[Array, ""]
 
 
@@ -101,44 +97,27 @@ def complex_modulus(
 
     def improved(now: _Iterate) -> _Iterate:
         found, jacobian = _with_derivative(half, now)
-        difference = found.stress - now.stress
-        misfit = _size(difference) / (1.0 + _size(now.stress))
-        begins = now.number <= _FROM_REST
-        # never where it is not a number
         # what changed beside the modes since may cost its share
-        better = (misfit <= now.best_misfit + _SHARE * now.moved) | (misfit < _EXACT)
-        better = better | (begins & jnp.isfinite(misfit))
-        matrix = jnp.eye(4) - jnp.swapaxes(jacobian, 1, 2)
-        step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
-        step = jnp.where(now.number < _FROM_REST, difference, step)
-        step = jnp.where(better, step, now.best_step)
-        best = jnp.where(better, now.stress, now.best)
-        share = jnp.where(better, 1.0, _SHORTER * now.share)
-        stress = best + share * step
+        modes, better = next_approximation(now.modes, found.stress, jacobian, _SHARE * now.moved)
         levels = tuple(
             # what a cycle adds and leaves decides where a level comes to rest
             (after - left * before) / (1.0 - left)
             for before, after, left in zip(now.levels, found.levels, found.left, strict=True)
         )
         felt, lacking = next_felt(now, found)
-        told = 1.0 + _ROUNDING / _TOLERANCE * frequency * dynamics.modes.relaxation_time
+        slowness = frequency * dynamics.modes.relaxation_time
         changes = [
-            jnp.max(_size(stress - now.stress) / (1.0 + _size(now.stress)) / told),
+            relative_change(now.modes, modes, slowness, _TOLERANCE),
             jnp.abs(felt / now.felt - 1.0),
             *(jnp.abs(a - b) for a, b in zip(levels, now.levels, strict=True)),
         ]
         return _Iterate(
-            stress=stress,
+            modes=modes,
             levels=levels,
             felt=felt,
             felt_before=now.felt,
             lacking_before=lacking,
             moved=jnp.max(jnp.stack(changes[1:])),
-            best=best,
-            best_misfit=jnp.where(better, misfit, now.best_misfit),
-            best_step=step,
-            share=share,
-            number=now.number + 1.0,
             change=jnp.where(jnp.all(better), jnp.max(jnp.stack(changes)), jnp.inf),
         )
 
@@ -155,28 +134,25 @@ def complex_modulus(
         return now.felt * jnp.exp(lacking / slope), lacking
 
     stress, levels = dynamics.rest()
-    free = jnp.full(stress.shape[1], jnp.inf)
     amplitude, zero = jnp.asarray(strain), jnp.zeros(())
     start = _Iterate(
-        stress=stress,
+        modes=first_approximation(stress),
         levels=levels,
         felt=amplitude,
         felt_before=amplitude,
         lacking_before=zero,
         moved=zero,
-        best=stress,
-        best_misfit=free,
-        best_step=jnp.zeros_like(stress),
-        share=jnp.ones_like(free),
-        number=zero,
         change=jnp.asarray(jnp.inf),
     )
     end = jax.lax.while_loop(
-        lambda now: (now.number < _MOST) & ~((now.number > _FROM_REST) & (now.change < _TOLERANCE)),
+        lambda now: (
+            (now.modes.number < _MOST)
+            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
+        ),
         improved,
         start,
     )
-    whole = modulus(half(end.stress, end.levels, end.felt), end.felt)
+    whole = modulus(half(end.modes.stress, end.levels, end.felt), end.felt)
     found = whole / taken(whole)
     return jnp.where(end.change < _TOLERANCE, found, jnp.nan)
 
@@ -196,17 +172,13 @@ def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Com
     return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
 
-def _size(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
-    return jnp.max(jnp.abs(stress), axis=0)
-
-
 def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]:
     """Return half a cycle, and of each mode the derivative of its end: direction, component."""
 
     def along(unit):
-        direction = unit[:, None] * jnp.ones(now.stress.shape)
+        direction = unit[:, None] * jnp.ones(now.modes.stress.shape)
         of_stress = jax.jvp(
-            lambda stress: half(stress, now.levels, now.felt), (now.stress,), (direction,)
+            lambda stress: half(stress, now.levels, now.felt), (now.modes.stress,), (direction,)
         )
         return of_stress[0], of_stress[1].stress
 

@@ -1,12 +1,11 @@
 """What is said of several explanations, on records by scipy and closed forms."""
 
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from independent.flow import oscillation, start_up
-from independent.folders import write_folder
+from independent.folders import with_noise, write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 from independent.johnson_segalman import JohnsonSegalman
@@ -37,14 +36,12 @@ FLOWS = {
 
 
 def records(folder, material, instrument=None, seed=0):
-    generator = np.random.default_rng(seed)
-    runs = {}
-    for name, (flow, end) in FLOWS.items():
-        run = (instrument or Instrument()).record(material, flow, np.linspace(0.02, end, 120))
-        size = NOISE * np.sqrt(np.mean(run.stress**2))
-        noisy = run.stress + size * generator.standard_normal(run.stress.size)
-        runs[name] = replace(run, stress=noisy)
-    return dc.load_dataset(write_folder(folder, runs))
+    runs = {
+        name: (instrument or Instrument()).record(material, flow, np.linspace(0.02, end, 120))
+        for name, (flow, end) in FLOWS.items()
+    }
+    noisy = with_noise(runs, NOISE, np.random.default_rng(seed))
+    return dc.load_dataset(write_folder(folder, noisy))
 
 
 def explained(folder, material, effects, **options):

@@ -1,11 +1,9 @@
 """A first step beyond the minimum, to the end of a range, hides no law. Records by scipy."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from independent.flow import start_up
-from independent.folders import write_folder
+from independent.folders import with_noise, write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 from independent.johnson_segalman import JohnsonSegalman
@@ -18,14 +16,12 @@ NOISE = 0.02
 
 
 def records(folder, material):
-    generator = np.random.default_rng(0)
-    runs = {}
-    for name, (flow, end) in FLOWS.items():
-        run = Instrument().record(material, flow, np.linspace(0.05, end, 80))
-        size = NOISE * np.sqrt(np.mean(run.stress**2))
-        noisy = run.stress + size * generator.standard_normal(run.stress.size)
-        runs[name] = replace(run, stress=noisy)
-    return dc.load_dataset(write_folder(folder, runs))
+    runs = {
+        name: Instrument().record(material, flow, np.linspace(0.05, end, 80))
+        for name, (flow, end) in FLOWS.items()
+    }
+    noisy = with_noise(runs, NOISE, np.random.default_rng(0))
+    return dc.load_dataset(write_folder(folder, noisy))
 
 
 # of these flows the misfit as a function of α has a second minimum at its largest, 1, and as one of

@@ -1,11 +1,9 @@
 """Which test would tell the explanations apart, on records by scipy."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from independent.flow import start_up
-from independent.folders import write_folder
+from independent.folders import with_noise, write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
@@ -22,14 +20,12 @@ LAWS = ["giesekus_mobility", "non_affine_motion"]
 
 
 def recorded(folder, flows, seed=0):
-    generator = np.random.default_rng(seed)
-    runs = {}
-    for name, (flow, end) in flows.items():
-        run = Instrument().record(TRUTH, flow, np.linspace(0.05, end, 80))
-        size = NOISE * np.sqrt(np.mean(run.stress**2))
-        noisy = run.stress + size * generator.standard_normal(run.stress.size)
-        runs[name] = replace(run, stress=noisy)
-    return dc.load_dataset(write_folder(folder, runs))
+    runs = {
+        name: Instrument().record(TRUTH, flow, np.linspace(0.05, end, 80))
+        for name, (flow, end) in flows.items()
+    }
+    noisy = with_noise(runs, NOISE, np.random.default_rng(seed))
+    return dc.load_dataset(write_folder(folder, noisy))
 
 
 @pytest.fixture(scope="module")

@@ -27,14 +27,13 @@ from discover.closed_loop.judgement import Judgement
 from discover.closed_loop.next_test import NextTest, NextTests
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, make_batch
-from discover.identify.next_experiment import squared_distance
+from discover.identify.next_experiment import MOST_EVIDENCE, squared_distance
 from discover.statistics.residual import summarise
 
 MOST = 6
 """Explanations that are told apart, the likeliest."""
 
 _LEAST_LIKELY = 0.02
-_MOST_EVIDENCE = 1e6
 
 _NOT_BELIEVED = 0.9
 """Probability of none of them from which on it is idle to ask which one it is."""
@@ -185,7 +184,7 @@ def _weighed(
         for j in range(i):
             factor = np.concatenate([factors[i], factors[j]])
             apart = 0.5 * squared_distance((curves[i] - curves[j]) / scale, factor)
-            evidence[i, j] = evidence[j, i] = min(apart, _MOST_EVIDENCE)
+            evidence[i, j] = evidence[j, i] = min(apart, MOST_EVIDENCE)
     nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))
     samples = test.run.rate if is_flow_curve else test.run.time
     return NextTest(test.title, test.run.quantity, nats, evidence, samples, curves, is_flow_curve)

@@ -4,21 +4,14 @@ from discover.comparison.comparison import Comparison
 from discover.identify.experiments import OBSERVED
 from discover.report.plots.flows import units
 from discover.report.plots.style import (
-    BEFORE,
-    GREEN,
-    NETWORK,
-    PURPLE,
-    SPARSE,
-    YELLOW,
+    CHOSEN_STYLE,
+    RIVAL_STYLES,
     Picture,
     figure,
     legend_above,
     picture,
 )
 from discover.report.wording import FIGURE_SYMBOLS, readable
-
-_COLOURS = (NETWORK, GREEN, PURPLE, YELLOW, BEFORE)
-_DASHES = ("--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 
 
 def next_picture(comparison: Comparison) -> Picture | None:
@@ -34,7 +27,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
             panel.plot(
                 best.experiment.times,
                 best.curves[0, :, column],
-                color=SPARSE,
+                **CHOSEN_STYLE,
                 linewidth=2.2,
                 label=f"chosen: {_typeset(following.laws[0])}",
             )
@@ -43,8 +36,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
                 panel.plot(
                     best.experiment.times,
                     curve[:, column],
-                    color=_COLOURS[i % len(_COLOURS)],
-                    linestyle=_DASHES[i % len(_DASHES)],
+                    **RIVAL_STYLES[i % len(RIVAL_STYLES)],
                     label=_typeset(name),
                 )
             # a rival that runs away must not flatten the others

@@ -3,21 +3,14 @@
 from discover.closed_loop import LoopResult
 from discover.protocols.kinematics import MODULI
 from discover.report.plots.style import (
-    BEFORE,
-    GREEN,
-    NETWORK,
-    PURPLE,
-    SPARSE,
-    YELLOW,
+    CHOSEN_STYLE,
+    RIVAL_STYLES,
     Picture,
     figure,
     legend_above,
     picture,
 )
 from discover.report.wording import FIGURE_SYMBOLS, effects_title, percent
-
-_COLOURS = (SPARSE, NETWORK, GREEN, PURPLE, YELLOW, BEFORE)
-_DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 
 
 def next_test_picture(result: LoopResult) -> Picture | None:
@@ -33,8 +26,7 @@ def next_test_picture(result: LoopResult) -> Picture | None:
             panel.plot(
                 best.samples,
                 curve,
-                color=_COLOURS[i % len(_COLOURS)],
-                linestyle=_DASHES[i % len(_DASHES)],
+                **(RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE),
                 lw=2.0 if i == 0 else 1.4,
                 label=f"{effects_title(effects)} ({percent(probability)})",
             )

@@ -62,6 +62,16 @@ OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
 )
 """Of what a study asks to be drawn beside the rest, in its order."""
 
+CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
+RIVAL_STYLES: tuple[dict[str, Any], ...] = (
+    {"color": NETWORK, "linestyle": "--"},
+    {"color": GREEN, "linestyle": "-."},
+    {"color": PURPLE, "linestyle": ":"},
+    {"color": YELLOW, "linestyle": (0, (5, 1))},
+    {"color": BEFORE, "linestyle": (0, (1, 1))},
+)
+"""Of what the data do not tell from the law that was chosen, in its order."""
+
 TRUTH_STYLE = {"color": TRUTH, "linewidth": 1.3}
 BEFORE_STYLE = {"color": BEFORE, "linewidth": 1.0, "linestyle": "-."}
 

@@ -1,0 +1,118 @@
+"""Newton's method for states that a cycle of flow brings back, each mode by itself."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+FROM_REST = 2
+"""Cycles from rest before Newton's steps."""
+
+# A step that made things worse is tried again this much shorter; below the other, it is rounding
+_SHORTER, _EXACT = 0.25, 1e-12
+
+# Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
+_ROUNDING = 1e-13
+
+
+class Approximation(NamedTuple):
+    """An approximation to the modes, and the best one of each that was tried.
+
+    Attributes
+    ----------
+    stress, best
+        Dimensionless, shape (4, k).
+    best_misfit, best_step
+        What a cycle changes in the best one, relative, and Newton's step from it.
+    share
+        Of that step that is taken.
+    number
+        Of cycles gone through.
+    """
+
+    stress: Float[Array, "4 k"]
+    best: Float[Array, "4 k"]
+    best_misfit: Float[Array, " k"]
+    best_step: Float[Array, "4 k"]
+    share: Float[Array, " k"]
+    number: Float[Array, ""]
+
+
+def first_approximation(stress: Float[Array, "4 k"]) -> Approximation:
+    """Return where the iteration begins, of which no cycle has been gone through."""
+    free = jnp.full(stress.shape[1], jnp.inf)
+    return Approximation(
+        stress=stress,
+        best=stress,
+        best_misfit=free,
+        best_step=jnp.zeros_like(stress),
+        share=jnp.ones_like(free),
+        number=jnp.zeros(()),
+    )
+
+
+def next_approximation(
+    now: Approximation,
+    after: Float[Array, "4 k"],
+    jacobian: Float[Array, "k 4 4"],
+    lenience: Float[Array, ""] | float = 0.0,
+) -> tuple[Approximation, Bool[Array, " k"]]:
+    """Return the next approximation, and of which modes this one was better than all before.
+
+    A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
+    Introduction to Numerical Analysis, section 5.4].
+
+    Parameters
+    ----------
+    now, after
+        The modes, and what a cycle makes of them.
+    jacobian
+        Of that in these, for each mode: direction, component.
+    lenience
+        By how much the misfit may be worse than the best one's, where something beside the modes
+        has changed.
+    """
+    difference = after - now.stress
+    misfit = _size(difference) / (1.0 + _size(now.stress))
+    begins = now.number <= FROM_REST
+    # never where it is not a number
+    better = (misfit <= now.best_misfit + lenience) | (misfit < _EXACT)
+    better = better | (begins & jnp.isfinite(misfit))
+    matrix = jnp.eye(4) - jnp.swapaxes(jacobian, 1, 2)
+    step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
+    step = jnp.where(now.number < FROM_REST, difference, step)
+    step = jnp.where(better, step, now.best_step)
+    best = jnp.where(better, now.stress, now.best)
+    share = jnp.where(better, 1.0, _SHORTER * now.share)
+    following = Approximation(
+        stress=best + share * step,
+        best=best,
+        best_misfit=jnp.where(better, misfit, now.best_misfit),
+        best_step=step,
+        share=share,
+        number=now.number + 1.0,
+    )
+    return following, better
+
+
+def relative_change(
+    now: Approximation, following: Approximation, slowness: Float[Array, " k"], tolerance: float
+) -> Float[Array, ""]:
+    """Return how far the modes moved, relative, but for what rounding moves of slow ones.
+
+    Parameters
+    ----------
+    now, following
+        Approximations one after the other.
+    slowness
+        Relaxation time of each mode over that of a cycle.
+    tolerance
+        Change below which the iteration ends.
+    """
+    told = 1.0 + _ROUNDING / tolerance * slowness
+    moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))
+    return jnp.max(moved / told)
+
+
+def _size(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
+    return jnp.max(jnp.abs(stress), axis=0)
