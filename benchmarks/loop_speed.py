@@ -66,7 +66,7 @@ def main() -> None:
     enable_x64()
     enable_compilation_cache()
     from discover.closed_loop import run_loop
-    from discover.closed_loop.before_after import cut_to_strain
+    from discover.closed_loop.judging.before_after import cut_to_strain
     from discover.effects import make_effect
     from discover.forward.augmented_model import AugmentedModel
     from discover.forward.least_squares import fit_batch

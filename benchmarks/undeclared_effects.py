@@ -14,9 +14,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from planting import OUTSIDE, Noise, PlantedCase, Planter
 
 from discover.closed_loop import LoopResult, run_loop
-from discover.closed_loop.planting import OUTSIDE, Noise, PlantedCase, Planter
 from discover.compilation_cache import enable_compilation_cache
 from discover.effects import named_effects
 from discover.errors import InputError

@@ -1,12 +1,11 @@
 """Find what a model misses, trace it to an effect it lacks, add it, report before and after."""
 
-from discover.closed_loop.attribution import Attribution, CandidateScore
 from discover.closed_loop.each_run import run_loop_on_each
-from discover.closed_loop.explanation import Explanation, Explanations
-from discover.closed_loop.free_curve import FreeForm
 from discover.closed_loop.loop import run_loop
-from discover.closed_loop.next_test import NextTest, NextTests
-from discover.closed_loop.result import (
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.results.explanation import Explanation, Explanations
+from discover.closed_loop.results.free_curve import FreeForm
+from discover.closed_loop.results.loop_result import (
     ConstantByMode,
     ErrorPair,
     Fold,
@@ -16,6 +15,8 @@ from discover.closed_loop.result import (
     Stage,
     StageParameter,
 )
+from discover.closed_loop.results.next_test import NextTest, NextTests
+from discover.closed_loop.search.attribution import Attribution
 from discover.forward import DeclaredModel
 
 __all__ = [

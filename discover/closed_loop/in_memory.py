@@ -6,7 +6,7 @@ from typing import Any
 
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
-from discover.closed_loop.result import LoopResult
+from discover.closed_loop.results.loop_result import LoopResult
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid

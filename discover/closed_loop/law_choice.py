@@ -1,15 +1,15 @@
 """Which of several named laws the fitted runs ask for, before any effect is added."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
-from discover.closed_loop.augment import BARE_MENTION, criterion
-from discover.closed_loop.before_after import errors_of, record_runs
-from discover.closed_loop.error_pair import ErrorPair
-from discover.closed_loop.first_starts import first_starts
+from discover.closed_loop.judging.before_after import errors_of, record_runs
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.search.augment import BARE_MENTION, criterion
+from discover.closed_loop.search.first_starts import first_starts
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import (
@@ -27,45 +27,6 @@ from discover.statistics.residual import judged_cost, summarise
 
 _AT_END = 1e-3
 """Share of its range within which a constant stands at an end."""
-
-
-@dataclass(frozen=True)
-class LawFit:
-    """A named law fitted to the runs, with the modes and the instrument of the declared model.
-
-    Attributes
-    ----------
-    law
-        Key of `LAWS`.
-    parameters
-        Its constants.
-    at_end
-        Those of them that a fit drove to an end of their range, where they are no finding.
-    error
-        Mean relative errors of the runs fitted and held out; None where it cannot be integrated
-        through the fitted ones.
-    behind
-        By how much its information criterion is above that of the best law; None likewise.
-    is_told_apart
-        Whether the runs tell it from the best law: whether it fits them worse. One that fits as
-        well and is passed over for its further constants is not told apart.
-    """
-
-    law: str
-    parameters: Mapping[str, float]
-    at_end: tuple[str, ...] = ()
-    error: ErrorPair | None = None
-    behind: float | None = None
-    is_told_apart: bool = True
-
-    @property
-    def title(self) -> str:
-        """Name as a rheologist writes it, with the constants."""
-        return LAWS[self.law].described(self.parameters)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fit as ``loop.json`` holds it."""
-        return {**asdict(self), "title": LAWS[self.law].title}
 
 
 def choose_law(

@@ -6,17 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augment import FEWEST_SAMPLES
 from discover.closed_loop.augmented_law import AugmentedLaw
-from discover.closed_loop.before_after import (
-    cut_to_strain,
-    errors_of,
-    record_runs,
-    strain_of,
-)
 from discover.closed_loop.by_mode import constants_by_mode
-from discover.closed_loop.error_pair import ErrorPair
-from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
     carry,
@@ -24,15 +15,25 @@ from discover.closed_loop.explanations import (
     next_tests,
     with_band,
 )
-from discover.closed_loop.finer_steps import on_finer_steps
+from discover.closed_loop.explanations.other_times import FACTOR, held_against_times, other_times
 from discover.closed_loop.free_form import free_forms
-from discover.closed_loop.held_out import held_out as predict_held_out
-from discover.closed_loop.judgement import Judgement, Silence, judge
-from discover.closed_loop.law_choice import LawFit, choose_law
-from discover.closed_loop.next_test import NextTests
-from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.other_times import FACTOR, held_against_times, other_times
-from discover.closed_loop.result import (
+from discover.closed_loop.judging.before_after import (
+    cut_to_strain,
+    errors_of,
+    record_runs,
+    strain_of,
+)
+from discover.closed_loop.judging.finer_steps import on_finer_steps
+from discover.closed_loop.judging.held_out import held_out as predict_held_out
+from discover.closed_loop.judging.judgement import Judgement, Silence, judge
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.silence import fluid_is_silent, records_are_silent
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.law_choice import choose_law
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.explanation import Explanations
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.results.loop_result import (
     ConstantByMode,
     DeclaredEffect,
     KnownParameter,
@@ -40,10 +41,10 @@ from discover.closed_loop.result import (
     Stage,
     StageParameter,
 )
+from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.search import Search
-from discover.closed_loop.search_checkpoint import SearchCheckpoint, Store
-from discover.closed_loop.silence import fluid_is_silent, records_are_silent
-from discover.closed_loop.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.search.augment import FEWEST_SAMPLES
+from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
 from discover.dataset import Dataset, Run
 from discover.dataset.checking.start import doubts_of_start
 from discover.dataset.run import same_samples

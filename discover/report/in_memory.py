@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discover.closed_loop.result import LoopResult
+from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.report.comparison_report import write_comparison
 from discover.report.loop_report import write_loop

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.augment import Choice, aliases_of
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.search.augment import Choice, aliases_of
 from discover.dataset import Dataset, Run
 from discover.forward.least_squares import Fit
 from discover.protocols import start_up

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.left_out import left_out_errors
+from discover.closed_loop.search.left_out import left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch

@@ -18,8 +18,8 @@ import discover as dc
 from discover.closed_loop.explanations.discrepancy import posterior
 from discover.closed_loop.explanations.mixture import quantile
 from discover.closed_loop.explanations.weighing import unexplained_probability
-from discover.closed_loop.judgement import Judgement
-from discover.closed_loop.run_record import RunRecord
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.run_record import RunRecord
 from discover.errors import InputError
 from discover.report.predictions import loop_predictions
 from discover.statistics.lack_of_fit import LackOfFit

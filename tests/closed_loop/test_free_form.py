@@ -10,7 +10,7 @@ from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc
-from discover.closed_loop.free_curve import nearest_form
+from discover.closed_loop.results.free_curve import nearest_form
 from discover.report.verdicts import loop_verdict
 
 MODULUS, TIME, NOISE, LIMIT = 100.0, 1.0, 0.01, 60.0

@@ -9,7 +9,7 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.closed_loop import NextTest, NextTests
-from discover.closed_loop.next_test import DECISIVE, entropy
+from discover.closed_loop.results.next_test import DECISIVE, entropy
 from discover.report.verdicts import loop_verdict
 
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.numerical_resolution import COMPUTED, NumericalResolution, rounding
+from discover.closed_loop.judging.numerical_resolution import (
+    COMPUTED,
+    NumericalResolution,
+    rounding,
+)
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch

@@ -11,7 +11,7 @@ from independent.instruments import Instrument
 from independent.maxwell import UpperConvectedMaxwell
 
 import discover as dc
-from discover.closed_loop.other_times import FACTOR
+from discover.closed_loop.explanations.other_times import FACTOR
 
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 FLOWS = {

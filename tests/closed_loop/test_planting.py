@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from planting import OUTSIDE, Noise, Planter
 
 from discover.closed_loop import run_loop
-from discover.closed_loop.planting import OUTSIDE, Noise, Planter
 from discover.closed_loop.search import Search
 from discover.effects import named_effects
 from discover.errors import InputError

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import RunRecord
-from discover.closed_loop.reading import read_residual
-from discover.closed_loop.waves import oscillation, read_wave
+from discover.closed_loop.results.reading import read_residual
+from discover.closed_loop.results.waves import oscillation, read_wave
 
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, RunRecord
-from discover.closed_loop.judgement import judge
-from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.silence import records_are_silent
-from discover.closed_loop.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.judging.judgement import judge
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.silence import records_are_silent
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.comparison.explanation import explain
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome

@@ -9,8 +9,8 @@ import pytest
 from standing_alone import stands_alone
 
 from discover.closed_loop import CandidateScore
-from discover.closed_loop.explanation import Explanation, Explanations
-from discover.closed_loop.result import (
+from discover.closed_loop.results.explanation import Explanation, Explanations
+from discover.closed_loop.results.loop_result import (
     ConstantByMode,
     ErrorPair,
     Fold,

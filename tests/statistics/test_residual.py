@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from planting import Noise
 
-from discover.closed_loop.planting import Noise
 from discover.statistics.residual import (
     Expectation,
     is_noise,

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.discrepancy import discrepancy
-from discover.closed_loop.held_out import root_of_covariance
+from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
 

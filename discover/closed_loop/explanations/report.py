@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.closed_loop.before_after import errors_of, record_runs
-from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.mixture import mixed_bands
 from discover.closed_loop.explanations.weighing import explanations_of
-from discover.closed_loop.judgement import Judgement
-from discover.closed_loop.run_record import RunRecord
+from discover.closed_loop.judging.before_after import errors_of, record_runs
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.explanation import Explanations
+from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit

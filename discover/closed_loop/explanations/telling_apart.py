@@ -19,12 +19,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.explanation import Explanations
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.possible_tests import PossibleTest, possible_tests
-from discover.closed_loop.held_out import root_of_covariance
-from discover.closed_loop.judgement import Judgement
-from discover.closed_loop.next_test import NextTest, NextTests
+from discover.closed_loop.judging.held_out import root_of_covariance
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.explanation import Explanations
+from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, make_batch
 from discover.identify.next_experiment import MOST_EVIDENCE, squared_distance

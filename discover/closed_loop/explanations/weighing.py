@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.closed_loop.error_pair import ErrorPair
-from discover.closed_loop.explanation import Explanation, Explanations
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.judgement import Judgement
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.forward import AugmentedModel
 from discover.statistics.residual import STRUCTURE
 from discover.statistics.unseen import CARRIED

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.ticker import EngFormatter
 
 from discover.closed_loop import LoopResult, RunRecord
-from discover.closed_loop.reading import differences
+from discover.closed_loop.results.reading import differences
 from discover.protocols.kinematics import MODULI
 from discover.report.overlay import Overlay
 from discover.report.plots.style import (

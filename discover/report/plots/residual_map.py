@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.patches import Patch
 
-from discover.closed_loop.result import LoopResult
+from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
 from discover.report.plots.flows import units

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import OptimizeWarning, curve_fit
 
-from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.results.error_pair import ErrorPair
 
 Slot = Literal["recorded_stress", "drift", "network", "rate"]
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.finer_steps import change_on_finer_steps
+from discover.closed_loop.judging.finer_steps import change_on_finer_steps
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit

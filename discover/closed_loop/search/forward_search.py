@@ -4,12 +4,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.attribution import (
-    Attribution,
-    CandidateScore,
-    attribute,
-)
-from discover.closed_loop.augment import (
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.search.attribution import Attribution, attribute
+from discover.closed_loop.search.augment import (
     BARE_MENTION,
     IMPROVEMENT,
     Choice,
@@ -22,15 +21,13 @@ from discover.closed_loop.augment import (
     simplest,
     taken_out,
 )
-from discover.closed_loop.degrees import choose_degrees, positions_of
-from discover.closed_loop.first_starts import first_starts
-from discover.closed_loop.left_out import left_out_errors
-from discover.closed_loop.mode_dependence import names_not_needed
-from discover.closed_loop.numerical_resolution import NumericalResolution
-from discover.closed_loop.physical_range import at_an_end, undetermined
-from discover.closed_loop.search_checkpoint import SearchCheckpoint
-from discover.closed_loop.search_state import SearchState
-from discover.closed_loop.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.search.checkpoint import SearchCheckpoint
+from discover.closed_loop.search.degrees import choose_degrees, positions_of
+from discover.closed_loop.search.first_starts import first_starts
+from discover.closed_loop.search.left_out import left_out_errors
+from discover.closed_loop.search.mode_dependence import names_not_needed
+from discover.closed_loop.search.physical_range import at_an_end, undetermined
+from discover.closed_loop.search.state import SearchState
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError

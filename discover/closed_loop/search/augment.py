@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.attribution import CandidateScore, with_other_inner
-from discover.closed_loop.left_out import (
+from discover.closed_loop.search.attribution import CandidateScore, with_other_inner
+from discover.closed_loop.search.left_out import (
     FEWEST_FOLDS,
     left_out_parts,
     part_errors,

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import permutation_test, rankdata
 
-from discover.closed_loop.run_record import RunRecord
-from discover.closed_loop.waves import Wave, oscillation, read_wave
+from discover.closed_loop.results.run_record import RunRecord
+from discover.closed_loop.results.waves import Wave, oscillation, read_wave
 
 _BINS = 24
 _DECADES = 30.0

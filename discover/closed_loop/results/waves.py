@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
-from discover.closed_loop.run_record import RunRecord
+from discover.closed_loop.results.run_record import RunRecord
 
 HARMONICS = 5
 """Highest multiple of the frequency at which a residual is read."""

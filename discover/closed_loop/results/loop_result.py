@@ -11,14 +11,14 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.error_pair import ErrorPair
-from discover.closed_loop.explanation import Explanations
-from discover.closed_loop.free_curve import FreeForm
-from discover.closed_loop.law_choice import LawFit
-from discover.closed_loop.next_test import NextTests
-from discover.closed_loop.reading import Reading, read_residual
-from discover.closed_loop.run_record import RunRecord
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.explanation import Explanations
+from discover.closed_loop.results.free_curve import FreeForm
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.results.next_test import NextTests
+from discover.closed_loop.results.reading import Reading, read_residual
+from discover.closed_loop.results.run_record import RunRecord
 from discover.equations import (
     Equation,
     EquationTerm,

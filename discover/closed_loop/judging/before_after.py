@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.error_pair import ErrorPair
-from discover.closed_loop.run_record import RunRecord
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch

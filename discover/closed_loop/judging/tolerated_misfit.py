@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import even
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left

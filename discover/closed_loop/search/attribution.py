@@ -1,10 +1,11 @@
 """Score every effect by how well its signature, beyond what is fitted, explains the residual."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
@@ -22,43 +23,6 @@ _FINITE = 4.0
 
 _INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
 """Multiples of an inner time or exponent from which an effect is tried too."""
-
-
-@dataclass
-class CandidateScore:
-    """How a candidate effect did at one stage.
-
-    Attributes
-    ----------
-    effect, kind
-        Its name and kind.
-    score
-        Share of the squared residual that its signature explains to first order, 0 to 1.
-    step
-        Amplitude to first order.
-    reduction
-        Share of the squared residual removed by the best trial amplitude, others held.
-    aliases
-        Candidates whose refit the data cannot tell from this one's.
-    error, left_out_error
-        Mean relative error on the fitted runs, and on each run left out in turn, after a refit;
-        None if it was not refitted.
-    evidence
-        Lowering of the information criterion by the refit; positive is evidence for the effect.
-    start
-        Parameter vector to refit from.
-    """
-
-    effect: str
-    kind: str
-    score: float
-    step: float
-    reduction: float = 0.0
-    aliases: tuple[str, ...] = ()
-    error: float | None = None
-    left_out_error: float | None = None
-    evidence: float | None = None
-    start: np.ndarray = field(default_factory=lambda: np.zeros(0), repr=False)
 
 
 @dataclass

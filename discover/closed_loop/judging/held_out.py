@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, covariance_and_noise, jacobians
 from discover.statistics.unseen import Unseen

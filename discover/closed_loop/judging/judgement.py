@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from discover.closed_loop.held_out import HeldOut
-from discover.closed_loop.result import Verdict
-from discover.closed_loop.run_record import RunRecord
-from discover.closed_loop.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.judging.held_out import HeldOut
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.results.loop_result import Verdict
+from discover.closed_loop.results.run_record import RunRecord
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import (

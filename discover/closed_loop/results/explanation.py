@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from discover.closed_loop.error_pair import ErrorPair
+from discover.closed_loop.results.error_pair import ErrorPair
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,15 @@ from itertools import islice
 
 import numpy as np
 
-from discover.closed_loop.augment import BARE_MENTION, INDISTINGUISHABLE, criterion, taken_out
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.judgement import Judgement
+from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
+from discover.closed_loop.search.augment import (
+    BARE_MENTION,
+    INDISTINGUISHABLE,
+    criterion,
+    taken_out,
+)
 from discover.forward.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise
 

@@ -9,10 +9,10 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.degrees import Degree
-from discover.closed_loop.search_state import SearchState
-from discover.closed_loop.seen_sets import SeenSets
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.search.degrees import Degree
+from discover.closed_loop.search.seen_sets import SeenSets
+from discover.closed_loop.search.state import SearchState
 from discover.forward.least_squares import Fit
 
 

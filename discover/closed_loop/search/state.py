@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from discover.closed_loop.attribution import CandidateScore
-from discover.closed_loop.degrees import Degree
-from discover.closed_loop.seen_sets import SeenSets
+from discover.closed_loop.results.candidate_score import CandidateScore
+from discover.closed_loop.search.degrees import Degree
+from discover.closed_loop.search.seen_sets import SeenSets
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
 
