@@ -136,7 +136,7 @@ def sparse_bands(runs, unseen):
     """Return the bands of the sparse law with its rivals."""
     from discover.comparison.next_measurement import contenders
     from discover.comparison.training import searched
-    from discover.identify.bands import prediction_bands
+    from discover.identify.rivals.bands import prediction_bands
     from discover.learners.tensor_sindy import TensorSINDy
     from tensor_library import build_library
 

@@ -93,10 +93,10 @@ find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 # The experiment expected to separate the laws that remain, at the noise at hand; then we run it.
 
 # %%
-from discover.identify.experiment_outcome import judge_laws
-from discover.identify.experiments import candidate_experiments
-from discover.identify.many_laws import Contender
-from discover.identify.next_experiment import propose_experiments
+from discover.identify.design.experiment_outcome import judge_laws
+from discover.identify.design.experiments import candidate_experiments
+from discover.identify.design.next_experiment import propose_experiments
+from discover.identify.side_by_side.many_laws import Contender
 
 maxwell = Fluid.dimensionless(UpperConvectedMaxwell())
 covariance = np.array(model.uncertainty_.covariance)

@@ -16,9 +16,9 @@ from discover.identify import (
     RivalTable,
     Twin,
 )
-from discover.identify.experiment_outcome import Weight
-from discover.identify.physics import PhysicsCheck, PhysicsReport
-from discover.identify.structure import LawStructure, QuantityVerdict, Structure
+from discover.identify.design.experiment_outcome import Weight
+from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
+from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm
 from discover.notebook_view import NotebookView, as_html, table_of
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.truth import true_terms
-from discover.identify.many_laws import Contender, fluid_of, predict_laws
+from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS

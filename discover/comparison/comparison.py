@@ -18,7 +18,7 @@ from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.comparison.truth import TrueTerm
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
-from discover.identify.structure import Structure
+from discover.identify.structure.structure import Structure
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
 from discover.statistics import FitVerdict

@@ -14,7 +14,7 @@ from discover.comparison.flows import Flow
 from discover.comparison.identifiability import SEPARATED
 from discover.comparison.outcome import LearnerOutcome, Limits
 from discover.comparison.statements import Statement
-from discover.identify.bands import QUANTITIES, PredictionBand
+from discover.identify.rivals.bands import QUANTITIES, PredictionBand
 
 _SHOWN = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 

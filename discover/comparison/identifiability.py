@@ -22,8 +22,8 @@ from discover.identify import (
     check_physics,
     find_twins,
 )
-from discover.identify.physics import mean_relaxation_time
-from discover.identify.relations import spell
+from discover.identify.exact.relations import spell
+from discover.identify.soundness.physics import mean_relaxation_time
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm

@@ -8,10 +8,10 @@ import numpy as np
 
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
-from discover.identify.bands import PredictionBand, prediction_bands
-from discover.identify.experiments import OBSERVED, candidate_experiments
-from discover.identify.many_laws import Contender
-from discover.identify.next_experiment import Proposal, propose_experiments
+from discover.identify.design.experiments import OBSERVED, candidate_experiments
+from discover.identify.design.next_experiment import Proposal, propose_experiments
+from discover.identify.rivals.bands import PredictionBand, prediction_bands
+from discover.identify.side_by_side.many_laws import Contender
 from discover.laws.multimode import Fluid
 from discover.study.schema import NextExperiment
 

@@ -14,8 +14,8 @@ from discover.comparison.explanation import Explanation
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.comparison.identifiability import EXACT, SEPARATED, Rival, law_structure
 from discover.identify import Structure
-from discover.identify.bands import PredictionBand
-from discover.identify.relations import spell_briefly
+from discover.identify.exact.relations import spell_briefly
+from discover.identify.rivals.bands import PredictionBand
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
 

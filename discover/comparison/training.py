@@ -136,7 +136,7 @@ def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:
     seed
         Of draws within the uncertainty.
     """
-    from discover.identify.rivals import MOST_RIVALS, find_rivals
+    from discover.identify.rivals.fitted_rivals import MOST_RIVALS, find_rivals
     from discover.learners.tensor_sindy.report import uncertainty_row
 
     result = sparse.result_

@@ -8,7 +8,7 @@ import numpy as np
 from discover.comparison.explanation import ARITHMETIC, Explanation
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
-from discover.identify.bands import PredictionBand
+from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import LackOfFit, noise_model
 from discover.statistics.residual import STRUCTURE, Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes

@@ -7,7 +7,7 @@ from discover.comparison.disagreement import contested, disagreements, open_wher
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.statements import IN_LIBRARY, Statement
-from discover.identify.bands import PredictionBand
+from discover.identify.rivals.bands import PredictionBand
 from discover.protocols import start_up
 
 TIMES = np.linspace(0.0, 4.0, 9)

@@ -14,8 +14,8 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.sampled_rates import left_by_sampled_rates
 from discover.comparison.statements import IN_LIBRARY, check_band, make_statements
 from discover.identify import HiddenStresses, LawTerms
-from discover.identify.bands import PredictionBand
-from discover.identify.structure import LawStructure, QuantityVerdict, Structure
+from discover.identify.rivals.bands import PredictionBand
+from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
 from discover.protocols.protocol import measured_rate, oscillatory_shear
 from discover.statistics.residual import Expectation

@@ -11,7 +11,7 @@ from discover.comparison.explanation import explain
 from discover.comparison.flows import Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.unseen_runs import hold_against_unseen
-from discover.identify.bands import bands_of_predictions
+from discover.identify.rivals.bands import bands_of_predictions
 from discover.protocols import start_up as protocol
 from discover.statistics.residual import Expectation
 

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.stats import norm
 
-from discover.identify.bands import bands_of_predictions
-from discover.identify.many_laws import Contender, draws
+from discover.identify.rivals.bands import bands_of_predictions
+from discover.identify.side_by_side.many_laws import Contender, draws
 
 TIMES = np.linspace(0.0, 1.0, 5)
 N_DRAWS = 40

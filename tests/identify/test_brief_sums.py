@@ -1,6 +1,6 @@
 """Sums of terms in a sentence."""
 
-from discover.identify.relations import spell, spell_briefly
+from discover.identify.exact.relations import spell, spell_briefly
 
 
 def test_a_sum_of_few_terms_is_spelled_out():

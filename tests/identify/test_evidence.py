@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from discover.identify.evidence import compare_residuals
+from discover.identify.rivals.evidence import compare_residuals
 from discover.learners.tensor_sindy.search import SupportSearch
 
 N = 400

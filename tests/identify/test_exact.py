@@ -6,14 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.identify.exact_series import (
+from discover.identify.exact.exact_series import (
     compare_series,
     hidden_change,
     solve_for_coefficient,
     stress_series,
 )
-from discover.identify.exact_terms import PRIME, exact_terms, residue
-from discover.identify.relations import feels_33, spell, term_relations
+from discover.identify.exact.exact_terms import PRIME, exact_terms, residue
+from discover.identify.exact.relations import feels_33, spell, term_relations
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate
 from discover.simulate import simulate

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from discover.errors import InputError
-from discover.identify.bands import bands_of_predictions, prediction_bands
-from discover.identify.experiment_outcome import judge_laws
-from discover.identify.experiments import candidate_experiments
-from discover.identify.many_laws import Contender, fluid_of, predict_laws
-from discover.identify.next_experiment import DECISIVE, propose_experiments, squared_distance
+from discover.identify.design.experiment_outcome import judge_laws
+from discover.identify.design.experiments import candidate_experiments
+from discover.identify.design.next_experiment import DECISIVE, propose_experiments, squared_distance
+from discover.identify.rivals.bands import bands_of_predictions, prediction_bands
+from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.simulate import simulate
 

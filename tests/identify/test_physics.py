@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.identify.physics import check_physics
-from discover.identify.steady_states import (
+from discover.identify.soundness.physics import check_physics
+from discover.identify.soundness.steady_states import (
     is_stable,
     is_steady,
     steady_shear,

@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.identify.exact_series import compare_series
-from discover.identify.hidden_stresses import hidden_stresses
-from discover.identify.histories import SAME, differences, random_histories
-from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
-from discover.identify.separation import separations
-from discover.identify.twins import find_twins
+from discover.identify.exact.exact_series import compare_series
+from discover.identify.side_by_side.histories import SAME, differences, random_histories
+from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.separation import separations
+from discover.identify.structure.hidden_stresses import hidden_stresses
+from discover.identify.structure.twins import find_twins
 from discover.laws import (
     ExponentialPhanThienTanner,
     Giesekus,

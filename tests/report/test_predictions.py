@@ -11,7 +11,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import Flow
 from discover.comparison.next_measurement import NextMeasurement
 from discover.comparison.outcome import LearnerOutcome
-from discover.identify.bands import PredictionBand
+from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.report.predictions import (
     COLUMNS,

@@ -19,7 +19,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.effects import library_effects, named_effects
 from discover.effects.library_term import library_term
 from discover.equations.mathml import law_element, term_element
-from discover.identify.bands import PredictionBand
+from discover.identify.rivals.bands import PredictionBand
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison_report import safe_name, write_comparison

@@ -27,7 +27,7 @@ from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, make_batch
-from discover.identify.next_experiment import MOST_EVIDENCE, squared_distance
+from discover.identify.design.next_experiment import MOST_EVIDENCE, squared_distance
 from discover.statistics.residual import summarise
 
 MOST = 6

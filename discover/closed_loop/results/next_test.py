@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.next_experiment import DECISIVE
+from discover.identify.design.next_experiment import DECISIVE
 from discover.protocols.kinematics import RecordedQuantity
 
 

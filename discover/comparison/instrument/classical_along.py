@@ -9,7 +9,7 @@ from discover.comparison.classical import CLASSICAL, FLOOR, ClassicalFit, conten
 from discover.comparison.flows import Flow, of_recorded, predict, relative_errors
 from discover.comparison.instrument.fitted_along import CLASSICAL_EFFECTS, FittedAlong
 from discover.comparison.instrument.frame import Frame
-from discover.identify.many_laws import fluid_of
+from discover.identify.side_by_side.many_laws import fluid_of
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.tensor_sindy.selection import extended_bic

@@ -8,7 +8,7 @@ import numpy as np
 from discover.comparison.flows import Flow, Stresses
 from discover.comparison.instrument.corrected import InRecord
 from discover.comparison.outcome import LearnerOutcome
-from discover.identify.bands import PredictionBand
+from discover.identify.rivals.bands import PredictionBand
 from discover.study.build import DeclaredModel, StudyData
 
 _RUNS = ("training", "held_out")

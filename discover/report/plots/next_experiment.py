@@ -1,7 +1,7 @@
 """What to measure next: predictions of the laws that remain, in the experiment proposed."""
 
 from discover.comparison.comparison import Comparison
-from discover.identify.experiments import OBSERVED
+from discover.identify.design.experiments import OBSERVED
 from discover.report.plots.flows import units
 from discover.report.plots.style import (
     CHOSEN_STYLE,

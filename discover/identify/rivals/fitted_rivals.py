@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from discover.identify.evidence import LEVEL, Evidence, compare_residuals
-from discover.identify.laws_side_by_side import LawTerms
-from discover.identify.relations import spell
+from discover.identify.exact.relations import spell
+from discover.identify.rivals.evidence import LEVEL, Evidence, compare_residuals
+from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
 from discover.notebook_view import SentenceAndTable, table_of

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from discover.equations.equation import mean_relaxation_time as mean_of_modes
-from discover.identify.physics_flows import Cycles, Trajectories, cycles, trajectories
-from discover.identify.steady_states import (
+from discover.identify.soundness.physics_flows import Cycles, Trajectories, cycles, trajectories
+from discover.identify.soundness.steady_states import (
     is_stable,
     is_steady,
     steady_shear,

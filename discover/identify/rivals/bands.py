@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.many_laws import Contender, draws, fluid_of, predict_laws
+from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 from discover.protocols.protocol import FlowProtocol
 

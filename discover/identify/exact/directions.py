@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.relations import spell_briefly
+from discover.identify.exact.relations import spell_briefly
 
 EXACT = 1e-13
 """Singular value, relative to the largest of unit columns, that counts as zero.

@@ -20,7 +20,7 @@ from typing import Any, no_type_check
 
 import numpy as np
 
-from discover.identify.exact_terms import PRIME, exact_terms, residue
+from discover.identify.exact.exact_terms import PRIME, exact_terms, residue
 from tensor_library.terms import parse_term
 
 DEFAULT_ORDER = 9

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.identify.experiments import OBSERVED, Experiment
-from discover.identify.many_laws import Contender, draws, fluid_of, predict_laws
-from discover.identify.next_experiment import spread_of, squared_distance
+from discover.identify.design.experiments import OBSERVED, Experiment
+from discover.identify.design.next_experiment import spread_of, squared_distance
+from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 
 REFUTED = 1e-3

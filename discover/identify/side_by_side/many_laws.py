@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.identify.laws_side_by_side import LawTerms, dense
+from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.programs import compiled

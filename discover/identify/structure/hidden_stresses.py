@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.histories import Histories, random_histories
+from discover.identify.side_by_side.histories import Histories, random_histories
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.simulate.runge_kutta import runge_kutta_4

@@ -19,11 +19,11 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.run import Run
-from discover.identify.directions import Direction, weak_directions
-from discover.identify.exact_series import compare_series
-from discover.identify.hidden_stresses import HiddenStresses, hidden_stresses
-from discover.identify.laws_side_by_side import LawTerms, dense, joint_library
-from discover.identify.relations import TermRelation, spell_briefly, term_relations
+from discover.identify.exact.directions import Direction, weak_directions
+from discover.identify.exact.exact_series import compare_series
+from discover.identify.exact.relations import TermRelation, spell_briefly, term_relations
+from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense, joint_library
+from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell

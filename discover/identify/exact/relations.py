@@ -8,7 +8,7 @@ from functools import lru_cache
 from math import gcd, lcm
 from typing import Any, Literal
 
-from discover.identify.exact_terms import PRIME, exact_terms
+from discover.identify.exact.exact_terms import PRIME, exact_terms
 from tensor_library.library import TermLibrary
 
 _LARGEST_INTEGER = 10**6

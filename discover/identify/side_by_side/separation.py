@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from discover.identify.histories import observe_differences, random_histories
-from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.histories import observe_differences, random_histories
+from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.simulate.grid import make_grids

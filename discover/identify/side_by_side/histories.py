@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import (
     FlowProtocol,

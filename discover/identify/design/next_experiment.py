@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.experiments import OBSERVED, Experiment
-from discover.identify.many_laws import Contender, draws, fluid_of, predict_laws
+from discover.identify.design.experiments import OBSERVED, Experiment
+from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 
 DECISIVE = 5.0

@@ -1,0 +1,1 @@
+"""What two laws share in shear, in exact arithmetic."""

@@ -1,0 +1,1 @@
+"""What an experiment determines of a library, and which laws no shear can tell apart."""
