@@ -122,6 +122,7 @@ def wait_for(condition, seconds=120.0):
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 def test_a_batch_killed_at_random_ends_with_the_same_bytes(studies, calm, tmp_path):
     generator = random.Random(1)
     out = tmp_path / "out"

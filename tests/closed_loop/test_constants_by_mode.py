@@ -66,6 +66,7 @@ def test_the_constant_of_each_mode_is_found(mobilities):
     assert found.evidence[found.degree] > 100.0
 
 
+@pytest.mark.slow
 def test_equal_constants_are_one_and_the_same_as_without_the_question():
     found = loop((0.3, 0.3, 0.3)).declared_parameters["alpha"]
     plain = loop((0.3, 0.3, 0.3), by_mode=()).declared_parameters["alpha"]
@@ -78,6 +79,7 @@ def test_equal_constants_are_one_and_the_same_as_without_the_question():
     assert loop((0.3, 0.3, 0.3)).equation().terms[0].coefficient == pytest.approx(plain.value)
 
 
+@pytest.mark.slow
 def test_a_mode_that_no_flow_reaches_is_not_determined():
     # at 1 1/s the fastest mode feels a Weissenberg number of 0.05
     slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).declared_parameters["alpha"]
@@ -85,6 +87,7 @@ def test_a_mode_that_no_flow_reaches_is_not_determined():
     assert slow.modes[2].ci95 is None
 
 
+@pytest.mark.slow
 def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
     asked = {"effects": ["giesekus_mobility", "stress_gain"], "by_mode": ["giesekus_mobility"]}
@@ -187,6 +190,7 @@ class Store(dict):
             raise Interrupted
 
 
+@pytest.mark.slow
 def test_an_interrupted_loop_keeps_the_degrees():
     declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=("giesekus_mobility",))
     options = {"effects": ["giesekus_mobility", "stress_gain"], "store": Store()}

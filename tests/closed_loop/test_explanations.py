@@ -89,6 +89,7 @@ def test_nothing_is_the_explanation_of_the_declared_fluid(tmp_path):
     assert first.probability > 0.5 > sum(loop.explanations.inclusion.values())
 
 
+@pytest.mark.slow
 def test_twins_share_one_probability(tmp_path):
     # in shear σ12 is the same with ξ as with c tr(σ) γ̇, c = ξ (1 − ξ/2), in every history
     twins = {("non_affine_motion",), ("tr(sigma)*gammadot",)}

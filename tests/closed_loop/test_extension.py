@@ -38,6 +38,7 @@ def base():
     return dc.Fluid(dc.make_law("ucm"), MODULUS, TIME, SOLVENT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["uniaxial", "planar"])
 def test_a_mobility_is_found_in_extension_alone(base, kind):
     loop = dc.close_loop(extension(kind, 0.3), base, explanations=1)

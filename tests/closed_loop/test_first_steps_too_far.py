@@ -40,6 +40,7 @@ def test_what_was_planted_is_found_from_the_far_end(tmp_path, effect, material, 
     assert low < planted < high
 
 
+@pytest.mark.slow
 def test_slow_shear_of_a_giesekus_fluid_does_not_exclude_the_law_that_made_it(tmp_path):
     effects = ["giesekus_mobility", "non_affine_motion", "ptt_linear", "ptt_exponential"]
     loop = dc.close_loop(

@@ -45,6 +45,7 @@ def saturated(tmp_path_factory):
     return loop_with(folder, lambda run: LIMIT * np.tanh(run.stress / LIMIT))
 
 
+@pytest.mark.slow
 def test_a_saturated_transducer_is_found_as_a_function_of_the_stress(saturated):
     assert saturated.verdict == "unexplained"
     found = saturated.free_form[0]

@@ -34,6 +34,7 @@ def undecided(tmp_path_factory):
     return dc.close_loop(recorded(folder, SLOW), BASE, effects=LAWS, max_effects=1)
 
 
+@pytest.mark.slow
 def test_the_test_that_is_proposed_decides_for_the_law_that_made_the_records(undecided, tmp_path):
     following = undecided.next_tests
     assert set(following.explanations) == {(name,) for name in LAWS}

@@ -139,6 +139,7 @@ def test_an_effect_without_which_the_law_runs_away_is_kept(planter, monkeypatch)
     assert len(loop(case).stages) == 2  # the first is examined again once the second is there
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", ["clipped_transducer", "hum"])
 def test_a_mechanism_that_is_in_no_dictionary_is_unexplained(planter, mechanism):
     result = loop(planter.plant(outside=mechanism, size=0.1, seed=1))

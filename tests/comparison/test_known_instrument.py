@@ -127,6 +127,7 @@ def with_gain(weak, folder):
     return compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
 
 
+@pytest.mark.slow
 def test_both_learners_see_the_records_without_the_gain(weak, with_gain):
     known = compared(weak, effects={"stress_gain": {"gain_error": -0.1}})
     for found in (with_gain, known):

@@ -14,6 +14,7 @@ dc.register_law({name!r}, Giesekus, {{"alpha": (0.0, 1.0)}})
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "entry", "why"),
     [

@@ -58,6 +58,7 @@ def test_only_a_second_normal_stress_difference_separates_the_slip_twin(about_th
     assert max(p.evidence["twin"] for p in others) < 1e-6
 
 
+@pytest.mark.slow
 def test_shear_stress_suffices_where_it_separates(about_giesekus):
     assert about_giesekus[0].observed == ("sigma12",)
     assert about_giesekus[0].evidence["network"] > DECISIVE

@@ -52,6 +52,7 @@ def test_in_maxwell_n1_follows_from_the_assumed_derivative_and_not_from_data(str
     assert supports
 
 
+@pytest.mark.slow
 def test_with_slip_n2_follows_from_neither_shear_stress_nor_n1(structure):
     law = at(structure, "slip")
     assert law.verdict("N2") == "undetermined"
