@@ -69,8 +69,8 @@ def main() -> None:
     from discover.closed_loop.judging.before_after import cut_to_strain
     from discover.effects import make_effect
     from discover.forward.augmented_model import AugmentedModel
+    from discover.forward.batches import data_scales, make_batch
     from discover.forward.least_squares import fit_batch
-    from discover.forward.run_batch import data_scales, make_batch
     from discover.laws import Fluid, make_law
     from discover.simulate import simulate
 

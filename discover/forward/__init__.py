@@ -5,8 +5,8 @@ declared law, then those of every candidate effect. At zero amplitude an effect 
 """
 
 from discover.forward.augmented_model import AugmentedModel
+from discover.forward.batches import Batch, RunBatch, data_scales, even, make_batch
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
-from discover.forward.run_batch import Batch, RunBatch, data_scales, even, make_batch
 
 __all__ = [
     "MODULUS",

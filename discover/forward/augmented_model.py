@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect
+from discover.forward.batches import Batch, MixedBatch, OscillationBatch, Part
 from discover.forward.by_mode import LARGEST
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
-from discover.forward.run_batch import Batch, MixedBatch, OscillationBatch, Part
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.stats import t as student
 
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.run_batch import Batch
+from discover.forward.batches import Batch
 from discover.statistics import NoiseModel, least_squares_covariance
 
 _LARGEST_DAMPING = 1e7

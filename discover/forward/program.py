@@ -21,19 +21,19 @@ from discover.effects import (
     StateEffect,
 )
 from discover.forward.added_terms import AddedTerms, InUse
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades
-from discover.forward.dynamics import Dynamics, Modes, Series
-from discover.forward.imposed_stress import strain_at_stress
-from discover.forward.integrator import integrate
-from discover.forward.periodic_start import Cycle
-from discover.forward.periodic_states import complex_modulus, first_harmonic
-from discover.forward.run_batch import (
+from discover.forward.batches import (
     OscillationBatch,
     Part,
     RunBatch,
     SteadyBatch,
     StressBatch,
 )
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades
+from discover.forward.dynamics import Dynamics, Modes, Series
+from discover.forward.imposed_stress import strain_at_stress
+from discover.forward.integrator import integrate
+from discover.forward.periodic_start import Cycle
+from discover.forward.periodic_states import complex_modulus, first_harmonic
 from discover.forward.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled

@@ -1,0 +1,22 @@
+"""Runs laid out once on the host: padded, and of each control all in one program."""
+
+from discover.forward.batches.imposed_stress import StressBatch
+from discover.forward.batches.mixed import Batch, MixedBatch, Part, make_batch
+from discover.forward.batches.oscillation import OscillationBatch
+from discover.forward.batches.samples import even
+from discover.forward.batches.scales import data_scales
+from discover.forward.batches.steady import SteadyBatch
+from discover.forward.batches.transient import RunBatch
+
+__all__ = [
+    "Batch",
+    "MixedBatch",
+    "OscillationBatch",
+    "Part",
+    "RunBatch",
+    "SteadyBatch",
+    "StressBatch",
+    "data_scales",
+    "even",
+    "make_batch",
+]

@@ -1,0 +1,71 @@
+"""Runs at a given stress on padded grids: creep, recovery, oscillation of the stress."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.dataset import Run
+from discover.forward.batches.samples import measured
+from discover.protocols.kinematics import Kinematics, stack_kinematics
+from discover.protocols.protocol import shear_rates
+from discover.simulate.grid import stress_grid
+
+
+class StressBatch(eqx.Module):
+    """Runs at a given stress on padded grids, with a leading axis of runs.
+
+    Attributes
+    ----------
+    times
+        Step ends, shape (runs, s), in s.
+    imposed
+        Recorded stress there, in Pa.
+    recorded
+        Strain at the samples, shape (runs, n).
+    sample_index, weight, clock_factor, kinematics
+        As in `RunBatch`.
+    """
+
+    times: Float[Array, "runs s"]
+    imposed: Float[Array, "runs s"]
+    sample_index: Array
+    weight: Float[Array, "runs n"]
+    recorded: Float[Array, "runs n"]
+    clock_factor: Float[Array, " runs"]
+    kinematics: Kinematics | None = None
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        ends = np.take_along_axis(np.asarray(self.times), np.asarray(self.sample_index), axis=1)
+        return float(np.max(ends))
+
+
+def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
+    """Return runs at a given stress as a batch.
+
+    Parameters
+    ----------
+    runs
+        One or more, of this control.
+    strain_step
+        Largest strain of one step.
+    """
+    grids = [stress_grid(run.protocol, run.time, run.recorded, strain_step) for run in runs]
+    n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
+    rows = []
+    for run, grid in zip(runs, grids, strict=True):
+        index = np.searchsorted(grid, run.time)
+        last = grid[-1] - grid[-2]
+        padded = np.concatenate([grid, grid[-1] + last * np.arange(1, n_steps - len(grid) + 1)])
+        imposed = shear_rates(run.protocol, padded)
+        weight, recorded = measured(run, n_samples)
+        index = np.pad(index, (0, n_samples - len(run)), mode="edge")
+        rows.append((padded, imposed, index, weight, recorded, run.clock_factor))
+    columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
+    return StressBatch(
+        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
+    )

@@ -1,0 +1,77 @@
+"""Periodic states, padded: a sample is a modulus of a sweep of frequency or amplitude."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.dataset import Run
+from discover.protocols.kinematics import MODULI
+
+# Steps in half a cycle: at most this much strain in each, at least this many, and a limit that only
+# a strain given in the wrong unit reaches
+_FEWEST_STEPS, _MOST_STEPS = 12.0, 4000
+
+
+class OscillationBatch(eqx.Module):
+    """Periodic states, padded, with a leading axis of sweeps: both moduli of each are computed.
+
+    Attributes
+    ----------
+    strain, frequency
+        Amplitude and rad/s, shape (sweeps, n).
+    phase
+        ωt at step ends and middles in turn over half a cycle, shape (sweeps, m).
+    """
+
+    strain: Float[Array, "sweeps n"]
+    frequency: Float[Array, "sweeps n"]
+    phase: Float[Array, "sweeps m"]
+
+    @property
+    def longest(self) -> float:
+        """Zero: a periodic state knows no time since it began."""
+        return 0.0
+
+
+def oscillations(
+    runs: Sequence[Run], strain_step: float
+) -> tuple[OscillationBatch, tuple[tuple[int, int], ...]]:
+    """Return the sweeps, and of each run which of them it is and which modulus of it.
+
+    Parameters
+    ----------
+    runs
+        One or more moduli over a frequency or amplitude sweep.
+    strain_step
+        Largest strain of one step.
+    """
+    sweeps: list[tuple[np.ndarray, np.ndarray]] = []
+    moduli = []
+    for run in runs:
+        strain, frequency = np.asarray(run.strain), run.angular_frequency
+        # G′ and G″ of one sweep are computed together
+        at = next(
+            (
+                i
+                for i, (other, beside) in enumerate(sweeps)
+                if np.array_equal(other, strain) and np.array_equal(beside, frequency)
+            ),
+            len(sweeps),
+        )
+        if at == len(sweeps):
+            sweeps.append((strain, frequency))
+        moduli.append((at, MODULI.index(run.quantity)))
+    n = max(len(strain) for strain, _ in sweeps)
+    strains, frequencies = (
+        jnp.asarray(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
+        for column in zip(*sweeps, strict=True)
+    )
+    # half a cycle goes through twice the amplitude
+    largest = max(float(np.max(strain)) for strain, _ in sweeps)
+    steps = int(min(np.ceil(max(2.0 * largest, _FEWEST_STEPS) / strain_step), _MOST_STEPS))
+    phase = np.linspace(0.0, np.pi, 2 * steps + 1)
+    phases = jnp.asarray(np.tile(phase, (len(sweeps), 1)))
+    return OscillationBatch(strains, frequencies, phases), tuple(moduli)

@@ -1,0 +1,43 @@
+"""What was measured, on padded samples, and how much each sample weighs."""
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+
+# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
+_LEAST_STEADY = 1e-4
+
+
+def measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return weights and values of a run's samples, padded with zeros.
+
+    Parameters
+    ----------
+    run
+        The run.
+    n
+        Length to which it is padded.
+    """
+    size = np.full(len(run), np.sqrt(np.mean(run.recorded**2)))
+    if run.protocol.control in ("steady", "oscillation"):
+        # over decades of values the noise is in proportion to them, and each decade counts
+        largest = float(np.max(np.abs(run.recorded)))
+        size = np.maximum(np.abs(run.recorded), _LEAST_STEADY * largest)
+    scale = 1.0 / (np.where(size > 0, size, 1.0) * np.sqrt(len(run)))
+    pad = (0, n - len(run))
+    return np.pad(scale, pad), np.pad(run.recorded, pad)
+
+
+def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return by what values of one run are divided so that their noise has one size.
+
+    Ones but for a flow curve or a sweep, whose noise is in proportion to it.
+
+    Parameters
+    ----------
+    weight
+        Of its samples, without padding.
+    """
+    least = float(np.min(weight))
+    return least / weight if np.ptp(weight) > 1e-9 * least else np.ones_like(weight)

@@ -1,0 +1,55 @@
+"""Flow curves, padded: a sample is a steady state."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.dataset import Run
+from discover.forward.batches.samples import measured
+from discover.protocols.kinematics import Kinematics, stack_kinematics
+
+
+class SteadyBatch(eqx.Module):
+    """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate.
+
+    Attributes
+    ----------
+    rate
+        In 1/s, shape (runs, n).
+    weight
+        1/(recorded stress · √samples): of a flow curve the squared residuals sum to the mean
+        squared relative deviation.
+    recorded, kinematics
+        As in `RunBatch`.
+    """
+
+    rate: Float[Array, "runs n"]
+    weight: Float[Array, "runs n"]
+    recorded: Float[Array, "runs n"]
+    kinematics: Kinematics | None = None
+
+    @property
+    def longest(self) -> float:
+        """Zero: a steady state knows no time."""
+        return 0.0
+
+
+def steady_states(runs: Sequence[Run]) -> SteadyBatch:
+    """Return flow curves as a batch.
+
+    Parameters
+    ----------
+    runs
+        One or more, of this control.
+    """
+    n = max(len(run) for run in runs)
+    # a padded sample is one more of the last
+    rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
+    weights, recorded = zip(*(measured(run, n) for run in runs), strict=True)
+    columns = (jnp.asarray(np.stack(column)) for column in (rates, weights, recorded))
+    return SteadyBatch(
+        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
+    )

@@ -1,0 +1,132 @@
+"""Transients at a given rate on padded grids, so that all of them share one compilation."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from discover.dataset import Run
+from discover.forward.batches.samples import measured
+from discover.protocols.kinematics import Kinematics, stack_kinematics
+from discover.protocols.protocol import shear_rates
+from discover.simulate.grid import make_grid
+
+# An instrument effect acts within the first samples, so the first gap is divided this often
+_EARLY_STEPS = 0.5 ** np.arange(6)
+
+# Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
+# a run is steady. Shorter ones keep the accuracy of small steps throughout
+_LONG, _GROWTH = 2000, 0.05
+
+
+class RunBatch(eqx.Module):
+    """Transients at a given rate on padded grids, with a leading axis of runs.
+
+    Attributes
+    ----------
+    times
+        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
+        what came before the record.
+    commanded_rate
+        Rate there, in 1/s.
+    sample_index
+        Position of the samples among step ends, shape (runs, n).
+    weight
+        1/(rms record · √samples) at samples, 0 at padding: the squared residuals of a run then
+        sum to its squared relative error.
+    recorded
+        What was measured in Pa, shape (runs, n).
+    clock_factor
+        Shape (runs,).
+    strain_before
+        Total strain of the sample before each run, shape (runs,).
+    kinematics
+        Which flow each run is; None where all are simple shear.
+    cycle
+        Positions among step ends of the last cycle before the first sample, shape (runs, 2);
+        −1 where the run has no periodic start.
+    cycle_steps
+        The most steps that such a cycle has.
+    """
+
+    times: Float[Array, "runs m"]
+    commanded_rate: Float[Array, "runs m"]
+    sample_index: Array
+    weight: Float[Array, "runs n"]
+    recorded: Float[Array, "runs n"]
+    clock_factor: Float[Array, " runs"]
+    strain_before: Float[Array, " runs"]
+    cycle: Int[Array, "runs 2"]
+    kinematics: Kinematics | None = None
+    cycle_steps: int = eqx.field(static=True, default=0)
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        ends = np.take_along_axis(
+            np.asarray(self.times)[:, ::2], np.asarray(self.sample_index), axis=1
+        )
+        return float(np.max(ends))
+
+
+def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
+    """Return runs at a given rate as a batch.
+
+    Parameters
+    ----------
+    runs
+        One or more, of this control.
+    strain_step
+        Largest strain of one step.
+    """
+    grids = []
+    for run in runs:
+        # a window may have cut the first samples off, but not what the instrument did by then
+        gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
+        early = gap * _EARLY_STEPS
+        anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
+        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
+        if len(grid) > max(_LONG, 2 * len(anchors)):
+            grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
+        grids.append((grid, np.searchsorted(grid, run.time)))
+    n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
+    n_samples = max(len(run) for run in runs)
+    cycles = [
+        np.searchsorted(grid, run.protocol.cycle) if np.ptp(run.protocol.cycle) else (-1, -1)
+        for run, (grid, _) in zip(runs, grids, strict=True)
+    ]
+    cycle_steps = int(max(end - start for start, end in cycles))
+    if cycle_steps:
+        n_steps = max(n_steps, *(int(start) + cycle_steps + 1 for start, _ in cycles))
+    rows = []
+    for run, cycle, (grid, index) in zip(runs, cycles, grids, strict=True):
+        spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
+        padded = np.concatenate([grid, grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)])
+        half = np.empty(2 * n_steps - 1)
+        half[::2] = padded
+        half[1::2] = 0.5 * (padded[1:] + padded[:-1])
+        rate = shear_rates(run.protocol, half).copy()
+        # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
+        # that the slope of the rate at the last sample is the flow's own
+        rate[half > grid[-1] + 1.01 * spacing] = 0.0
+        weight, recorded = measured(run, n_samples)
+        rows.append(
+            (
+                half,
+                rate,
+                np.pad(index, (0, n_samples - len(run)), mode="edge"),
+                weight,
+                recorded,
+                run.clock_factor,
+                run.strain_before,
+                np.asarray(cycle),
+            )
+        )
+    columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
+    return RunBatch(
+        *columns,
+        kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
+        cycle_steps=cycle_steps,
+    )
