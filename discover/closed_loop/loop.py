@@ -29,6 +29,7 @@ from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.held_out import held_out as predict_held_out
 from discover.closed_loop.judgement import Judgement, Silence, judge
 from discover.closed_loop.law_choice import LawFit, choose_law
+from discover.closed_loop.limits import names_of_limits
 from discover.closed_loop.next_test import NextTests
 from discover.closed_loop.numerical_resolution import NumericalResolution
 from discover.closed_loop.other_times import FACTOR, held_against_times, other_times
@@ -233,6 +234,9 @@ def run_loop(
     judgement, instead = held_against_times(judgement, active, carried, times)
     for name in instead:
         search.aliases[name] = (*search.aliases.get(name, ()), FACTOR)
+    limits = names_of_limits(model, current.theta, active, batch.longest)
+    for name, other in limits.items():
+        search.aliases[name] = (*search.aliases.get(name, ()), other)
     stages = tuple(
         _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)
