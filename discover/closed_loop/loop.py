@@ -15,6 +15,7 @@ from discover.closed_loop.explanations import (
     next_tests,
     with_band,
 )
+from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.other_times import FACTOR, held_against_times, other_times
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.judging.before_after import (
@@ -234,6 +235,9 @@ def run_loop(
     judgement, instead = held_against_times(judgement, active, carried, times)
     for name in instead:
         search.aliases[name] = (*search.aliases.get(name, ()), FACTOR)
+    limits = names_of_limits(model, current.theta, active, batch.longest)
+    for name, other in limits.items():
+        search.aliases[name] = (*search.aliases.get(name, ()), other)
     stages = tuple(
         _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)

@@ -55,6 +55,9 @@ class EffectParameter:
         Data property in which `first_trial` is measured.
     first_trial
         Size of the first trial value, in that scale; for an inner parameter its starting value.
+    endless
+        Of a time: what the effect cannot be told from where no record lasts as long; empty if its
+        name says nothing of that time.
     """
 
     name: str
@@ -67,6 +70,7 @@ class EffectParameter:
     range_source: str = field(kw_only=True)
     range_scale: Scale = field(default="one", kw_only=True)
     ends: tuple[Literal["low", "high"], ...] = field(default=(), kw_only=True)
+    endless: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)

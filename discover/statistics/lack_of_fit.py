@@ -16,6 +16,7 @@ from discover.statistics.residual import (
     summarise,
     tells_noise,
 )
+from discover.statistics.same_place import repeated
 from discover.statistics.whiteness import SIGNIFICANCE, noise_probability
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
@@ -138,9 +139,13 @@ def what_is_left(
 def _without_outliers(residuals, measured):
     """Return weighted residuals, weights and records, padded, and which samples are outliers."""
     kept, outliers = [], []
+    sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
+    again = repeated([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
     for row, record in zip(residuals, measured, strict=True):
         values, record = np.asarray(row, dtype=float), np.asarray(record, dtype=float)
         off = stray(values, record)
+        # no knock comes at the same place of several runs
+        off[[at for at in again if at < len(off)]] = False
         kept.append((values[~off], record[~off]))
         outliers.append(tuple(int(i) for i in np.flatnonzero(off)))
     longest = max(len(row) for row, _ in kept)

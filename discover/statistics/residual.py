@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.ndimage import median_filter
 
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
@@ -87,11 +88,13 @@ def noise_floor(
 ) -> float:
     """Return the relative noise, mean over runs.
 
-    Where the residual is noise, white or of first order, that is its size. Where it holds
-    structure, it is the part of it that changes from sample to sample, see `summarise`; noise
-    that is correlated itself is then underestimated. Runs too short to be tested are taken to be
-    as noisy as the tested ones, or as what changes in them from sample to sample if that is more:
-    their size is no sign of noise. Those that do not judge (`judging`) do not count.
+    Where the residual is noise, white or of first order, that is its size, to which a sample far
+    outside its neighbourhood counts no more than one six times the noise: a few samples, however
+    large, say nothing of the others. Where it holds structure, it is the part of it that changes
+    from sample to sample, see `summarise`; noise that is correlated itself is then underestimated.
+    Runs too short to be tested are taken to be as noisy as the tested ones, or as what changes in
+    them from sample to sample if that is more: their size is no sign of noise. Where all are so
+    short, they tell it together. Those that do not judge (`judging`) do not count.
     """
     rows = judging(weight)
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
@@ -99,14 +102,39 @@ def noise_floor(
     fast = summarise(residual, weight).noise
     if not is_noise(residual, weight, measured):
         return float(np.mean(fast))
-    sizes = np.sqrt(np.sum(residual**2, axis=1))
+    sizes = np.array([_limited_size(r[w > 0]) for r, w in zip(residual, weight, strict=True)])
     samples = np.count_nonzero(weight > 0, axis=1)
     tested = samples >= FEWEST_TESTED
     if np.any(tested):
         sizes = np.where(tested, sizes, np.maximum(fast, np.mean(sizes[tested])))
     elif np.all(samples >= FEWEST_FAST):
-        sizes = fast
+        sizes = np.array([_pooled_fast_part(residual, weight)])
     return float(np.mean(sizes))
+
+
+def _pooled_fast_part(
+    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
+) -> float:
+    """Return the relative noise of runs of a few samples, taken to be the same in all.
+
+    From fourth differences: between few samples a residual bends so much that third ones, and the
+    median of those of one run alone, would take a misfit for noise.
+    """
+    rows = [r[w > 0] * np.sqrt(np.count_nonzero(w)) for r, w in zip(residual, weight, strict=True)]
+    differences = np.concatenate([np.diff(row, 4) for row in rows])
+    # the coefficients 1, 4, 6, 4, 1 have a sum of squares of 70
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(70.0))
+
+
+def _limited_size(values: Float[np.ndarray, " n"]) -> float:
+    """Return the norm of values, each no larger than so many robust deviations right beside it.
+
+    A stretch that is loud counts in full; up to three samples are no stretch, two at an end.
+    """
+    if len(values) < FEWEST_FAST:
+        return float(np.linalg.norm(values))
+    beside = 1.4826 * median_filter(np.abs(values), FEWEST_FAST, mode="mirror")
+    return float(np.linalg.norm(np.clip(values, -_LARGEST * beside, _LARGEST * beside)))
 
 
 def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
@@ -143,6 +171,8 @@ def is_noise(
     probability = noise_probability(residual, weight, measured)
     return probability is None or probability > SIGNIFICANCE
 
+
+_LARGEST = 6.0  # robust standard deviations up to which one sample counts as noise
 
 STRUCTURE = 1.5
 """A residual this many times larger than noise and linear error together is not explained."""

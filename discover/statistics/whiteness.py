@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from scipy.ndimage import median_filter
 from scipy.special import gammaincc, ndtr
 
+from discover.statistics.same_place import same_place_probability
 from discover.statistics.smooth_misfit import LARGEST_CORRELATION, smooth_misfit_probability
 
 LAGS = 12
@@ -44,7 +45,7 @@ def noise_probability(
     Under every first-order correlation up to 0.9 the innovations e_t = r_t − ρ r_{t−1} are held
     against independent ones of any size; the ρ that looks most like noise counts. Of independent
     symmetric numbers Σ e_t e_{t−k} has mean zero and variance Σ e_t² e_{t−k}², however their size
-    changes   [Lobato, Nankervis & Savin 2001, Int. Econ. Rev. 42, 187]. Six tests follow:
+    changes   [Lobato, Nankervis & Savin 2001, Int. Econ. Rev. 42, 187]. Seven tests follow:
 
     - a portmanteau over 12 lags, of all runs together   [after Ljung & Box 1978, Biometrika 65,
       297], and one run by run, which finds patterns of their own;
@@ -54,7 +55,8 @@ def noise_probability(
     - the sum over runs, sample by sample: noise of one run knows nothing of another's;
     - where a record repeats itself, the product of innovations a whole number of cycles apart;
     - whether a smooth misfit beside the noise says more than noise alone, which is what a law that
-      is nearly right leaves; see `smooth_misfit_probability`.
+      is nearly right leaves; see `smooth_misfit_probability`;
+    - single samples that stand out at the same place of several runs; see `same_place_probability`.
 
     The smallest probability counts as often as there are tests. None if every run is too short.
 
@@ -88,6 +90,10 @@ def noise_probability(
     ]
     if len(rows) > 1:
         tests.append(_alike(padded, count))
+        seen = [np.asarray(w) > 0 for w in weight]
+        tests.append(
+            same_place_probability([r[s] for r, s in zip(residual, seen, strict=True) if any(r[s])])
+        )
     cycles = [cycle(record) if record is not None else None for record in records]
     if any(length is not None for length in cycles):
         tests.append(_repeats(white, count, cycles))

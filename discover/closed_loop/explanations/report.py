@@ -53,7 +53,7 @@ def explain(
         records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
     errors = [errors_of(records, i) for i in range(len(thetas))]
     effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
-    return explanations_of(model, carried, errors, judgement, effective, unlisted)
+    return explanations_of(model, carried, errors, judgement, effective, unlisted, batch.longest)
 
 
 def with_band(

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanation, Explanations
@@ -27,6 +28,7 @@ def explanations_of(
     judgement: Judgement,
     effective_samples: float,
     unlisted: float = np.inf,
+    longest: float = np.inf,
 ) -> Explanations:
     """Return the probabilities of what was carried, twins merged, the likeliest first.
 
@@ -42,6 +44,8 @@ def explanations_of(
         Independent samples of what it leaves.
     unlisted
         Criterion of what explains the records and is none of them.
+    longest
+        Length of the longest run in s; what only a longer one would show has another name too.
     """
     classes = _classes(carried)
     best = min(unlisted, *(one.criterion for one in carried))
@@ -50,18 +54,27 @@ def explanations_of(
     none = unexplained_probability(judgement, effective_samples)
     shares = (1.0 - none) * weights / (np.sum(weights) + np.exp(-0.5 * (unlisted - best)))
     none = 1.0 - float(np.sum(shares))
-    found = [
-        Explanation(
-            carried[members[0]].effects,
-            float(share),
-            errors[members[0]],
-            _parameters(model, carried[members[0]]),
-            tuple(carried[i].effects for i in members[1:]),
-        )
-        for members, share in zip(classes, shares, strict=True)
-    ]
-    found.sort(key=lambda one: -one.probability)
     kinds = {effect.name: effect.kind for effect in model.effects}
+    found = []
+    for members, share in zip(classes, shares, strict=True):
+        spelled = []
+        for one in (carried[i] for i in members):
+            limits = names_of_limits(model, one.fit.theta, one.effects, longest)
+            kinds |= {other: kinds[name] for name, other in limits.items()}
+            spelled.append(one.effects)
+            if limits:
+                spelled.append(tuple(limits.get(name, name) for name in one.effects))
+        first = carried[members[0]]
+        found.append(
+            Explanation(
+                first.effects,
+                float(share),
+                errors[members[0]],
+                _parameters(model, first),
+                tuple(spelled[1:]),
+            )
+        )
+    found.sort(key=lambda one: -one.probability)
     return Explanations(
         tuple(found), none, _inclusion(found), _inclusion(found, lambda name: kinds[name])
     )

@@ -114,5 +114,8 @@ class ToleratedMisfit:
         return not self.noise_known or self.left(residual).verdict != "unexplained"
 
     def _is_random(self, residual: Float[np.ndarray, "runs n"]) -> bool:
-        probability = self.left(residual).probability
-        return probability is not None and probability > SIGNIFICANCE
+        left = self.left(residual)
+        # a few samples that noise does not reach are a misfit, whatever is left of the others
+        if left.misfit > STRUCTURE * left.expected:
+            return False
+        return left.probability is not None and left.probability > SIGNIFICANCE

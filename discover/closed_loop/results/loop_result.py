@@ -104,8 +104,8 @@ class Stage:
     parameters
         Its parameters in the final model.
     aliases
-        Effects that these data cannot tell from it, and `relaxation_time_factor` where one factor
-        on all declared times does as well.
+        Effects that these data cannot tell from it, `relaxation_time_factor` where one factor on
+        all declared times does as well, and what it is in the limit that is all they show of it.
     error
         Errors after this stage.
     evidence
