@@ -17,6 +17,7 @@ Scale = Literal[
     "one",
     "sampling_time",
     "run_time",
+    "inverse_rate",
     "strain",
     "stress",
     "inverse_stress",
@@ -167,13 +168,20 @@ class ModeEffect(ConstitutiveEffect):
 
 
 class StateEffect(ConstitutiveEffect):
-    """A scalar state of the fluid, integrated with the modes, that changes their stress or time.
+    """A state of the fluid, integrated with the modes, that changes their stress or time.
 
     The state starts at `rest` and obeys ds/dt = source − decay · s, both of which may depend on
-    the flow. With all factors one the law is unchanged.
+    the flow. With all factors one the law is unchanged. An effect may have several such `levels`:
+    state, source and decay then have the shape (levels,).
     """
 
     rest: ClassVar[float] = 0.0
+    levels: ClassVar[int] = 1
+
+    @property
+    def changes_times(self) -> bool:
+        """Whether there is a `time_factor`."""
+        return type(self).time_factor is not StateEffect.time_factor
 
     @abstractmethod
     def source_and_decay(
@@ -181,7 +189,7 @@ class StateEffect(ConstitutiveEffect):
         values: Float[Array, " p"],
         shear_rate: Float[Array, ""],
         stress: Float[Array, ""],
-    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
         """Return source and decay in 1/s.
 
         Parameters
@@ -193,16 +201,18 @@ class StateEffect(ConstitutiveEffect):
         """
 
     def modulus_factor(
-        self, values: Float[Array, " p"], state: Float[Array, ""]
+        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
     ) -> Float[Array, ""]:
         """Return the factor on the stress of all modes."""
-        del values
-        return jnp.ones_like(state)
+        del values, state
+        return jnp.ones(())
 
-    def time_factor(self, values: Float[Array, " p"], state: Float[Array, ""]) -> Float[Array, ""]:
+    def time_factor(
+        self, values: Float[Array, " p"], state: Float[Array, "*levels"]
+    ) -> Float[Array, ""]:
         """Return the factor on all relaxation times."""
-        del values
-        return jnp.ones_like(state)
+        del values, state
+        return jnp.ones(())
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,7 @@ def _entry(effect: AbstractEffect) -> list[str]:
 
 _PROPERTIES = {
     "run_time": "length of a run",
+    "inverse_rate": "1/(largest rate)",
     "strain": "strain of a run",
     "stress": "rms stress",
     "inverse_stress": "1/(rms stress)",

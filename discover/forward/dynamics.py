@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
 from discover.protocols.kinematics import Kinematics
@@ -51,6 +52,8 @@ class Dynamics(NamedTuple):
     trace_relaxation
         Rate at which a small trace of each mode relaxes beside −σ, over 1/λ, shape (k,); that too
         is integrated exactly. None where chains do not retract.
+    times_change
+        1 where a state changes the relaxation times, else 0.
     """
 
     slope: Callable
@@ -61,6 +64,7 @@ class Dynamics(NamedTuple):
     series: Series | None
     viscosity: Float[Array, ""]
     trace_relaxation: Float[Array, " k"] | None = None
+    times_change: Int[Array, ""] | int = 0
 
     @property
     def modes(self) -> Modes:
@@ -94,18 +98,44 @@ class Dynamics(NamedTuple):
             first = last
         return tuple(pieces)
 
-    def weights_of_step(self, pieces: tuple[Float[Array, "kinds 10 _"], ...]) -> StressWeights:
-        """Return the weights of one step, by its pieces of `weights`."""
+    def weights_of_step(
+        self,
+        pieces: tuple[Float[Array, "kinds 10 _"], ...],
+        width: Float[Array, ""],
+        slow: Float[Array, ""],
+    ) -> StressWeights:
+        """Return the weights of one step.
+
+        Parameters
+        ----------
+        pieces
+            Those of `weights`.
+        width
+            Of the step in s.
+        slow
+            The factor on all times in its middle. A step in time over it is exact for the
+            relaxation as it is there: a structure may shorten times a hundredfold, which explicit
+            steps of the length that the flow asks for cannot follow.
+        """
+        if any(effect.changes_times for effect in self.states):
+            pieces = jax.lax.cond(
+                self.times_change,
+                lambda: tuple(piece[0] for piece in self.weights((width / slow)[None])),
+                lambda: pieces,
+            )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
         whole = KrogstadWeights(*joined[0])
         if self.trace_relaxation is None:
             return StressWeights(whole)
         return StressWeights(whole, KrogstadWeights(*joined[1]), self.trace_relaxation)
 
-    def rest(self) -> tuple[Float[Array, "4 k"], tuple[Float[Array, ""], ...]]:
+    def rest(self) -> tuple[Float[Array, "4 k"], tuple[Float[Array, "..."], ...]]:
         """Return modes and states at rest."""
         modulus = self.modes.modulus
-        levels = (jnp.full((), effect.rest, dtype=modulus.dtype) for effect in self.states)
+        levels = (
+            jnp.full((effect.levels,) if effect.levels > 1 else (), effect.rest, modulus.dtype)
+            for effect in self.states
+        )
         return jnp.zeros((4, len(modulus))), tuple(levels)
 
     def combined(self, factor: str, levels) -> Float[Array, ""]:

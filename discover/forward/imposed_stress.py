@@ -48,11 +48,11 @@ def strain_at_stress(
     def step(carry, inputs):
         stress, levels, before, strain = carry
         (from_, target), h, weights = inputs
-        w = dynamics.weights_of_step(weights)
         sheared, felt = dynamics.sheared(stress, before, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         ahead = _after(dynamics, levels, felt, sheared, h)
         slow = dynamics.combined("time_factor", ahead)
+        w = dynamics.weights_of_step(weights, h, slow)
         scale = dynamics.combined("modulus_factor", ahead)
         already = scale * dynamics.recorded(stress, flow)
         # backward Euler where the tool hardly counts, the trapezoidal rule where it swings
@@ -77,7 +77,7 @@ def strain_at_stress(
                 value, slope = jax.jvp(missing, (rate,), (jnp.ones_like(rate),))
                 rate = rate - value / slope
             change = dynamics.change(state, rate, slow, flow)
-            return rate, w.remainder(state, change, dynamics.decay)
+            return rate, w.remainder(state, slow * change, dynamics.decay)
 
         r1, n1 = stage(stress)
         r2, n2 = stage(w.second(stress, n1))

@@ -53,11 +53,6 @@ def integrate(
     def step(carry, inputs):
         stress, levels, missing, compliance_rate = carry
         (first_rate, middle_rate, last_rate), h, weights = inputs
-        w = dynamics.weights_of_step(weights)
-
-        def remainder(stress, rate, slow):
-            return w.remainder(stress, slope(stress, rate, slow), dynamics.decay)
-
         scale = combined("modulus_factor", levels)
         shear_before, felt_rate = dynamics.sheared(stress, middle_rate, flow)
         shear_before = scale * shear_before
@@ -68,13 +63,18 @@ def integrate(
         slow_first = combined("time_factor", levels)
         slow_middle = combined("time_factor", [p[0] for p in predicted])
         slow_last = combined("time_factor", [p[1] for p in predicted])
+        w = dynamics.weights_of_step(weights, h, slow_middle)
+
+        def remainder(stress, rate, slow):
+            change = slow_middle * slope(stress, rate, slow)
+            return w.remainder(stress, change, dynamics.decay)
 
         n1 = remainder(stress, first_rate + compliance_rate, slow_first)
         if series is not None:
             scale_last = combined("modulus_factor", [p[1] for p in predicted])
             n1, compliance_rate = _compliance_rate(
                 dynamics, scale_last, stress, shear_before, missing, compliance_rate, n1, w.whole,
-                first_rate, last_rate, h, times[-1],
+                slow_middle, first_rate, last_rate, h, times[-1],
             )  # fmt: skip
         middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
         n2 = remainder(w.second(stress, n1), middle_rate, slow_middle)
@@ -165,6 +165,7 @@ def _compliance_rate(
     earlier,
     n1,
     w,
+    slow,
     first_rate,
     last_rate,
     h,
@@ -179,7 +180,8 @@ def _compliance_rate(
     series, modes, viscous = dynamics.series, dynamics.modes, dynamics.viscosity
     assert series is not None
     full, whole = w.full, w.b1 + 2.0 * w.b23 + w.b4
-    stretch = modes.relaxation_time * (1.0 + stress[1])
+    own_time = slow * modes.relaxation_time
+    stretch = own_time * (1.0 + stress[1])
     predicted = scale * ((full * stress[3] + whole * n1[3]) @ modes.modulus)
     stiffness = scale * ((whole * stretch) @ modes.modulus)
     compliance = series.compliance + 0.5 * series.slip * h
@@ -190,7 +192,7 @@ def _compliance_rate(
     taken = taken + 0.5 * series.slip * h * before + missing
     now = -taken / (h + compliance * (stiffness + viscous))
     now = jnp.where(h > _JUMP * end, now, earlier)
-    change = (now - earlier) * modes.relaxation_time
+    change = (now - earlier) * own_time
     # the upper convected derivative is linear in the rate
     zero = jnp.zeros_like(stress[0])
     return n1 + change * jnp.stack([2.0 * stress[3], zero, zero, 1.0 + stress[1]]), now

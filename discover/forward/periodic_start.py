@@ -19,7 +19,7 @@ from discover.forward.modified_newton import (
 # that is seen: Newton's error goes as its square
 _MOST, _TOLERANCE = 40, 1e-7
 
-Levels = tuple[Float[Array, ""], ...]
+Levels = tuple[Float[Array, "..."], ...]
 
 
 class Cycle(NamedTuple):
@@ -81,7 +81,10 @@ def periodic_start(
         count = 4 + len(levels)
         unit = jnp.eye(count)
         directions = unit[:, :4, None] * jnp.ones((1, *stress.shape))
-        of_levels = tuple(unit[:, 4 + i] for i in range(len(levels)))
+        of_levels = tuple(
+            jnp.multiply.outer(unit[:, 4 + i], jnp.ones_like(level))
+            for i, level in enumerate(levels)
+        )
         ends, levels_ends, slopes, level_slopes = jax.vmap(along)(directions, of_levels)
         jacobian = jnp.moveaxis(slopes[:4], 2, 0)  # mode, direction, component
         own = tuple(slope[4 + i] for i, slope in enumerate(level_slopes))
@@ -96,7 +99,7 @@ def periodic_start(
         )
         changes = [
             relative_change(now.modes, modes, slowness, _TOLERANCE),
-            *(jnp.abs(a - b) for a, b in zip(levels, now.levels, strict=True)),
+            *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
         ]
         largest = jnp.max(jnp.stack(changes))
         change = jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0)

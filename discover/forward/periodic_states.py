@@ -32,8 +32,8 @@ class _Half(NamedTuple):
     """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends."""
 
     stress: Float[Array, "4 k"]
-    levels: tuple[Float[Array, ""], ...]
-    left: tuple[Float[Array, ""], ...]
+    levels: tuple[Float[Array, "..."], ...]
+    left: tuple[Float[Array, "..."], ...]
     wave: Float[Array, " s"]
 
 
@@ -41,7 +41,7 @@ class _Iterate(NamedTuple):
     """An approximation to the state at zero strain, and what is felt there of the amplitude."""
 
     modes: Approximation
-    levels: tuple[Float[Array, ""], ...]
+    levels: tuple[Float[Array, "..."], ...]
     felt: Float[Array, ""]
     felt_before: Float[Array, ""]
     lacking_before: Float[Array, ""]
@@ -109,7 +109,7 @@ def complex_modulus(
         changes = [
             relative_change(now.modes, modes, slowness, _TOLERANCE),
             jnp.abs(felt / now.felt - 1.0),
-            *(jnp.abs(a - b) for a, b in zip(levels, now.levels, strict=True)),
+            *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
         ]
         return _Iterate(
             modes=modes,
@@ -189,10 +189,7 @@ def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]
 def _half_cycle(dynamics: Dynamics, wave, width):
     """Return the function from state and strain amplitude to what half a cycle makes of them."""
     combined = dynamics.combined
-    w = dynamics.weights_of_step(tuple(piece[0] for piece in dynamics.weights(width[None])))
-
-    def remainder(stress, rate, slow):
-        return w.remainder(stress, dynamics.change(stress, rate, slow, None), dynamics.decay)
+    weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
 
     def relaxed(levels, rate, stress, share):
         pairs = [e.source_and_decay(v, rate, stress) for e, v in dynamics.states.items()]
@@ -215,6 +212,12 @@ def _half_cycle(dynamics: Dynamics, wave, width):
             halfway, _ = relaxed(levels, middle, before, 0.5)
             at_end, _ = relaxed(levels, middle, before, 1.0)
             slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
+            w = dynamics.weights_of_step(weights, width, slow[1])
+
+            def remainder(stress, rate, now):
+                change = slow[1] * dynamics.change(stress, rate, now, None)
+                return w.remainder(stress, change, dynamics.decay)
+
             n1 = remainder(stress, first, slow[0])
             n2 = remainder(w.second(stress, n1), middle, slow[1])
             n3 = remainder(w.third(stress, n1, n2), middle, slow[1])
@@ -228,7 +231,7 @@ def _half_cycle(dynamics: Dynamics, wave, width):
             )
 
         begun = combined("modulus_factor", levels) * sheared(stress, rate[0])
-        start = (stress, list(levels), [jnp.ones(())] * len(levels))
+        start = (stress, list(levels), [jnp.ones_like(level) for level in levels])
         (stress, levels, left), recorded = jax.lax.scan(
             step, start, (rate[:-2:2], rate[1::2], rate[2::2])
         )

@@ -104,7 +104,9 @@ class Program:
 
     def in_use(self, theta: np.ndarray) -> InUse:
         """Return the branches that a parameter vector takes."""
-        used = self.added.in_use(theta)
+        changing = [e for e in self._states if e.changes_times]
+        times = any(theta[self.slices[e.name].start] != 0.0 for e in changing)
+        used = self.added.in_use(theta)._replace(times=np.int32(times))
         if self._by_mode is None:
             return used
         differ = theta[self.slices[self._by_mode.name].start] != 0.0
@@ -357,6 +359,7 @@ class Program:
             series,
             self._beside(numbers, theta, jnp.ones(1), flow)[0],
             self._trace_relaxation(law, modulus, extra) if law.retracts else None,
+            used.times,
         )
 
     def _trace_relaxation(self, law: AbstractConstitutiveLaw, modulus, extra: Modes | None):

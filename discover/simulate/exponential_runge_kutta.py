@@ -158,11 +158,11 @@ def krogstad_weights(
 
 
 def relax(
-    source: Float[Array, ""],
-    decay: Float[Array, ""],
-    state: Float[Array, ""],
+    source: Float[Array, "*levels"],
+    decay: Float[Array, "*levels"],
+    state: Float[Array, "*levels"],
     width: Float[Array, ""],
-) -> Float[Array, ""]:
+) -> Float[Array, "*levels"]:
     """Return s after a step of ds/dt = source − decay · s with both of them constant, exactly."""
     z = -decay * width
     return state * jnp.exp(z) + source * width * phi_functions(z)[0]

@@ -24,6 +24,9 @@ _FINITE = 4.0
 _INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
 """Multiples of an inner time or exponent from which an effect is tried too."""
 
+_NARROW = 100.0
+"""Ratio of the ends of a range up to which its first trial is close to every value in it."""
+
 
 @dataclass
 class Attribution:
@@ -154,7 +157,11 @@ def with_other_inner(
     model: AugmentedModel, theta: np.ndarray, effect: AbstractEffect
 ) -> list[np.ndarray]:
     """Return a parameter vector with the inner parameters of an effect at other sizes, if any."""
-    inner = model.positions(effect.name)[1:]
+    inner = [
+        at
+        for at in model.positions(effect.name)[1:]
+        if model.low[at] <= 0.0 or model.high[at] > _NARROW * model.low[at]
+    ]
     out = []
     for stretch in _INNER_STRETCHES if inner else ():
         other = theta.copy()

@@ -37,6 +37,7 @@ def data_scales(runs: Sequence[Run]) -> dict[str, float]:
     return {
         "sampling_time": gap,
         "run_time": float(np.median(material_lengths)) or 1.0,
+        "inverse_rate": 1.0 / rate,
         "strain": float(np.median(strains)) or 1.0,
         "stress": stress,
         "inverse_stress": 1.0 / stress,

@@ -1,0 +1,143 @@
+"""A structure of the fluid that flow breaks and rest mends, on which the stress depends."""
+
+from abc import abstractmethod
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.effects.base import EffectParameter, StateEffect
+
+CROSS = 2.0 / 3.0
+"""Exponent of the rate of dispersions   [Cross 1965]."""
+
+
+class Structure(StateEffect):
+    """A structure s, one at rest: ds/dt = (1 − s)/t_b − (X/X_c)ⁿ s/t_b.
+
+    X is the shear rate or the stress, and s = 1/(1 + (X/X_c)ⁿ) in steady flow, which is Cross's
+    equation. Parameters are 1/X_c, which is the amplitude, t_b and n; with two structure times,
+    s = (1 − w) s₁ + w s₂, the ratio R of the slow one to t_b and the share w instead of n, which
+    is then Cross's: no record of which we know tells all five.
+    [Cross 1965, J. Colloid Sci. 20, 417; Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147–148,
+    214; several times: Wei, Solomon & Larson 2018, J. Rheol. 62, 321]. A member of the family says
+    what breaks it, X, and on what s acts, `time_factor` or `modulus_factor`.
+    """
+
+    rest = 1.0
+    acts_on_steady_states = True
+
+    @staticmethod
+    @abstractmethod
+    def breaks(shear_rate: Float[Array, ""], stress: Float[Array, ""]) -> Float[Array, ""]:
+        """Return X, in 1/s or Pa."""
+
+    def source_and_decay(self, values, shear_rate, stress):
+        """Return 1/t_b and (1 + (X/X_c)ⁿ)/t_b, of both structures where there are two."""
+        times = values[1] if self.levels == 1 else values[1] * jnp.array([1.0, values[2]])
+        return 1.0 / times, (1.0 + self._broken(values, shear_rate, stress)) / times
+
+    def _broken(self, values, shear_rate, stress):
+        size = values[0] * jnp.abs(self.breaks(shear_rate, stress))
+        # a power below one has no derivative at zero
+        flows = size > 0.0
+        exponent = values[2] if self.levels == 1 else CROSS
+        return jnp.where(flows, jnp.where(flows, size, 1.0) ** exponent, 0.0)
+
+    def whole(self, values: Float[Array, " p"], state) -> Float[Array, ""]:
+        """Return s."""
+        if self.levels == 1:
+            return state
+        return (1.0 - values[3]) * state[0] + values[3] * state[1]
+
+
+class BrokenByRate(Structure):
+    """A structure that a power of the shear rate breaks."""
+
+    @staticmethod
+    def breaks(shear_rate, stress):
+        """Return the shear rate in 1/s."""
+        del stress
+        return shear_rate
+
+
+class BrokenByStress(Structure):
+    """A structure that a power of the stress breaks.
+
+    [de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673].
+    """
+
+    @staticmethod
+    def breaks(shear_rate, stress):
+        """Return the shear stress in Pa."""
+        del shear_rate
+        return stress
+
+
+INVERSE_RATE = EffectParameter(
+    "inverse_critical_rate",
+    r"1/\dot\gamma_\mathrm{c}",
+    "s",
+    low=0.0,
+    high=1e5,
+    scale="inverse_rate",
+    first_trial=0.3,
+    range_source="half of a structure is broken at the critical rate: the slowest steady flows of "
+    "rheometers, 1e-5 1/s, break those of gels (Mewis & Wagner 2009)",
+)
+"""Amplitude of what the rate breaks."""
+
+INVERSE_STRESS = EffectParameter(
+    "inverse_critical_stress",
+    r"1/\sigma_\mathrm{c}",
+    "1/Pa",
+    low=0.0,
+    high=100.0,
+    scale="inverse_stress",
+    first_trial=0.3,
+    range_source="half of a structure is broken at the critical stress: at a hundredth of the "
+    "stress recorded it is broken throughout",
+    range_scale="inverse_stress",
+)
+"""Amplitude of what the stress breaks."""
+
+BUILD_UP_TIME = EffectParameter(
+    "build_up_time",
+    r"t_\mathrm{b}",
+    "s",
+    low=1e-3,
+    high=1e6,
+    scale="run_time",
+    first_trial=0.3,
+    range_source="as that of thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
+    ends=("high",),
+)
+
+EXPONENT = EffectParameter(
+    "exponent",
+    "n",
+    low=0.1,
+    high=4.0,
+    first_trial=1.0,
+    range_source="1 in most models of thixotropy, others in some (Mewis & Wagner 2009), 2/3 in "
+    "Cross's equation for dispersions; beyond 4 a structure breaks at one rate or stress at once",
+)
+
+SLOWNESS = EffectParameter(
+    "slowness",
+    "R",
+    low=2.0,
+    high=1e4,
+    first_trial=30.0,
+    range_source="structure times closer than twofold are hardly two (those of Wei, Solomon & "
+    "Larson 2018 spread over decades)",
+)
+"""The slow structure time over the fast one."""
+
+SLOW_SHARE = EffectParameter(
+    "slow_share",
+    "w",
+    low=0.01,
+    high=0.99,
+    first_trial=0.1,
+    range_source="with less than one part in a hundred of either there are no two structures",
+)
