@@ -24,7 +24,8 @@ ROOT_PAGES = {
 REFERENCE = {
     "data": (
         "Data",
-        "load_dataset check_folder synthetic_dataset Dataset Run LinearSweep InputError",
+        "load_dataset from_dataframe check_folder synthetic_dataset Dataset Run LinearSweep "
+        "InputError",
     ),
     "flows": (
         "Flows",
