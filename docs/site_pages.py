@@ -41,6 +41,19 @@ REFERENCE = {
     ),
 }
 
+# what these return, which nobody makes by hand
+RESULTS = {
+    "learners": (
+        "discover.equations.Equation",
+        "discover.learners.RecoveredTerm",
+        "discover.learners.LearnerResult",
+    ),
+    "loops": (
+        "discover.comparison.comparison.Comparison",
+        "discover.closed_loop.result.LoopResult",
+    ),
+}
+
 # these two names are packages as well, whose reference would be that of all that they hold
 TABLES = {
     "laws": "discover.laws.registry.laws_table",
@@ -105,9 +118,8 @@ def _reference() -> Iterator[tuple[str, str]]:
     if listed != set(dc.__all__):
         raise ValueError(f"names that REFERENCE lacks or invents: {listed ^ set(dc.__all__)}")
     for path, (title, names) in REFERENCE.items():
-        entries = "".join(
-            f"\n::: {TABLES.get(name, f'discover.{name}')}\n" for name in names.split()
-        )
+        paths = [TABLES.get(name, f"discover.{name}") for name in names.split()]
+        entries = "".join(f"\n::: {name}\n" for name in (*paths, *RESULTS.get(path, ())))
         yield f"reference/{path}.md", f"# {title}\n{entries}"
     entries = "".join(f"\n::: tensor_library.{name}\n" for name in tensor_library.__all__)
     yield "reference/tensor_library.md", f"# Tensor library\n{entries}"
