@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.dataset import Run as Run
     from discover.dataset import check_folder as check_folder
     from discover.dataset import load_dataset as load_dataset
+    from discover.dataset.from_dataframe import from_dataframe as from_dataframe
     from discover.dataset.importing import register_importer as register_importer
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
@@ -67,6 +68,7 @@ __all__ = [
     "close_loop",
     "compare",
     "effects",
+    "from_dataframe",
     "in_flow",
     "laws",
     "load",
@@ -94,6 +96,7 @@ _PLACES = {
         "check_folder",
         "load_dataset",
     ),
+    "discover.dataset.from_dataframe": ("from_dataframe",),
     "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),

@@ -24,7 +24,8 @@ ROOT_PAGES = {
 REFERENCE = {
     "data": (
         "Data",
-        "load_dataset check_folder synthetic_dataset Dataset Run LinearSweep InputError",
+        "load_dataset from_dataframe check_folder synthetic_dataset Dataset Run LinearSweep "
+        "InputError",
     ),
     "flows": (
         "Flows",
@@ -37,6 +38,19 @@ REFERENCE = {
     "registering": (
         "Additions of your own",
         "register_law register_effect register_closed_form register_learner register_importer",
+    ),
+}
+
+# what these return, which nobody makes by hand
+RESULTS = {
+    "learners": (
+        "discover.equations.Equation",
+        "discover.learners.RecoveredTerm",
+        "discover.learners.LearnerResult",
+    ),
+    "loops": (
+        "discover.comparison.comparison.Comparison",
+        "discover.closed_loop.results.loop_result.LoopResult",
     ),
 }
 
@@ -104,9 +118,8 @@ def _reference() -> Iterator[tuple[str, str]]:
     if listed != set(dc.__all__):
         raise ValueError(f"names that REFERENCE lacks or invents: {listed ^ set(dc.__all__)}")
     for path, (title, names) in REFERENCE.items():
-        entries = "".join(
-            f"\n::: {TABLES.get(name, f'discover.{name}')}\n" for name in names.split()
-        )
+        paths = [TABLES.get(name, f"discover.{name}") for name in names.split()]
+        entries = "".join(f"\n::: {name}\n" for name in (*paths, *RESULTS.get(path, ())))
         yield f"reference/{path}.md", f"# {title}\n{entries}"
     entries = "".join(f"\n::: tensor_library.{name}\n" for name in tensor_library.__all__)
     yield "reference/tensor_library.md", f"# Tensor library\n{entries}"

@@ -33,7 +33,8 @@ class ClosedForm:
     inner_name, inner_default, inner_bounds
         The inner parameter, the value a fit starts from, and where it is admissible.
     function
-        ``f(trace_of_stress, inner)``.
+        ``f(trace_of_stress, inner)``: of the dimensionless trace and one number, both of shape (),
+        in jax.numpy.
     complexity
         Number of operations, as a measure of how much the form costs in model selection.
     source

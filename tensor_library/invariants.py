@@ -35,7 +35,7 @@ def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
     Parameters
     ----------
     stress, rate
-        Symmetric tensors, both (3, 3) or both (4,).
+        Symmetric dimensionless tensors, both of shape (3, 3) or both (4,).
 
     Examples
     --------

@@ -58,8 +58,8 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
     Parameters
     ----------
     velocity_gradient
-        L, shape (3, 3); its components 11, 22, 33, 12, where no other is there; or the scalar
-        shear rate of simple shear.
+        L in 1/s, or dimensionless, shape (3, 3); its components 11, 22, 33, 12, where no other is
+        there; or the scalar shear rate of simple shear.
 
     Examples
     --------
@@ -87,7 +87,8 @@ def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGra
     stress
         σ, shape (3, 3), or its four components 11, 22, 33, 12.
     velocity_gradient
-        As in `rate_of_deformation`; the full tensor for a full σ, else one of the other two.
+        As in `rate_of_deformation`: shape (3, 3) for a full σ, else (4,) or (), in 1/s or
+        dimensionless.
 
     Examples
     --------

@@ -147,7 +147,8 @@ class TermLibrary:
         stress, rate
             Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
         inner
-            Inner parameters in the order of `inner_names`; their defaults if None.
+            Inner parameters in the order of `inner_names`, dimensionless, shape (n_inner,); their
+            defaults if None.
 
         Returns
         -------
@@ -204,8 +205,8 @@ def build_library(
     >>> len(build_library(degree=0)), len(build_library(degree=1, closed_forms=["exp"]))
     (8, 65)
     """
-    if not 0 <= degree <= 4:
-        raise ValueError(f"degree must be 0 to 4; got {degree}. Higher degrees are not separable.")
+    if not isinstance(degree, int) or not 0 <= degree <= 4:
+        raise ValueError(f"degree must be 0 to 4; got {degree!r}. Higher ones are not separable.")
     if invariants is None:
         invariants = [
             name for i, name in enumerate(INVARIANT_NAMES) if i not in IDENTICALLY_ZERO_IN_SHEAR

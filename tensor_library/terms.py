@@ -110,7 +110,8 @@ class CandidateTerm:
         stress, rate
             Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
         inner
-            Inner parameters by name; the form's default where one is missing.
+            Inner parameters by name, dimensionless, of shape (); the form's default where one is
+            missing.
         """
         invariants = scalar_invariants(stress, rate)
         value = integrity_basis(stress, rate)[self.tensor]
@@ -173,6 +174,15 @@ class CandidateTerm:
 
 class TermShare(NamedTuple):
     """A term, by its canonical spelling, with the coefficient that a law or an effect gives it.
+
+    Attributes
+    ----------
+    term
+        The spelling, as `parse_term` reads it.
+    coefficient
+        Dimensionless.
+    inner
+        Inner parameters of a closed form by name, dimensionless.
 
     Examples
     --------

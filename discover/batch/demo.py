@@ -3,7 +3,8 @@
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from discover.batch.tasks import Progress, run_close_loop, run_compare
+from discover.batch.tasks import run_close_loop, run_compare
+from discover.progress import Progress
 
 
 def run_demo(

@@ -5,7 +5,7 @@ from threading import Lock
 from time import monotonic
 
 from discover.batch.status import StudyStatus
-from discover.batch.tasks import Progress
+from discover.progress import Progress
 
 _PAUSE = 1.0  # seconds between two lines of one study that a worker sends
 

@@ -10,8 +10,9 @@ from discover.batch.cluster import run_on_cluster
 from discover.batch.progress import BatchProgress
 from discover.batch.status import BatchResult, StudyStatus
 from discover.batch.summary import SUMMARY_FILES, Summary
-from discover.batch.tasks import Note, Progress, nothing_to_note, run_close_loop, run_compare
+from discover.batch.tasks import Note, nothing_to_note, run_close_loop, run_compare
 from discover.errors import InputError, plain_os_error
+from discover.progress import Progress
 from discover.stop_callbacks import on_stop
 from discover.study.atomic import make_folder
 from discover.study.read import read_study

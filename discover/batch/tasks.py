@@ -8,11 +8,11 @@ import numpy as np
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
+from discover.progress import Progress, by_lines
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 
-Progress = Callable[[str, float], None]
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
 
@@ -156,13 +156,6 @@ def run_close_loop(
     each = data_of_study.each
     if each:
         stages *= 1 + len(data_of_study.fit)
-    lines = 0
-
-    def say(line: str) -> None:
-        nonlocal lines
-        lines += 1
-        progress(line, min(lines / (stages + 1), 0.95))
-
     options = {
         "fit": data_of_study.fit.names,
         "effects": study.loop.effects,
@@ -172,7 +165,7 @@ def run_close_loop(
         "most_samples": study.loop.most_samples,
         "explanations": study.loop.explanations,
         "laws": model.choice,
-        "progress": say,
+        "progress": by_lines(progress, stages),
         "store": folder,
     }
     if each:

@@ -1,8 +1,10 @@
 """A closed loop on data that a program holds."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
@@ -11,9 +13,12 @@ from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
+from discover.progress import Progress, by_lines, checked
 from discover.study.build import DeclaredModel as DeclaredFluid
 from discover.study.build import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
+from discover.study.schema import Loop
+from discover.validation import validated
 
 _OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws"}
 
@@ -26,7 +31,7 @@ def close_loop(
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
     known_effects: Mapping[str, Any] | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> LoopResult:
     """Find what a fluid lacks on these data, add it, and judge it on runs that no fit saw.
@@ -52,7 +57,7 @@ def close_loop(
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
         model and not proposed again.
     progress
-        Called with a line of text now and then.
+        Called now and then with a line of text and about what fraction is done.
     **options
         `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` of
         `discover.closed_loop.run_loop`.
@@ -78,10 +83,13 @@ def close_loop(
         raise InputError(
             f"close_loop has no option {unknown[0]!r}; it has {', '.join(sorted(_OPTIONS))}."
         )
+    asked = _checked(options)
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
     declared = forward_model(with_known(fluid, known_effects, free, by_mode))
-    options |= {"fit": divided.fit.names, "progress": progress}
+    rounds = (1 + len(divided.fit)) if divided.each else 1
+    say = by_lines(checked(progress), rounds * (asked.max_effects + 1))
+    options |= {"fit": divided.fit.names, "progress": say}
     if divided.each:
         result = run_loop_on_each(divided.dataset, declared, **options)
     else:
@@ -93,6 +101,21 @@ def close_loop(
         f"mode{'s' if len(fluid.modulus) > 1 else ''}. {data.thinned}"
     ).strip()
     return replace(result, title=data.name, summary=summary)
+
+
+def _checked(options: Mapping[str, Any]) -> Loop:
+    """Return the options as a study would hold them."""
+    content = dict(options)
+    laws, effects = content.pop("laws", ()), content.get("effects")
+    if isinstance(laws, str):
+        raise InputError(f"laws must be a list of names; got {laws!r}. Write [{laws!r}].")
+    if not (effects is None or isinstance(effects, str | Iterable)):
+        raise InputError(f"effects must be 'named' or a list of effects; got {effects!r}.")
+    if effects is not None and not isinstance(effects, str):
+        content["effects"] = [getattr(effect, "name", effect) for effect in effects]
+    if isinstance(content.get("strain"), np.ndarray):
+        content["strain"] = content["strain"].tolist()
+    return validated(Loop, content, "close_loop()")
 
 
 def _described(fluid: DeclaredFluid) -> str:

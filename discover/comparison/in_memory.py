@@ -1,12 +1,12 @@
 """A comparison of estimators, or on data, that a program holds."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Sized
 from dataclasses import replace
 from typing import Any, overload
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare as compare_study
-from discover.comparison.training import Progress, searched, silent
+from discover.comparison.training import searched
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -15,6 +15,7 @@ from discover.learners.known_part import known_part
 from discover.learners.provenance import fingerprint_of
 from discover.learners.result import LearnerResult
 from discover.learners.run_prediction import RunPrediction
+from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.build import DeclaredModel, StudyData
 from discover.study.in_memory import (
@@ -54,15 +55,15 @@ def compare(
 
 
 def compare(
-    first: Any,
-    second: Any = None,
+    first: Sequence[RunPrediction] | Dataset,
+    second: Dataset | Fluid | None = None,
     *,
-    train: Any = None,
-    held_out: Any = (),
-    known_effects: Any = None,
-    free: Any = (),
+    train: Dataset | None = None,
+    held_out: HeldOut = (),
+    known_effects: Mapping[str, Any] | None = None,
+    free: Sequence[str] = (),
     seed: int = 0,
-    progress: Any = None,
+    progress: Progress | None = None,
     **options: Any,
 ) -> Comparison:
     """Compare fitted estimators on runs that no fit saw, or fit both learners to data and compare.
@@ -105,7 +106,7 @@ def compare(
     >>> comparison = dc.compare(data, learners=["tensor_sindy"])  # doctest: +SKIP
     >>> comparison.to_html("comparison.html")  # doctest: +SKIP
     """
-    say = progress or silent
+    say = checked(progress) or silent
     if isinstance(first, Dataset):
         if train is not None:
             raise InputError("train is for estimators from a file; leave it out.")
@@ -113,8 +114,9 @@ def compare(
         model = with_known(declared_fluid(second, first), known_effects, free)
         study = _study(data, model, options)
         return compare_study(study, seed, say, data=data, declared=model)
-    if options or len(held_out) or known_effects or len(free):
-        given = {"held_out": len(held_out), "known_effects": known_effects, "free": len(free)}
+    judging = not isinstance(held_out, Sized) or len(held_out) > 0
+    if options or judging or known_effects or len(free):
+        given = {"held_out": judging, "known_effects": known_effects, "free": len(free)}
         unknown = next(iter(options), next((k for k, value in given.items() if value), ""))
         raise InputError(
             f"{unknown} is for a data set; the estimators are fitted already. Leave it out."

@@ -24,12 +24,7 @@ from discover.comparison.next_measurement import NextMeasurement, next_measureme
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.sampled_rates import left_by_sampled_rates
 from discover.comparison.statements import make_statements
-from discover.comparison.training import (
-    Progress,
-    silent,
-    study_library,
-    train,
-)
+from discover.comparison.training import study_library, train
 from discover.comparison.truth import TrueTerm, true_terms
 from discover.comparison.unseen_runs import hold_against_unseen
 from discover.dataset import Dataset
@@ -39,6 +34,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
 from discover.learners.result import LearnerResult
+from discover.progress import Progress, silent
 from discover.protocols import settled
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation

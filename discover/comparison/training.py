@@ -1,6 +1,6 @@
 """From a study to trained learners."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,20 +10,13 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
+from discover.progress import Progress, silent
 from discover.study.build import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
 
 if TYPE_CHECKING:
     from discover.learners.tensor_sindy import TensorSINDy
-
-Progress = Callable[[str, float], None]
-"""Called with what is going on and the fraction done, 0 to 1."""
-
-
-def silent(label: str, fraction: float) -> None:
-    """Report nothing."""
-    del label, fraction
 
 
 def require_numbers(model: DeclaredModel) -> None:
@@ -91,7 +84,7 @@ def train(
             selection=options.selection,
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
-            progress=lambda text: progress(text, 0.5),
+            progress=progress,
             **shared,
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files
@@ -103,7 +96,7 @@ def train(
         dense = TensorDense(
             use_normal_stresses=options.use_normal_stresses,
             solvent_viscosity=model.solvent_viscosity,
-            progress=lambda text: progress(text, 0.5),
+            progress=progress,
             **shared,
         ).fit(list(runs))
         return replace(dense.result_, weighted=dense.laws_that_fit()), dense.fluid_
@@ -115,9 +108,7 @@ def train(
             n_members=options.members,
             quick=options.quick,
             projection_library=library,
-            progress=lambda step, total, loss: progress(
-                f"step {step} of at most {total}, loss {loss:.2g}", step / max(total, 1)
-            ),
+            progress=progress,
             **shared,
         )
         estimator.fit(list(runs))

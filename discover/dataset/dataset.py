@@ -58,6 +58,23 @@ class Dataset(NotebookView):
     material_functions: Mapping[str, Run] = field(default_factory=dict)
 
     def __post_init__(self):
+        if isinstance(self.runs, Run | str) or not isinstance(self.runs, Iterable):
+            raise InputError(
+                f"A data set takes a sequence of Run; got a {type(self.runs).__name__}. Put a "
+                "single run in a list."
+            )
+        object.__setattr__(self, "runs", tuple(self.runs))
+        other = next((run for run in self.runs if not isinstance(run, Run)), None)
+        if other is not None:
+            raise InputError(
+                f"A data set takes a sequence of Run; one is a {type(other).__name__}. Make runs "
+                "of a table with from_dataframe."
+            )
+        if not (self.linear_sweep is None or isinstance(self.linear_sweep, LinearSweep)):
+            raise InputError(
+                "linear_sweep must be a LinearSweep of frequencies, G' and G''; got a "
+                f"{type(self.linear_sweep).__name__}."
+            )
         names = [run.name for run in self.runs]
         repeated = {name for name in names if names.count(name) > 1}
         if repeated:
@@ -244,6 +261,9 @@ class Dataset(NotebookView):
                 raise InputError(
                     f"{label} must be a list of names; got {names!r}. Write [{names!r}]."
                 )
+            listed = isinstance(names, Iterable) and all(isinstance(n, str) for n in names)
+            if not (listed or (names is None and label == "fit")):
+                raise InputError(f"{label} must be a list of names of runs; got {names!r}.")
         test = self.select(list(held_out))
         train = self.select([n for n in self.names if n not in held_out] if fit is None else fit)
         both = set(train.names) & set(test.names)
@@ -259,6 +279,8 @@ class Dataset(NotebookView):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return all samples, one line each: the column ``run``, then those of its file."""
+        if not self.runs:
+            return pd.DataFrame({"run": []})
         table = pd.concat(
             [run.to_dataframe().assign(run=run.name) for run in self.runs], ignore_index=True
         )

@@ -8,6 +8,7 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.optimize import nnls
 
+from discover.dataset.columns import as_column
 from discover.errors import InputError
 
 MOST_MODES = 30
@@ -45,6 +46,18 @@ class LinearSweep:
     storage_modulus: Float[np.ndarray, " n"]
     loss_modulus: Float[np.ndarray, " n"]
     thinned: str = ""
+
+    def __post_init__(self):
+        for label in ("angular_frequency", "storage_modulus", "loss_modulus"):
+            column = as_column(getattr(self, label), f"{label} of a linear sweep")
+            if column.shape != np.shape(self.angular_frequency):
+                raise InputError(
+                    f"{label} of a linear sweep must have shape {np.shape(self.angular_frequency)} "
+                    f"like its frequencies; got {column.shape}."
+                )
+            object.__setattr__(self, label, column)
+        if np.any(self.angular_frequency <= 0):
+            raise InputError("The frequencies of a linear sweep must be positive, in rad/s.")
 
     def __len__(self) -> int:
         return self.angular_frequency.shape[0]
@@ -150,6 +163,11 @@ def relaxation_spectrum(
         raise InputError(
             f"most_modes must be at least 1 and tolerance at least 1; got {most_modes} and "
             f"{tolerance}."
+        )
+    if np.any(sweep.storage_modulus <= 0) or np.any(sweep.loss_modulus <= 0):
+        raise InputError(
+            "A relaxation spectrum needs moduli that are positive at every frequency. Remove the "
+            "others."
         )
     # more unknowns than data would fit the noise
     most_modes = min(most_modes, len(sweep.angular_frequency))

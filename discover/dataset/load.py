@@ -57,6 +57,11 @@ def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
     InputError
         If there is no such folder, or it has none of `DATA_FILES`.
     """
+    if not isinstance(folder, str | os.PathLike):
+        raise InputError(
+            f"A data folder is named by its path; got a {type(folder).__name__}. For tables in "
+            "memory there is from_dataframe."
+        )
     try:
         path = Path(folder).expanduser()
     except RuntimeError:

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from discover.dataset.columns import as_column
 from discover.errors import InputError
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, FlowKind, RecordedQuantity
@@ -14,6 +16,17 @@ from discover.protocols.protocol import FlowProtocol, recording
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
+
+
+_NEEDED = ("time", "rate", "stress")
+_COLUMNS = (
+    *_NEEDED,
+    "first_normal_stress_difference",
+    "second_normal_stress_difference",
+    "strain",
+    "storage_modulus",
+    "loss_modulus",
+)
 
 
 @dataclass(frozen=True)
@@ -39,8 +52,8 @@ class Run:
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
     strain
-        Strain at the sampling times, where recorded; computed from the rate otherwise. Of
-        oscillations by their first harmonic the amplitude, as are rate and stress.
+        Strain at the sampling times, shape (n,), where recorded; computed from the rate otherwise.
+        Of oscillations by their first harmonic the amplitude, as are rate and stress.
     storage_modulus, loss_modulus
         G′ and G″ in Pa of such oscillations, shape (n,).
     clock_factor
@@ -84,32 +97,32 @@ class Run:
     loss_modulus: Float[np.ndarray, " _"] | None = None
 
     def __post_init__(self):
-        # shapes are checked here, not by annotation: users build runs by hand
-        n = self.time.shape[0] if self.time.ndim == 1 else 0
-        if n == 0:
-            raise InputError(f"The run {self.name!r} has no samples; give at least one.")
-        for label, values in (
-            ("time", self.time),
-            ("rate", self.rate),
-            ("stress", self.stress),
-            ("first_normal_stress_difference", self.first_normal_stress_difference),
-            ("second_normal_stress_difference", self.second_normal_stress_difference),
-            ("strain", self.strain),
-            ("storage_modulus", self.storage_modulus),
-            ("loss_modulus", self.loss_modulus),
-        ):
-            if values is None:
+        # kinds and shapes are checked here, not by annotation: users build runs by hand
+        if not isinstance(self.name, str):
+            raise InputError(f"The name of a run must be text; got {self.name!r}.")
+        if not isinstance(self.protocol, FlowProtocol):
+            raise InputError(
+                f"protocol of the run {self.name!r} must be a flow, such as start_up(0.5) or "
+                f"measured_rate(times, rates); got a {type(self.protocol).__name__}."
+            )
+        for label in _COLUMNS:
+            values = getattr(self, label)
+            if values is None and label not in _NEEDED:
                 continue
-            if values.shape != (n,):
+            column = as_column(values, f"{label} of the run {self.name!r}")
+            object.__setattr__(self, label, column)
+            if not len(self.time):
+                raise InputError(f"The run {self.name!r} has no samples; give at least one.")
+            if column.shape != self.time.shape:
                 raise InputError(
-                    f"{label} of the run {self.name!r} must have shape ({n},) like its time; got "
-                    f"{values.shape}."
+                    f"{label} of the run {self.name!r} must have shape {self.time.shape} like its "
+                    f"time; got {column.shape}."
                 )
-            if not np.all(np.isfinite(values)):
-                row = int(np.argmin(np.isfinite(values)))
+        for label in ("clock_factor", "rate_before", "strain_before"):
+            value = getattr(self, label)
+            if isinstance(value, bool) or not isinstance(value, Real):
                 raise InputError(
-                    f"{label} of the run {self.name!r} must be finite; sample {row} holds "
-                    f"{values[row]}. Remove that sample."
+                    f"{label} of the run {self.name!r} must be a number; got {value!r}."
                 )
         if self.time[0] < 0 or np.any(np.diff(self.time) <= 0):
             raise InputError(

@@ -6,6 +6,8 @@ from typing import Any, Protocol, runtime_checkable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
@@ -25,7 +27,10 @@ class HasSpectrum(Protocol):
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
-    return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
+    try:
+        return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
+    except (TypeError, ValueError):
+        raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
 
 
 class Fluid(eqx.Module):
@@ -57,6 +62,37 @@ class Fluid(eqx.Module):
     modulus: Float[Array, " k"] = eqx.field(converter=_as_modes)
     relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes)
     solvent_viscosity: Float[Array, ""] = eqx.field(converter=as_parameter, default=0.0)
+
+    def __check_init__(self):
+        if not isinstance(self.law, AbstractConstitutiveLaw):
+            raise InputError(
+                "The law of a fluid must be a law, such as make_law('ucm'), and no name or class; "
+                f"got {self.law!r}."
+            )
+        shape = self.relaxation_time.shape
+        if self.modulus.shape != shape or len(shape) != 1 or not shape[0]:
+            raise InputError(
+                "modulus and relaxation_time of a fluid must have one value for each mode; got the "
+                f"shapes {self.modulus.shape} and {shape}."
+            )
+        for label, values, least in (
+            ("modulus", self.modulus, np.nextafter(0.0, 1.0)),
+            ("relaxation_time", self.relaxation_time, np.nextafter(0.0, 1.0)),
+            ("solvent_viscosity", self.solvent_viscosity, 0.0),
+        ):
+            if isinstance(values, Tracer):
+                continue  # known only when the program runs
+            numbers = np.asarray(values)
+            if not np.all((numbers >= least) & np.isfinite(numbers)):
+                wanted = "positive and finite" if least else "finite and not negative"
+                raise InputError(f"{label} of a fluid must be {wanted}; got {numbers.tolist()}.")
+
+    def __repr__(self) -> str:
+        modes = f"{self.n_modes} mode{'s' if self.n_modes > 1 else ''}"
+        if not isinstance(self.relaxation_time, Tracer) and self.n_modes:
+            times = np.asarray(self.relaxation_time)
+            modes += f" from {times.min():.3g} to {times.max():.3g} s"
+        return f"<Fluid: {type(self.law).__name__}, {modes}>"
 
     @classmethod
     def dimensionless(cls, law: AbstractConstitutiveLaw) -> "Fluid":
@@ -93,6 +129,11 @@ class Fluid(eqx.Module):
             raise InputError(
                 "There is no linear sweep to take the modes from: the data set has no lve.csv. "
                 "Give the modes: Fluid(law, modulus, relaxation_time), in Pa and s."
+            )
+        if not isinstance(sweep, HasSpectrum):
+            raise InputError(
+                "The modes come from a linear sweep, such as data.linear_sweep; got a "
+                f"{type(sweep).__name__}."
             )
         spectrum = sweep.relaxation_spectrum(**options)
         return cls(
@@ -131,9 +172,9 @@ class Fluid(eqx.Module):
         Parameters
         ----------
         state
-            σ_k/G_k in the four components.
+            σ_k/G_k, dimensionless, in the four components, shape (k, 4).
         velocity_gradient
-            The shear rate γ̇ in 1/s, or the four components of L in 1/s.
+            The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
         """
         scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
         return jax.vmap(self.law.stress_rate)(state, scaled) / self.relaxation_time[:, None]

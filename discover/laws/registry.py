@@ -221,8 +221,13 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
     >>> [(share.term, share.coefficient) for share in law.as_terms()]
     [('sigma.sigma', 0.3)]
     """
+    if not (parameters is None or isinstance(parameters, Mapping)):
+        raise InputError(
+            f"The parameters of a law are given by name, such as {{'alpha': 0.3}}; got "
+            f"{parameters!r}."
+        )
     parameters = dict(parameters or {})
-    if name not in LAWS:
+    if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"Unknown law {name!r}; write one of {', '.join(LAWS)}.")
     entry = LAWS[name]
     unknown = [key for key in parameters if key not in entry.parameters]

@@ -2,14 +2,18 @@
 
 import inspect
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.checking import check_law
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.learners.settings import per_mode
 
 _HELD_BY_BASE = (
     "modulus",
@@ -29,7 +33,7 @@ class KnownPart:
     law
         A known dimensionless law; None for upper convected Maxwell.
     modulus, relaxation_time
-        In Pa and s, numbers, or one value for each mode.
+        In Pa and s, shape (k,).
     solvent_viscosity
         In Pa s.
     linear_relaxation
@@ -37,8 +41,8 @@ class KnownPart:
     """
 
     law: AbstractConstitutiveLaw | None
-    modulus: Any
-    relaxation_time: Any
+    modulus: Float[np.ndarray, " k"]
+    relaxation_time: Float[np.ndarray, " k"]
     solvent_viscosity: float
     linear_relaxation: bool
 
@@ -61,16 +65,35 @@ def known_part(estimator: Any) -> KnownPart:
     Raises
     ------
     InputError
-        If `base` is no fluid, or something that it holds is given too.
+        If `base` is no fluid, or something that it holds is given too; or a part is not as it
+        should be.
     """
     base = estimator.base
     if base is None:
         law = estimator.base_law
+        if not (law is None or isinstance(law, AbstractConstitutiveLaw)):
+            raise InputError(
+                f"base_law must be a law, such as make_law('ucm'); got a {type(law).__name__}."
+            )
+        if law is not None:
+            check_law(law)
+        modulus = per_mode("modulus", estimator.modulus)
+        relaxation_time = per_mode("relaxation_time", estimator.relaxation_time)
+        if modulus.shape != relaxation_time.shape:
+            raise InputError(
+                "modulus and relaxation_time must have one value for each mode; got "
+                f"{modulus.size} and {relaxation_time.size}."
+            )
+        viscosity = getattr(estimator, "solvent_viscosity", 0.0)
+        if not (isinstance(viscosity, Real) and 0.0 <= float(viscosity) < np.inf):
+            raise InputError(
+                f"solvent_viscosity must be a number in Pa s, not negative; got {viscosity!r}."
+            )
         return KnownPart(
             law,
-            estimator.modulus,
-            estimator.relaxation_time,
-            getattr(estimator, "solvent_viscosity", 0.0),
+            modulus,
+            relaxation_time,
+            float(viscosity),
             estimator.known_relaxation if law is None else law.linear_relaxation,
         )
     if not isinstance(base, Fluid):
@@ -82,6 +105,7 @@ def known_part(estimator: Any) -> KnownPart:
     for name in _HELD_BY_BASE:
         if name in defaults and not _same(getattr(estimator, name), defaults[name].default):
             raise InputError(f"base holds {name} already; got both. Leave {name} out, or base.")
+    check_law(base.law)
     return KnownPart(
         None if isinstance(base.law, UpperConvectedMaxwell) else base.law,
         np.asarray(base.modulus),

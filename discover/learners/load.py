@@ -1,5 +1,6 @@
 """A saved estimator, whichever learner it is of."""
 
+import os
 from pathlib import Path
 
 from discover.errors import InputError
@@ -31,6 +32,8 @@ def load(path: str | Path) -> TensorSINDy | TBNNUDE | TensorDense:
     >>> law = dc.load("law.discover")  # doctest: +SKIP
     >>> law.predict(test)  # doctest: +SKIP
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"load takes the path of a file; got a {type(path).__name__}.")
     file = EstimatorFile(path)
     if file.learner not in _LEARNERS:
         raise InputError(

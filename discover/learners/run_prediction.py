@@ -16,15 +16,18 @@ from discover.errors import InputError
 from discover.first_use import require_double
 from discover.learners.estimator_file import EstimatorFile, write_estimator
 from discover.learners.provenance import Provenance
+from discover.learners.settings import PerMode
 from discover.protocols import settled
 
 if TYPE_CHECKING:
+    import xarray
+
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
     from discover.learners.result import LearnerResult
 
 
-def as_runs(runs: Any, relaxation_time: Any = 0.0) -> list[Run]:
+def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
     """Return the runs as a list, each as one that follows a rate in time.
 
     One at a given stress follows its measured rate. One that starts periodic gets as many cycles
@@ -129,11 +132,55 @@ class RunPrediction:
             raise file.damaged(error) from None
         return estimator
 
-    def predict(self, X: Any) -> Float[np.ndarray, " rows"]:
-        """Return σ12 in Pa at the samples of all runs, one run after the other."""
+    def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
+        """Return what the data leave open, with named dimensions, for xarray and ArviZ.
+
+        Of `TensorSINDy` and `TensorDense` 1,000 draws of the coefficients, dimensions ``chain``,
+        ``draw`` and ``term``, as `arviz.summary` takes them (96 where the linearisation does not
+        hold). Those of a sparse law are given its terms: that other terms may be right is not in
+        them. Of `TBNNUDE` what each network predicts, dimensions ``member`` and ``sample``: members
+        are no draws from a posterior.
+
+        Parameters
+        ----------
+        X
+            For networks the runs to predict, by default those that were fitted.
+        seed
+            Of the draws.
+
+        Raises
+        ------
+        NotFittedError
+            If nothing was fitted yet.
+        InputError
+            If there is nothing to draw, or xarray is not installed (extra ``xarray``).
+        """
+        from discover.learners.labelled import labelled_draws, labelled_members
+
+        check_is_fitted(self, "fluid_")
+        if hasattr(self, "members_"):
+            return labelled_members(self, X)
+        return labelled_draws(self, seed)
+
+    def predict(self, X: Iterable[Run]) -> Float[np.ndarray, " rows"]:
+        """Return σ12 in Pa at the samples of all runs, one run after the other.
+
+        Parameters
+        ----------
+        X
+            Runs or a data set; of their stresses nothing is used.
+
+        Raises
+        ------
+        NotFittedError
+            If nothing was fitted yet.
+        InputError
+            If a run is unusable.
+        """
+        check_is_fitted(self, "fluid_")
         return np.concatenate(self._predict_runs(as_runs(X, self.fluid_.relaxation_time)))
 
-    def score(self, X: Any, y=None, sample_weight=None) -> float:
+    def score(self, X: Iterable[Run], y=None, sample_weight=None) -> float:
         """Return one minus the relative error of σ12, averaged over runs: 1 is perfect.
 
         The error of a run is the root-mean-square of prediction minus measurement over the
@@ -150,6 +197,7 @@ class RunPrediction:
             Ignored; scikit-learn passes them.
         """
         del y, sample_weight
+        check_is_fitted(self, "fluid_")
         runs = as_runs(X, self.fluid_.relaxation_time)
         errors = [
             np.sqrt(np.mean((p - run.recorded) ** 2) / np.mean(run.recorded**2))

@@ -1,6 +1,7 @@
 """What was done to the fluid before the first sample, as the beginning of its protocol."""
 
 from dataclasses import replace
+from numbers import Real
 
 import jax.numpy as jnp
 import numpy as np
@@ -56,7 +57,7 @@ def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowPr
     True
     """
     _require_positive("end", end)
-    if not (np.isfinite(rate) and rate != 0.0):
+    if not (isinstance(rate, Real) and np.isfinite(rate) and rate != 0.0):
         raise InputError(f"The rate of the flow before must not be 0; got {rate}. Rest needs none.")
     length = min(STEADY_LENGTH * end, STEADY_STRAIN / abs(rate))
     return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
@@ -93,7 +94,8 @@ def after_step_strain(
     True
     """
     _require_positive("first", first)
-    if not np.isfinite(strain) or duration < 0.0:
+    numbers = isinstance(strain, Real) and isinstance(duration, Real)
+    if not numbers or not np.isfinite(strain) or duration < 0.0:
         raise InputError(
             f"A step needs a strain and a duration from 0 on; got {strain}, {duration}."
         )
@@ -114,7 +116,7 @@ def after_alternation(
     period
         In s.
     times
-        Of the samples, in s.
+        Of the samples, in s, shape (n,).
 
     Raises
     ------

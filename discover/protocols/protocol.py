@@ -136,7 +136,10 @@ def _interpolate(
 
 
 def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    array = np.atleast_1d(np.asarray(values, dtype=float))
+    try:
+        array = np.atleast_1d(np.asarray(values, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers; got {values!r}.") from None
     if array.ndim != 1 or array.size == 0 or not np.all(np.isfinite(array)):
         raise InputError(f"{name} must be a non-empty list of finite numbers; got {values!r}.")
     return array
@@ -298,6 +301,10 @@ def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     >>> dc.in_flow(dc.start_up(0.3), "uniaxial").flow
     'uniaxial'
     """
+    if not isinstance(protocol, FlowProtocol):
+        raise InputError(
+            f"in_flow takes a flow, such as start_up(0.3); got a {type(protocol).__name__}."
+        )
     found = kinematics_of(kind)
     return replace(protocol, kinematics=None if kind == "shear" else found)
 

@@ -113,7 +113,7 @@ _LETTERS = (
     ("kappa", "κ"),
     ("*", " "),
 )
-_WORDS = {"alpha": "α", "beta": "β", "xi": "ξ"}
+_WORDS = {"alpha": "α", "beta": "β", "eta s": "ηₛ", "tau": "τ", "xi": "ξ"}
 """Letters that are also parts of English words."""
 
 
@@ -123,7 +123,7 @@ def readable(term: str) -> str:
     text = re.sub(r"(?<=sigma|madot)\.(?=sigma|gammadot)", "·", term)
     for spelled, letter in _LETTERS:
         text = text.replace(spelled, letter)
-    return re.sub(r"\b(alpha|beta|xi)\b", lambda found: _WORDS[found[0]], text)
+    return re.sub(r"\b(alpha|beta|eta s|tau|xi)\b", lambda found: _WORDS[found[0]], text)
 
 
 _EFFECTS = {

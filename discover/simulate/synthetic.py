@@ -84,8 +84,11 @@ def synthetic_dataset(
         raise InputError(f"Unknown synthetic protocol {protocol!r}; write 'paper'.")
     if not (_is_number(noise) and 0.0 <= noise <= 10.0):
         raise InputError(f"noise must be a fraction from 0 to 10; got {noise!r}. 0.01 means 1 %.")
-    if not (_is_number(n_samples) and 2 <= n_samples <= 1_000_000):
-        raise InputError(f"n_samples must be from 2 to a million; got {n_samples!r}.")
+    whole = isinstance(n_samples, int | np.integer) and not isinstance(n_samples, bool)
+    if not (whole and 2 <= n_samples <= 1_000_000):
+        raise InputError(
+            f"n_samples must be a whole number from 2 to a million; got {n_samples!r}."
+        )
     if not (_is_number(duration) and duration > 0):
         raise InputError(
             f"duration must be a positive number of relaxation times; got {duration!r}."

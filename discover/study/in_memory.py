@@ -1,6 +1,6 @@
 """Data sets and fluids that a program holds, as the tasks take them from a study."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxati
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
 from discover.errors import InputError
+from discover.laws.checking import check_law
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.simulate.synthetic import SyntheticDataset
@@ -51,7 +52,11 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
                 f"[{held_out!r}] for this run."
             )
         divided = StudyData(data, data, data.select([]), each=True)
-    elif len(held_out):
+    elif not isinstance(held_out, Iterable):
+        raise InputError(
+            f"held_out must be a data set, a list of names or 'each'; got {held_out!r}."
+        )
+    elif len(held_out := list(held_out)):
         divided = StudyData(data, *data.split(held_out))
     else:
         divided = StudyData(data, data, data.select([]))
@@ -105,6 +110,7 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
             f"base must be a Fluid; got a {type(base).__name__}. Make one with "
             "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
         )
+    check_law(base.law)
     name, parameters = name_of(base.law) or (type(base.law).__name__, {})
     modulus, relaxation_time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     return DeclaredModel(

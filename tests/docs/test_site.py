@@ -91,6 +91,17 @@ def test_every_public_name_is_in_the_reference(site):
         assert f"tensor_library.{name}" in places, name
 
 
+def test_methods_and_results_that_users_hold_are_in_the_reference(site):
+    places = set().union(*(page.places for page in site.values()))
+    for learner in ("TensorSINDy", "TBNNUDE", "TensorDense"):
+        for method in ("fit", "predict", "score", "save", "to_xarray", "equation_"):
+            assert f"discover.{learner}.{method}" in places
+    for method in ("to_html", "to_dataframe", "to_json", "errors_table"):
+        assert f"discover.comparison.comparison.Comparison.{method}" in places
+        assert f"discover.closed_loop.results.loop_result.LoopResult.{method}" in places
+    assert "discover.equations.Equation.latex" in places
+
+
 def test_formulas_are_set_and_search_knows_them_by_name(site):
     (effects,) = [path for path in site if path.name == "effects.html"]
     text = effects.read_text("utf-8")

@@ -31,11 +31,14 @@ def after(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         quick = {"library": LIBRARY, "max_terms": 1, "n_folds": 0, "n_stability": 0}
-        patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, **quick))
-        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, quick=True))
+        said: dict = {"sindy": [], "network": [], "loop": []}
+        heard = {name: lambda *news, name=name: said[name].append(news) for name in said}
+        patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
+        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, progress=heard["network"], quick=True))
+        patch.setattr(dc, "close_loop", partial(in_memory.close_loop, progress=heard["loop"]))
         few = partial(in_memory.run_loop, effects=["giesekus_mobility", "stress_gain"])
         patch.setattr(in_memory, "run_loop", few)
-        left: dict = {"folder": folder}
+        left: dict = {"folder": folder, "said": said}
         exec(compile(script(), "docs/python.md", "exec"), left)
         yield left
 
@@ -60,6 +63,15 @@ def test_the_script_finds_what_scipy_planted(after):
     assert table.loc[0, "value"] == pytest.approx(MOBILITY, abs=0.03)
     assert loop.error_after.held_out < 0.02 < loop.error_before.held_out
     assert "giesekus_mobility" in repr(loop)
+
+
+def test_progress_has_one_shape_for_learners_and_loop(after):
+    for name, news in after["said"].items():
+        assert len(news) > 1, name
+        fractions = [fraction for _, fraction in news]
+        assert all(isinstance(text, str) and text for text, _ in news)
+        assert fractions == sorted(fractions)
+        assert 0.0 < fractions[0] <= fractions[-1] <= 1.0
 
 
 def test_the_comparison_judges_on_what_no_fit_saw(after):

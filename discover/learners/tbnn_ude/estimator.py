@@ -2,10 +2,9 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -16,12 +15,14 @@ from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.settings import PerMode, check_settings
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
@@ -34,6 +35,7 @@ from discover.learners.tbnn_ude.spread import (
     coefficient_spread,
     member_predictions,
 )
+from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
@@ -70,7 +72,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     random_state
         Seed of the initial weights.
     progress
-        Called with step, total number of steps (at most) and loss, or None.
+        Called with a line of text and the fraction done, or None.
     solvent_viscosity
         η_s in Pa s.
 
@@ -124,16 +126,16 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        recipe: Any = "default",
-        modulus: Any = 1.0,
-        relaxation_time: Any = 1.0,
+        recipe: str | DefaultRecipe | PaperRecipe = "default",
+        modulus: PerMode = 1.0,
+        relaxation_time: PerMode = 1.0,
         known_relaxation: bool = True,
-        base_law: Any = None,
+        base_law: AbstractConstitutiveLaw | None = None,
         n_members: int = 3,
         projection_library: TermLibrary | None = None,
         quick: bool = False,
         random_state: int = 0,
-        progress: Any = None,
+        progress: Progress | None = None,
         base: Fluid | None = None,
         solvent_viscosity: float = 0.0,
     ):
@@ -150,7 +152,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.base = base
         self.solvent_viscosity = solvent_viscosity
 
-    def fit(self, X: Any, y=None) -> "TBNNUDE":
+    def fit(self, X: Iterable[Run], y=None) -> "TBNNUDE":
         """Train on σ12 of these runs.
 
         Parameters
@@ -167,12 +169,11 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         """
         del y
         started = time.perf_counter()
+        check_settings(self.get_params(deep=False))
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)
         recipe = self._recipe()
         problem = _problem(runs, known)
-        if self.n_members < 1:
-            raise InputError(f"n_members must be at least 1; got {self.n_members}.")
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
@@ -232,7 +233,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         protocol, times
-            Any flow, also one that no training saw; times in s, from 0 on.
+            Any flow, also one that no training saw; times in s, shape (n,), from 0 on.
         """
         check_is_fitted(self, "ensemble_fluids_")
         return member_predictions(self.ensemble_fluids_, protocol, times)
@@ -260,24 +261,25 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self, problem: TrainingProblem, keys, recipe, known: KnownPart
     ) -> tuple[list[Trained], str]:
         """Return all members, and how they came about."""
-        first = self._train(problem, keys[0], recipe, known)
+        say = by_steps(self.progress)
+        first = self._train(problem, keys[0], recipe, known, say)
         if len(keys) == 1:
             return [first], "a single member"
         if isinstance(recipe, PaperRecipe):
             # the first has compiled the program; its steps are too small to be shared out
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
                 others = list(
-                    pool.map(lambda key: self._train(problem, key, recipe, known), keys[1:])
+                    pool.map(lambda key: self._train(problem, key, recipe, known, say), keys[1:])
                 )
             return [first, *others], "trained from initial weights of their own"
-        others, agreement = train_others(problem, first, keys[1:], recipe, self.progress)
+        others, agreement = train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
-    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart) -> Trained:
+    def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:
         relaxes = known.linear_relaxation
         if isinstance(recipe, DefaultRecipe):
-            return train_default(problem, key, relaxes, recipe, self.progress, known.law)
-        law, losses = train_paper(problem, key, relaxes, recipe, self.progress, base_law=known.law)
+            return train_default(problem, key, relaxes, recipe, say, known.law)
+        law, losses = train_paper(problem, key, relaxes, recipe, say, base_law=known.law)
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
@@ -288,18 +290,8 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
 
 
 def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
-    modulus, relaxation_time = (
-        np.atleast_1d(np.asarray(value, dtype=float))
-        for value in (known.modulus, known.relaxation_time)
-    )
-    bad = modulus.shape != relaxation_time.shape or modulus.ndim != 1
-    if bad or not (np.all(modulus > 0) and np.all(relaxation_time > 0)):
-        raise InputError(
-            "modulus and relaxation_time must be positive, with one value for each mode; got "
-            f"{known.modulus!r} and {known.relaxation_time!r}."
-        )
     return make_problem(
-        runs, modulus, relaxation_time, solvent_viscosity=float(known.solvent_viscosity)
+        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity
     )
 
 

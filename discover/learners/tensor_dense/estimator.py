@@ -1,6 +1,7 @@
 """The scikit-learn estimator: runs in, all laws of a library that fit them out."""
 
 import time
+from collections.abc import Iterable
 from typing import Any
 
 import jax.numpy as jnp
@@ -11,6 +12,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
@@ -18,6 +20,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import known_part
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.settings import PerMode, check_settings
 from discover.learners.tensor_dense.draws import DenseDraws
 from discover.learners.tensor_dense.mixture import Mixture, Optimum, explore
 from discover.learners.tensor_dense.reference_laws import (
@@ -29,6 +32,7 @@ from discover.learners.tensor_dense.reference_laws import (
 from discover.learners.tensor_dense.term_sizes import term_sizes
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.weighted_laws import Limits, WeightedLaws
+from discover.progress import Progress, by_lines
 from discover.protocols.protocol import recorded_at, stack_protocols
 from discover.simulate.grid import make_grids
 from discover.simulate.solve import solve_batch
@@ -68,7 +72,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
     random_state
         Seed of the draws.
     progress
-        Called with a line of text, or None.
+        Called with a line of text and the fraction done, or None.
 
     Attributes
     ----------
@@ -120,17 +124,17 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        library: Any = None,
-        modulus: Any = 1.0,
-        relaxation_time: Any = 1.0,
+        library: TermLibrary | None = None,
+        modulus: PerMode = 1.0,
+        relaxation_time: PerMode = 1.0,
         solvent_viscosity: float = 0.0,
         known_relaxation: bool = True,
-        base_law: Any = None,
+        base_law: AbstractConstitutiveLaw | None = None,
         use_normal_stresses: bool = False,
         misfit_floor: float = 1e-3,
         strain_step: float = 0.2,
         random_state: int | None = 0,
-        progress: Any = None,
+        progress: Progress | None = None,
         base: Fluid | None = None,
     ):
         self.library = library
@@ -146,7 +150,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         self.progress = progress
         self.base = base
 
-    def fit(self, X: Any, y=None) -> "TensorDense":
+    def fit(self, X: Iterable[Run], y=None) -> "TensorDense":
         """Find the laws that fit these runs.
 
         Parameters
@@ -163,6 +167,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         """
         del y
         started = time.perf_counter()
+        check_settings(self.get_params(deep=False))
         self._check_parameters()
         runs = as_runs(X, known_part(self).relaxation_time)
         problem = self._problem(runs)
@@ -170,7 +175,8 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         def sizes(constants):
             return term_sizes(with_reference(problem, constants))
 
-        found = explore(problem, sizes, self.misfit_floor, self.random_state or 0, self.progress)
+        say = by_lines(self.progress, len(REFERENCES))
+        found = explore(problem, sizes, self.misfit_floor, self.random_state or 0, say)
         at = _point(found)
         library = problem.library
         self.runs_ = tuple(runs)
@@ -218,7 +224,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         own = TermLibrary(self.library_.terms[: self.draws_.coefficients.shape[1]])
         return self.draws_.laws(own, base)
 
-    def predict_band(self, X: Any) -> list[Limits | None]:
+    def predict_band(self, X: Iterable[Run]) -> list[Limits | None]:
         """Return the 95 % band of the recorded stress, N1 and N2 in each run.
 
         Parameters
@@ -231,6 +237,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         For each run ``"sigma12"``, ``"N1"`` and ``"N2"``: lowest, middle and highest value in Pa at
         its samples, shape (3, n). None where laws of more than half of the weight run away.
         """
+        check_is_fitted(self, "fluid_")
         fluid = self.fluid_
         runs = as_runs(X, fluid.relaxation_time)
         return self.laws_that_fit().bands(
@@ -283,8 +290,6 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
                 f"have no Gaussian prior; got {', '.join(self.library.inner_names)}. Use "
                 "build_library(degree=1)."
             )
-        if not self.misfit_floor > 0:
-            raise InputError(f"misfit_floor must be positive; got {self.misfit_floor}.")
 
 
 def _reference(problem: TrajectoryProblem) -> ReferenceLaw:

@@ -1,23 +1,26 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
+from pysindy.optimizers import BaseOptimizer
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.settings import PerMode, check_settings
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
@@ -38,6 +41,7 @@ from discover.learners.tensor_sindy.stability import Stability, selection_stabil
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
 from discover.learners.trajectories.problem import make_problem
+from discover.progress import Progress, by_lines
 from discover.protocols.protocol import recorded_at
 from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
@@ -91,7 +95,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
     random_state
         Seed of the division of runs into folds.
     progress
-        Called with a line of text, or None.
+        Called with a line of text and the fraction done, or None.
 
     Attributes
     ----------
@@ -161,13 +165,13 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        library: Any = None,
-        optimizer: Any = "stlsq",
-        modulus: Any = 1.0,
-        relaxation_time: Any = 1.0,
+        library: TermLibrary | None = None,
+        optimizer: str | BaseOptimizer = "stlsq",
+        modulus: PerMode = 1.0,
+        relaxation_time: PerMode = 1.0,
         solvent_viscosity: float = 0.0,
         known_relaxation: bool = True,
-        base_law: Any = None,
+        base_law: AbstractConstitutiveLaw | None = None,
         use_normal_stresses: bool = False,
         selection: str = "bic",
         max_terms: int = 5,
@@ -176,7 +180,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         misfit_floor: float = 1e-5,
         strain_step: float = 0.2,
         random_state: int | None = 0,
-        progress: Any = None,
+        progress: Progress | None = None,
         base: Fluid | None = None,
     ):
         self.library = library
@@ -197,7 +201,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.progress = progress
         self.base = base
 
-    def fit(self, X: Any, y=None) -> "TensorSINDy":
+    def fit(self, X: Iterable[Run], y=None) -> "TensorSINDy":
         """Find the law of these runs.
 
         Parameters
@@ -214,6 +218,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         """
         del y
         started = time.perf_counter()
+        check_settings(self.get_params(deep=False))
         self._check_parameters()
         library = build_library() if self.library is None else self.library
         known = known_part(self)
@@ -237,10 +242,11 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 f"selection={self.selection!r} needs at least two runs and two folds; got "
                 f"{n_groups} and {self.n_folds}. Use selection='bic'."
             )
-        search = SupportSearch(
-            problem, self.optimizer, self.max_terms, self.misfit_floor, self.progress
-        )
+        search = SupportSearch(problem, self.optimizer, self.max_terms, self.misfit_floor)
+        # a line for each beginning of the runs, and for each size
+        quiet, search.progress = search.progress, by_lines(self.progress, 3 + search.largest)
         path = search.run()
+        search.progress = quiet  # a closure, which pickle would not take
         held_out, by_run = None, None
         if validates:
             folds = run_folds(n_groups, self.n_folds, self.random_state)[groups]
@@ -442,10 +448,6 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 "library must be a TermLibrary; got a "
                 f"{type(self.library).__name__}. Use tensor_library.build_library."
             )
-        if self.max_terms < 1:
-            raise InputError(f"max_terms must be at least 1; got {self.max_terms}.")
-        if not self.misfit_floor > 0:
-            raise InputError(f"misfit_floor must be positive; got {self.misfit_floor}.")
 
 
 def _groups(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:

@@ -1,0 +1,121 @@
+"""What the data leave open, with the names of its dimensions: for xarray and ArviZ."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from discover.dataset.run import Run
+from discover.errors import InputError
+from discover.learners.run_prediction import as_runs
+
+if TYPE_CHECKING:
+    import xarray
+
+N_DRAWS = 1000
+_FACTOR = 1.96  # of a normal distribution, where intervals have Student's
+
+
+def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
+    """Return draws of the coefficients of a law's terms, dimensions chain, draw and term.
+
+    Parameters
+    ----------
+    estimator
+        A fitted `TensorSINDy` or `TensorDense`.
+    seed
+        Of the draws.
+
+    Raises
+    ------
+    InputError
+        If the law has no term, or its constants exchange each other, so that there are no draws;
+        or xarray is missing.
+    """
+    rng = np.random.default_rng(seed)
+    if hasattr(estimator, "uncertainty_"):
+        terms, values, inner = _of_a_sparse_law(estimator, rng)
+        given = "the terms that were chosen"
+    else:
+        names = estimator.library_.names[: estimator.draws_.coefficients.shape[1]]
+        chosen = rng.choice(len(estimator.draws_.weights), N_DRAWS, p=estimator.draws_.weights)
+        terms, values = list(names), estimator.draws_.coefficients[chosen]
+        inner = dict(
+            zip(("alpha", "xi", "epsilon", "k", "m"), estimator.draws_.constants[chosen].T,
+                strict=True)
+        )  # fmt: skip
+        given = "all terms, each on top of the named law whose constants are beside it"
+    variables = {"coefficient": (("chain", "draw", "term"), values[None])}
+    variables |= {name: (("chain", "draw"), column[None]) for name, column in inner.items()}
+    coordinates = {"chain": [0], "draw": np.arange(len(values)), "term": terms}
+    return _xarray().Dataset(variables, coordinates, {"given": given, **_source(estimator)})
+
+
+def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":
+    """Return what each network of an ensemble predicts, dimensions member and sample.
+
+    Parameters
+    ----------
+    estimator
+        A fitted `TBNNUDE`.
+    runs
+        The flows; by default those that were fitted. σ12, N1 and N2 are in Pa, time is in s.
+
+    Raises
+    ------
+    InputError
+        If there are no runs, or xarray is missing.
+    """
+    wanted = getattr(estimator, "runs_", None) if runs is None else runs
+    if wanted is None:
+        raise InputError("A file holds no data; give the runs to predict: to_xarray(data).")
+    followed = as_runs(wanted, np.asarray(estimator.fluid_.relaxation_time))
+    each = [estimator.predict_members(run.protocol, run.time) for run in followed]
+    variables = {
+        name: (("member", "sample"), np.concatenate([getattr(one, name) for one in each], axis=1))
+        for name in ("sigma12", "N1", "N2")
+    }
+    coordinates = {
+        "member": np.arange(len(estimator.members_)),
+        "run": ("sample", np.concatenate([[run.name] * len(run) for run in followed])),
+        "time_s": ("sample", np.concatenate([run.time for run in followed])),
+    }
+    return _xarray().Dataset(variables, coordinates, _source(estimator))
+
+
+def _of_a_sparse_law(
+    estimator: Any, rng: np.random.Generator
+) -> tuple[list[str], np.ndarray, dict[str, np.ndarray]]:
+    """Return the terms, and draws of their coefficients and of inner parameters."""
+    uncertainty, draws = estimator.uncertainty_, estimator.draws_
+    if uncertainty is None:
+        raise InputError("No term was chosen, so there is no coefficient to draw.")
+    if draws.method == "none":
+        raise InputError(f"There are no draws: {draws.reason}.")
+    terms = [term.term for term in estimator.terms_]
+    places = list(uncertainty.inner_positions)
+    coefficients = [term.coefficient for term in estimator.terms_]
+    centre = np.append(coefficients, estimator.inner_[places])
+    values = draws.values
+    if draws.method == "linear":
+        covariance = uncertainty.total_covariance * (uncertainty.factor / _FACTOR) ** 2
+        values = rng.multivariate_normal(centre, covariance, N_DRAWS)
+    size = len(terms)
+    names = [estimator.library_.inner_names[i] for i in places]
+    inner = dict(zip(names, values[:, size:].T, strict=True))
+    return terms, values[:, :size], inner
+
+
+def _source(estimator: Any) -> dict[str, str]:
+    found = estimator.provenance_
+    return {"learner": estimator.learner, "data": found.data, "runs": ", ".join(found.runs)}
+
+
+def _xarray():
+    try:
+        import xarray
+    except ImportError:
+        raise InputError(
+            'This needs xarray; install it with: pip install "discover-rheology[xarray]".'
+        ) from None
+    return xarray

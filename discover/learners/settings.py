@@ -1,0 +1,64 @@
+"""What estimators take as settings, checked when they fit."""
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from discover.errors import InputError
+from discover.progress import checked
+
+PerMode = float | int | Sequence[float] | np.ndarray | jax.Array
+"""A number, or one value for each relaxation mode, shape (k,)."""
+
+_WHOLE = {"max_terms": 1, "n_members": 1, "n_folds": 0, "n_stability": 0, "random_state": 0}
+"""Settings that are whole numbers, with the least that each may be."""
+
+_POSITIVE = ("misfit_floor", "strain_step")
+
+
+def check_settings(settings: Mapping[str, Any]) -> None:
+    """Check settings that several estimators share.
+
+    Parameters
+    ----------
+    settings
+        All parameters of an estimator by name.
+
+    Raises
+    ------
+    InputError
+        If a count or a seed is no whole number, a limit is not positive, or `progress` cannot be
+        called.
+    """
+    for name, least in _WHOLE.items():
+        value = settings.get(name)
+        if value is None:
+            continue  # not a setting of this one, or any seed
+        if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+            raise InputError(f"{name} must be a whole number, at least {least}; got {value!r}.")
+    for name in _POSITIVE:
+        value = settings.get(name, 1.0)
+        if isinstance(value, bool) or not (isinstance(value, Real) and 0.0 < float(value) < np.inf):
+            raise InputError(f"{name} must be positive and finite; got {value!r}.")
+    checked(settings.get("progress"))
+
+
+def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
+    """Return a setting with one value for each mode.
+
+    Raises
+    ------
+    InputError
+        If a value is no number, or is not positive and finite.
+    """
+    values = np.atleast_1d(np.asarray(value))
+    numbers = values.dtype.kind in "iuf" and values.ndim == 1 and values.size
+    if not numbers or not np.all((values > 0) & np.isfinite(values)):
+        raise InputError(
+            f"{name} must be positive and finite, a number or one for each mode; got {value!r}."
+        )
+    return values.astype(float)
