@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.explanations import BEAM_WIDTH
-from discover.closed_loop.loop import MOST_SAMPLES, run_loop
+from discover.closed_loop.loop import run_loop
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.loop_result import Fold, LoopResult
+from discover.closed_loop.runs import MOST_SAMPLES
 from discover.closed_loop.search.checkpoint import Store
 from discover.dataset import Dataset
 from discover.effects import AbstractEffect

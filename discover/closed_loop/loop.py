@@ -1,13 +1,17 @@
 """The closed loop: residual, attribution, augmentation, before and after."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.by_mode import constants_by_mode
+from discover.closed_loop.candidates import (
+    admission,
+    candidates_of,
+    require_possible,
+    require_present,
+)
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
     carry,
@@ -17,12 +21,17 @@ from discover.closed_loop.explanations import (
 )
 from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.other_times import FACTOR, held_against_times, other_times
+from discover.closed_loop.final_model import (
+    augmented_fluid,
+    declared_effects,
+    declared_law,
+    declared_parameters,
+    stage_of,
+)
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.judging.before_after import (
-    cut_to_strain,
     errors_of,
     record_runs,
-    strain_of,
 )
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
@@ -35,63 +44,28 @@ from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import (
-    ConstantByMode,
-    DeclaredEffect,
-    KnownParameter,
     LoopResult,
-    Stage,
-    StageParameter,
 )
 from discover.closed_loop.results.next_test import NextTests
+from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.augment import FEWEST_SAMPLES
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
-from discover.dataset import Dataset, Run
+from discover.closed_loop.small_strains import settle_instrument
+from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
-from discover.dataset.run import same_samples
-from discover.dataset.thinning import thin_run
 from discover.effects import (
     BY_MODE,
     AbstractEffect,
-    ConstitutiveEffect,
-    KinematicEffect,
-    ModeEffect,
-    StateEffect,
-    library_effects,
-    make_effect,
-    named_effects,
 )
-from discover.equations import Equation, law_parts
 from discover.errors import InputError
 from discover.forward import (
-    MODULUS,
-    RELAXATION_TIME,
     AugmentedModel,
     DeclaredModel,
     data_scales,
     make_batch,
 )
-from discover.forward.least_squares import Fit, intervals
-from discover.laws import Fluid
-from discover.statistics import isolated
-from discover.statistics.residual import Expectation, fast_part, summarise
-
-LINEAR_STRAIN = 0.4
-"""Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""
-
-FEWEST_LINEAR_SAMPLES = 10
-"""Fewer samples than this at small strain settle nothing."""
-
-MOST_SAMPLES = 400
-"""Samples of a run that are used by default, at most: a search costs as much as it has samples, and
-more of them say little more of a law."""
-
-_FEWEST_KEPT = 150
-_RESOLVED = 1e-3
-"""Relative error that the noise of as many samples as are used may leave."""
-
-EXTRAPOLATION = 10.0
-"""Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
+from discover.forward.least_squares import intervals
+from discover.statistics.residual import Expectation, summarise
 
 
 def run_loop(
@@ -162,15 +136,15 @@ def run_loop(
     """
     started = time.perf_counter()
     say = progress or (lambda line: None)
-    fitted_runs, held_runs, spikes = _split(dataset, fit, held_out, strain, most_samples)
-    candidates = _candidates(effects)
+    fitted_runs, held_runs, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
+    candidates = candidates_of(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
-    _require_samples(fitted_runs, declared)
+    require_samples(fitted_runs, declared)
     known = {effect.name for effect in declared.effects}
-    _require_present(declared, {*known, *(effect.name for effect in candidates)})
+    require_present(declared, {*known, *(effect.name for effect in candidates)})
     candidates = [effect for effect in candidates if effect.name not in known]
-    _require_possible(declared, [*fitted_runs, *held_runs])
+    require_possible(declared, [*fitted_runs, *held_runs])
     tried_laws: tuple[LawFit, ...] = ()
     if laws and not records_are_silent(fitted_runs):
         declared, tried_laws = choose_law(declared, laws, fitted_runs, held_runs, say)
@@ -188,7 +162,7 @@ def run_loop(
         batch,
         held_batch,
         len(candidates),
-        _admission(fitted_runs, held_runs),
+        admission(fitted_runs, held_runs),
         tolerated,
         SearchCheckpoint(store, name),
     )
@@ -201,7 +175,7 @@ def run_loop(
     else:
         say(f"declared model on {len(fitted_runs)} runs")
         search.start()
-        _settle(search, fitted_runs, max_effects, say)
+        settle_instrument(search, fitted_runs, max_effects, say)
     carried = []
     if not silent:
         search.run(max_effects, say)
@@ -239,10 +213,10 @@ def run_loop(
     for name, other in limits.items():
         search.aliases[name] = (*search.aliases.get(name, ()), other)
     stages = tuple(
-        _stage(search, name, bounds, errors_of(records, i), by_mode.get(name))
+        stage_of(search, name, bounds, errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)
     )
-    spikes = _with_later_ones(spikes, fitted_runs, judgement)
+    spikes = with_later_spikes(spikes, fitted_runs, judgement)
     side_by_side, forms, following = Explanations(), (), NextTests()
     if carried:
         runs = (fitted_runs, held_runs)
@@ -258,7 +232,7 @@ def run_loop(
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
-    fluid = _fluid(model, current, [*active, *known])
+    fluid = augmented_fluid(model, current, [*active, *known])
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),
@@ -286,9 +260,9 @@ def run_loop(
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
-        declared_parameters=_declared_parameters(declared, current, bounds) | of_law,
-        declared_effects=_declared_effects(model, current, bounds, by_mode),
-        declared_law=None if differ & {*of_law} else _declared_law(declared, current),
+        declared_parameters=declared_parameters(declared, current, bounds) | of_law,
+        declared_effects=declared_effects(model, current, bounds, by_mode),
+        declared_law=None if differ & {*of_law} else declared_law(declared, current),
         explanations=side_by_side,
         next_tests=following,
         laws=tried_laws,
@@ -304,284 +278,9 @@ def _predicts_worse(error: ErrorPair, than: ErrorPair) -> bool:
     return (error.held_out or 0.0) > (than.held_out or np.inf)
 
 
-def _split(dataset, fit, held_out, strain, most):
-    overlap = [name for name in (fit or ()) if name in held_out]
-    if overlap:
-        raise InputError(f"The run {overlap[0]!r} is both fitted and held out; choose one.")
-    held = dataset.select(list(held_out))
-    fitted = dataset.select(
-        list(fit) if fit is not None else [n for n in dataset.names if n not in held_out]
-    )
-    if len(fitted) == 0:
-        raise InputError("No run is left to fit. Take some out of held_out.")
-    for run in held.runs:
-        copied = next((other.name for other in fitted.runs if same_samples(run, other)), None)
-        if copied is not None:
-            raise InputError(
-                f"The held-out run {run.name!r} holds the same samples as the fitted run "
-                f"{copied!r}, so it proves nothing. Hold out another, or none."
-            )
-    if most < FEWEST_LINEAR_SAMPLES:
-        raise InputError(
-            f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "
-            "told from fewer samples."
-        )
-    spikes: dict[str, list[float]] = {}
-    fitted_runs, held_runs = (
-        [
-            thin_run(run, _needed(run, most))
-            for run in _without_spikes(cut_to_strain(part.runs, strain), spikes)
-        ]
-        for part in (fitted, held)
-    )
-    return fitted_runs, held_runs, spikes
-
-
-def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
-    """Give the runs without the samples that stand alone in them, whose times are noted."""
-    for run in runs:
-        off = isolated(run.recorded)
-        if np.any(off):
-            spikes[run.name] = [float(t) for t in run.time[off]]
-        yield run.window(~off) if np.any(off) else run
-
-
-def _with_later_ones(
-    spikes: dict[str, list[float]], runs: Sequence[Run], judgement: Judgement
-) -> dict[str, list[float]]:
-    """Return the times of all outliers: of those that the fit showed too."""
-    found = dict(spikes)
-    for run, samples in zip(runs, judgement.left.outlier_samples, strict=True):
-        if samples:
-            times = [float(run.time[i]) for i in samples]
-            found[run.name] = sorted([*found.get(run.name, []), *times])
-    return found
-
-
-def _needed(run: Run, most: int) -> int:
-    """Return how many samples of a run resolve its stress to `_RESOLVED`."""
-    size = float(np.sqrt(np.mean(run.recorded**2)))
-    noise = fast_part(run.recorded) / size if size > 0.0 else 0.0
-    return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
-
-
-def _require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
-    """Refuse what any law would fit."""
-    count, constants = sum(len(run) for run in runs), declared.free_constants
-    if count < FEWEST_SAMPLES + constants:
-        raise InputError(
-            f"The runs to fit ([data] fit) hold {count} samples in all, for {constants} constants "
-            f"to be fitted; at least {FEWEST_SAMPLES + constants} are needed to tell a law from "
-            "another. Sample more often, or declare the constants."
-        )
-
-
-def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
-    """Refuse a known effect that the rates of these runs contain already."""
-    measured = [run.name for run in runs if run.rate_is_measured]
-    for known in declared.effects:
-        if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
-            raise InputError(
-                f"The known effect {known.name} lies between the command and the tool, and the "
-                f"rate of {measured[0]} was measured at the tool, so it contains it already. Leave "
-                "the effect out."
-            )
-
-
-def _require_present(declared: DeclaredModel, present: set[str]) -> None:
-    """Refuse an effect by mode that is neither declared nor a candidate."""
-    free = {parameter.name for parameter in declared.free_parameters}
-    absent = [name for name in declared.by_mode if name not in free and name not in present]
-    if absent:
-        raise InputError(
-            f"by_mode names the effect {absent[0]}, which is neither declared nor a candidate. Add "
-            "it to [model] effects or to [loop] effects, or take it out of by_mode."
-        )
-
-
-def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
-    if effects is None:
-        return [*named_effects().values(), *library_effects()]
-    if effects == "named":
-        return [*named_effects().values()]
-    if isinstance(effects, str):
-        raise InputError(
-            f'effects must be a list of names, or "named" for every effect with a name; got '
-            f"{effects!r}. Write [{effects!r}] for this one alone."
-        )
-    if not effects:
-        raise InputError("The loop needs at least one candidate effect; got none.")
-    made = [make_effect(effect) if isinstance(effect, str) else effect for effect in effects]
-    names = [effect.name for effect in made]
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise InputError(f"The effect {repeated[0]!r} is given twice.")
-    return made
-
-
-def _admission(fitted: Sequence[Run], held: Sequence[Run]):
-    """Return which effects are candidates, given the rates.
-
-    Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
-    command is none where the rate was measured. Rates are set, or measured, apart from the stress,
-    so this looks at no held-out stress.
-    """
-    measured = any(run.rate_is_measured for run in fitted)
-    fastest = max(float(np.max(np.abs(run.rate))) for run in fitted)
-    asked = max((float(np.max(np.abs(run.rate))) for run in held), default=0.0)
-    far = asked > EXTRAPOLATION * fastest
-
-    def admitted(effect: AbstractEffect) -> bool:
-        if isinstance(effect, KinematicEffect):
-            return not (measured and effect.shapes_command)
-        return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
-
-    return admitted
-
-
-def _settle(search: Search, runs: Sequence[Run], max_effects: int, say) -> None:
-    """Find instrument effects where the strain is small and no law differs from another.
-
-    That holds for fluids that are linear there. Where instrument effects alone do not explain the
-    small strains, the fluid may not be, and nothing is settled.
-    """
-    small = []
-    for run in runs:
-        if run.flow != "shear" or not run.from_rest or run.protocol.control != "rate":
-            continue  # a fluid that flowed before is not at small strain
-        reached = np.maximum.accumulate(np.abs(strain_of(run)))
-        keep = reached <= LINEAR_STRAIN
-        if np.count_nonzero(keep) >= FEWEST_LINEAR_SAMPLES:
-            small.append(run.window(keep))
-    if len(small) < 2 or max_effects == 0:
-        return
-    linear = search.restricted(
-        small, lambda effect: effect.kind != "constitutive", "at_small_strain"
-    )
-    if not linear.resume():
-        linear.start(by_mode=False)
-    linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
-    if linear.active and linear.explained:
-        search.adopt(linear)
-        search.checkpoint.save(search)
-
-
 def _with_refusals(judgement: Judgement, search: Search) -> str:
     """Return the verdict's reasons, with the effects that fitted and cannot be what is missing."""
     refused = [search.not_named[name] for name in sorted(search.refused)]
     if not judgement.structured or not refused:
         return judgement.description
     return f"{judgement.description} {' '.join(f'{text}.' for text in refused)}"
-
-
-def _stage(search: Search, name: str, bounds, error, by_mode: ConstantByMode | None) -> Stage:
-    model, fit = search.model, search.fit
-    effect = next(e for e in model.effects if e.name == name)
-    parameters = {
-        p.name: StageParameter(float(fit.theta[at]), bounds[at], p.unit)
-        for p, at in zip(effect.parameters, model.positions(name), strict=True)
-    }
-    if by_mode is not None:
-        parameters[effect.parameters[0].name] = by_mode
-    return Stage(
-        effect=name,
-        kind=effect.kind,
-        parameters=parameters,
-        aliases=tuple(
-            other
-            for other in search.aliases.get(name, ())
-            if other not in search.active and other not in search.refused
-        ),
-        error=error,
-        evidence=search.support.get(name, 0.0),
-        equation=effect.equation,
-        source=effect.source,
-        check=effect.check,
-    )
-
-
-def _declared_parameters(declared: DeclaredModel, fit: Fit, bounds) -> dict[str, StageParameter]:
-    named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
-    # of several modes only a common factor is fitted, which has no unit
-    single = len(declared.modulus) == 1
-    constants = {
-        0: (MODULUS, declared.modulus[0], "Pa") if single else ("modulus_factor", 1.0, ""),
-        1: (RELAXATION_TIME, declared.relaxation_time[0], "s")
-        if single
-        else ("relaxation_time_factor", 1.0, ""),
-    }
-    out: dict[str, StageParameter] = {}
-    for at in declared.free_positions:
-        values = np.array([fit.theta[at], *bounds[at]])
-        name, scale, unit = constants.get(at) or (named[at], 1.0, "")
-        if at in constants:
-            # fitted as the logarithm of a factor
-            values = scale * np.exp(values)
-        value, low, high = (float(v) for v in values)
-        out[name] = StageParameter(value, (low, high), unit)
-    return out
-
-
-def _declared_effects(
-    model: AugmentedModel, fit: Fit, bounds, by_mode: Mapping[str, ConstantByMode]
-) -> tuple[DeclaredEffect, ...]:
-    """Return the known effects with their values in the final model."""
-    found = []
-    for known in model.declared.effects:
-        parameters: dict[str, KnownParameter | ConstantByMode] = {
-            p.name: KnownParameter(float(fit.theta[at]), bounds.get(at), p.unit)
-            for p, at in zip(known.effect.parameters, model.positions(known.name), strict=True)
-        }
-        if known.name in by_mode:
-            parameters[known.effect.parameters[0].name] = by_mode[known.name]
-        found.append(DeclaredEffect(known.name, known.effect.kind, parameters))
-    return tuple(found)
-
-
-def _declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
-    """Return the declared law with its modes as fitted; None where it cannot be written out."""
-    law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
-    try:
-        named, terms = law_parts(law)
-    except InputError:
-        return None
-    return Equation(
-        terms,
-        tuple(map(float, declared.modulus * np.exp(fit.theta[0]))),
-        tuple(map(float, declared.relaxation_time * np.exp(fit.theta[1]))),
-        law.linear_relaxation,
-        float(declared.solvent_viscosity),
-        named=named,
-    )
-
-
-def _fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:
-    """Return the augmented fluid; None where it has a state that a law cannot carry."""
-    declared = model.declared
-    added = [
-        (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))
-        for effect in model.effects
-        if effect.name in active and isinstance(effect, ConstitutiveEffect)
-    ]
-    if any(isinstance(effect, StateEffect) for effect, _ in added):
-        return None
-    base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
-    law = AugmentedLaw(
-        base=base,
-        values=tuple(values for _, values in added),
-        effects=tuple(effect for effect, _ in added),
-        linear_relaxation=base.linear_relaxation,
-    )
-    one = jnp.ones(1)
-    viscosity = declared.solvent_viscosity + sum(
-        float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
-    )
-    modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
-    modulus = declared.modulus * np.exp(fit.theta[0])
-    relaxation_time = declared.relaxation_time * np.exp(fit.theta[1])
-    return Fluid(
-        law,
-        np.append(modulus, [float(pair[0]) for pair in modes]),
-        np.append(relaxation_time, [float(pair[1]) for pair in modes]),
-        viscosity,
-    )

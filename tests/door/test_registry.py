@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import discover as dc
-from discover.closed_loop.loop import _candidates
+from discover.closed_loop.candidates import candidates_of
 from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
 from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.laws.base import as_parameter
@@ -63,7 +63,7 @@ def test_a_study_uses_a_law_and_an_effect_from_outside(registered):
     )
     data = load_study_data(study)
     assert declared_model(study, data.dataset).free == ("k",)
-    assert _candidates(study.loop.effects) == [CREAK]
+    assert candidates_of(study.loop.effects) == [CREAK]
     assert make_effect("creak") is CREAK
 
     def field(t, s):  # by components, apart from the software

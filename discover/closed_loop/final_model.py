@@ -1,0 +1,200 @@
+"""The final model, as the result of a closed loop holds it."""
+
+from collections.abc import Mapping, Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from discover.closed_loop.augmented_law import AugmentedLaw
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.loop_result import (
+    ConstantByMode,
+    DeclaredEffect,
+    KnownParameter,
+    Stage,
+    StageParameter,
+)
+from discover.closed_loop.search import Search
+from discover.effects import (
+    ConstitutiveEffect,
+    ModeEffect,
+    StateEffect,
+)
+from discover.equations import Equation, law_parts
+from discover.errors import InputError
+from discover.forward import (
+    MODULUS,
+    RELAXATION_TIME,
+    AugmentedModel,
+    DeclaredModel,
+)
+from discover.forward.least_squares import Fit
+from discover.laws import Fluid
+
+Bounds = Mapping[int, tuple[float, float]]
+"""Ends of the 95 % interval of what is fitted, by its position."""
+
+
+def stage_of(
+    search: Search, name: str, bounds: Bounds, error: ErrorPair, by_mode: ConstantByMode | None
+) -> Stage:
+    """Return one effect of the final model, as a stage of the way to it.
+
+    Parameters
+    ----------
+    search
+        The finished search.
+    name
+        Name of the effect.
+    bounds
+        Intervals of the final model.
+    error
+        Errors once this effect was added.
+    by_mode
+        Its constant in each mode, where that differs.
+    """
+    model, fit = search.model, search.fit
+    effect = next(e for e in model.effects if e.name == name)
+    parameters = {
+        p.name: StageParameter(float(fit.theta[at]), bounds[at], p.unit)
+        for p, at in zip(effect.parameters, model.positions(name), strict=True)
+    }
+    if by_mode is not None:
+        parameters[effect.parameters[0].name] = by_mode
+    return Stage(
+        effect=name,
+        kind=effect.kind,
+        parameters=parameters,
+        aliases=tuple(
+            other
+            for other in search.aliases.get(name, ())
+            if other not in search.active and other not in search.refused
+        ),
+        error=error,
+        evidence=search.support.get(name, 0.0),
+        equation=effect.equation,
+        source=effect.source,
+        check=effect.check,
+    )
+
+
+def declared_parameters(
+    declared: DeclaredModel, fit: Fit, bounds: Bounds
+) -> dict[str, StageParameter]:
+    """Return the fitted constants of the declared model, in their units.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+    fit, bounds
+        The final fit and its intervals.
+    """
+    named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
+    # of several modes only a common factor is fitted, which has no unit
+    single = len(declared.modulus) == 1
+    constants = {
+        0: (MODULUS, declared.modulus[0], "Pa") if single else ("modulus_factor", 1.0, ""),
+        1: (RELAXATION_TIME, declared.relaxation_time[0], "s")
+        if single
+        else ("relaxation_time_factor", 1.0, ""),
+    }
+    out: dict[str, StageParameter] = {}
+    for at in declared.free_positions:
+        values = np.array([fit.theta[at], *bounds[at]])
+        name, scale, unit = constants.get(at) or (named[at], 1.0, "")
+        if at in constants:
+            # fitted as the logarithm of a factor
+            values = scale * np.exp(values)
+        value, low, high = (float(v) for v in values)
+        out[name] = StageParameter(value, (low, high), unit)
+    return out
+
+
+def declared_effects(
+    model: AugmentedModel, fit: Fit, bounds: Bounds, by_mode: Mapping[str, ConstantByMode]
+) -> tuple[DeclaredEffect, ...]:
+    """Return the known effects with their values in the final model.
+
+    Parameters
+    ----------
+    model, fit, bounds
+        The final model, its fit and its intervals.
+    by_mode
+        Constants in each mode, of effects where they differ.
+    """
+    found = []
+    for known in model.declared.effects:
+        parameters: dict[str, KnownParameter | ConstantByMode] = {
+            p.name: KnownParameter(float(fit.theta[at]), bounds.get(at), p.unit)
+            for p, at in zip(known.effect.parameters, model.positions(known.name), strict=True)
+        }
+        if known.name in by_mode:
+            parameters[known.effect.parameters[0].name] = by_mode[known.name]
+        found.append(DeclaredEffect(known.name, known.effect.kind, parameters))
+    return tuple(found)
+
+
+def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
+    """Return the declared law with its modes as fitted; None where it cannot be written out.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+    fit
+        The final fit.
+    """
+    law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
+    try:
+        named, terms = law_parts(law)
+    except InputError:
+        return None
+    return Equation(
+        terms,
+        tuple(map(float, declared.modulus * np.exp(fit.theta[0]))),
+        tuple(map(float, declared.relaxation_time * np.exp(fit.theta[1]))),
+        law.linear_relaxation,
+        float(declared.solvent_viscosity),
+        named=named,
+    )
+
+
+def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:
+    """Return the augmented fluid; None where it has a state that a law cannot carry.
+
+    Parameters
+    ----------
+    model, fit
+        The final model and its fit.
+    active
+        Names of the effects in it.
+    """
+    declared = model.declared
+    added = [
+        (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))
+        for effect in model.effects
+        if effect.name in active and isinstance(effect, ConstitutiveEffect)
+    ]
+    if any(isinstance(effect, StateEffect) for effect, _ in added):
+        return None
+    base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
+    law = AugmentedLaw(
+        base=base,
+        values=tuple(values for _, values in added),
+        effects=tuple(effect for effect, _ in added),
+        linear_relaxation=base.linear_relaxation,
+    )
+    one = jnp.ones(1)
+    viscosity = declared.solvent_viscosity + sum(
+        float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
+    )
+    modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
+    modulus = declared.modulus * np.exp(fit.theta[0])
+    relaxation_time = declared.relaxation_time * np.exp(fit.theta[1])
+    return Fluid(
+        law,
+        np.append(modulus, [float(pair[0]) for pair in modes]),
+        np.append(relaxation_time, [float(pair[1]) for pair in modes]),
+        viscosity,
+    )
