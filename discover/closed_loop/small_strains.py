@@ -49,7 +49,7 @@ def settle_instrument(
     )
     if not linear.resume():
         linear.start(by_mode=False)
-    linear.run(max_effects, lambda line: say(f"at small strain, {line}"), look_ahead=False)
+    linear.run(max_effects, lambda line: say(f"at small strain, {line}"), whole=False)
     if linear.active and linear.explained:
         search.adopt(linear)
         search.checkpoint.save(search)
