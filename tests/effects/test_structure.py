@@ -116,7 +116,8 @@ def test_times_a_hundred_times_shorter_need_no_shorter_steps():
     truth = independent_of(name, critical).respond(steps(*RATES), TIMES).sigma12
     # but at the jump, where they change within a step
     settled = (np.abs(TIMES - 3.0) > 0.5) & (TIMES > 0.5)
-    np.testing.assert_allclose(found[settled], truth[settled], rtol=0.02)
+    # 1e-4 was measured; by explicit steps it is off by its whole size
+    np.testing.assert_allclose(found[settled], truth[settled], rtol=1e-3)
 
 
 @pytest.mark.parametrize("name", FAMILY)
