@@ -131,7 +131,8 @@ def run_loop(
         Names of the runs that only judge.
     effects
         Candidates, by name, by spelling of a library term, or as objects; ``"named"`` for every
-        effect with a name; by default these and every library term up to one invariant.
+        effect with a name that is no candidate on request alone; by default these and every library
+        term up to one invariant.
     max_effects
         Largest number of effects added.
     strain
@@ -395,10 +396,11 @@ def _require_present(declared: DeclaredModel, present: set[str]) -> None:
 
 
 def _candidates(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
+    named = [effect for effect in named_effects().values() if not effect.on_request]
     if effects is None:
-        return [*named_effects().values(), *library_effects()]
+        return [*named, *library_effects()]
     if effects == "named":
-        return [*named_effects().values()]
+        return named
     if isinstance(effects, str):
         raise InputError(
             f'effects must be a list of names, or "named" for every effect with a name; got '
