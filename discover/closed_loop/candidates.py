@@ -28,18 +28,19 @@ def candidates_of(effects: Sequence[str | AbstractEffect] | str | None) -> list[
     Parameters
     ----------
     effects
-        Names, spellings of library terms or objects; ``"named"`` for every effect with a name;
-        None for these and every library term up to one invariant.
+        Names, spellings of library terms or objects; ``"named"`` for every effect with a name that
+        is no candidate on request alone; None for these and every library term up to one invariant.
 
     Raises
     ------
     InputError
         If there is none, one is given twice, or a name is unknown.
     """
+    named = [effect for effect in named_effects().values() if not effect.on_request]
     if effects is None:
-        return [*named_effects().values(), *library_effects()]
+        return [*named, *library_effects()]
     if effects == "named":
-        return [*named_effects().values()]
+        return named
     if isinstance(effects, str):
         raise InputError(
             f'effects must be a list of names, or "named" for every effect with a name; got '

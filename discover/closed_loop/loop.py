@@ -107,7 +107,8 @@ def run_loop(
         Names of the runs that only judge.
     effects
         Candidates, by name, by spelling of a library term, or as objects; ``"named"`` for every
-        effect with a name; by default these and every library term up to one invariant.
+        effect with a name that is no candidate on request alone; by default these and every library
+        term up to one invariant.
     max_effects
         Largest number of effects added.
     strain

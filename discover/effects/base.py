@@ -105,6 +105,8 @@ class AbstractEffect(ABC):
     visible: str = ""
     complexity: int = 1
     kind: ClassVar[Kind]
+    on_request: ClassVar[bool] = False
+    """Whether it is a candidate only where it is asked for by name."""
     acts_on_steady_states: ClassVar[bool] = False
     """Of an effect of the instrument or a state: whether it changes what is steady or periodic,
     sample by sample, without regard to time or strain."""

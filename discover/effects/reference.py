@@ -46,6 +46,7 @@ def _entry(effect: AbstractEffect) -> list[str]:
             for parameter in effect.parameters
         ),
         "",
+        *(["- Candidate where a study asks for it by name."] if effect.on_request else []),
         f"- Shows from: {effect.visible}",
         f"- To confirm: {effect.check}",
         f"- Source: {effect.source.rstrip('.')}.",

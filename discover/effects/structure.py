@@ -25,6 +25,8 @@ class Structure(StateEffect):
 
     rest = 1.0
     acts_on_steady_states = True
+    # each has three constants or more, and few fluids heal: searches of all others stay as fast
+    on_request = True
 
     @staticmethod
     @abstractmethod

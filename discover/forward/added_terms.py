@@ -38,6 +38,8 @@ class InUse(NamedTuple):
         0 without other terms, i + 1 with the i-th alone, one past the last with several.
     by_mode
         1 where the terms of the law differ from mode to mode.
+    states
+        0 without states of the fluid, i + 1 with the i-th alone, one past the last with several.
     times
         1 where a state changes the relaxation times.
     """
@@ -46,6 +48,7 @@ class InUse(NamedTuple):
     tensor: np.int32
     others: np.int32
     by_mode: np.int32 = np.int32(0)
+    states: np.int32 = np.int32(0)
     times: np.int32 = np.int32(0)
 
 

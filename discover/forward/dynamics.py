@@ -1,6 +1,6 @@
 """The fluid and what gives way in series with it, as the integrators take them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -13,7 +13,11 @@ from discover.simulate.exponential_runge_kutta import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,
+    relax,
 )
+
+Levels = tuple[Float[Array, "..."], ...]
+"""States of the fluid."""
 
 
 class Modes(NamedTuple):
@@ -54,6 +58,9 @@ class Dynamics(NamedTuple):
         is integrated exactly. None where chains do not retract.
     times_change
         1 where a state changes the relaxation times, else 0.
+    states_in_use
+        0 for none, i + 1 for the i-th alone, one past the last for several; None computes all. One
+        that is not in use stays at rest.
     """
 
     slope: Callable
@@ -65,6 +72,7 @@ class Dynamics(NamedTuple):
     viscosity: Float[Array, ""]
     trace_relaxation: Float[Array, " k"] | None = None
     times_change: Int[Array, ""] | int = 0
+    states_in_use: Int[Array, ""] | None = None
 
     @property
     def modes(self) -> Modes:
@@ -129,7 +137,7 @@ class Dynamics(NamedTuple):
             return StressWeights(whole)
         return StressWeights(whole, KrogstadWeights(*joined[1]), self.trace_relaxation)
 
-    def rest(self) -> tuple[Float[Array, "4 k"], tuple[Float[Array, "..."], ...]]:
+    def rest(self) -> tuple[Float[Array, "4 k"], Levels]:
         """Return modes and states at rest."""
         modulus = self.modes.modulus
         levels = (
@@ -137,6 +145,36 @@ class Dynamics(NamedTuple):
             for effect in self.states
         )
         return jnp.zeros((4, len(modulus))), tuple(levels)
+
+    def later(
+        self,
+        levels: Levels,
+        rate: Float[Array, ""],
+        stress: Float[Array, ""],
+        widths: Sequence[Float[Array, ""]],
+    ) -> tuple[Levels, ...]:
+        """Return the states after steps of these widths in s, source and decay constant in each."""
+        pairs = list(self.states.items())
+
+        def of(numbers: Sequence[int]) -> Callable[[], tuple[Levels, ...]]:
+            def changed():
+                out = []
+                for width in widths:
+                    after = list(levels)
+                    for i in numbers:
+                        effect, values = pairs[i]
+                        terms = effect.source_and_decay(values, rate, stress)
+                        after[i] = relax(*terms, levels[i], width)
+                    out.append(tuple(after))
+                return tuple(out)
+
+            return changed
+
+        every = of(range(len(pairs)))
+        if self.states_in_use is None or not pairs:
+            return every()
+        branches = [of([]), *(of([i]) for i in range(len(pairs))), every]
+        return jax.lax.switch(self.states_in_use, branches)
 
     def combined(self, factor: str, levels) -> Float[Array, ""]:
         """Return the product of a factor of all states: ``modulus_factor`` or ``time_factor``."""

@@ -6,7 +6,6 @@ from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import relax
 
 # The rate enters a law linearly but for terms that name it, for which one more step is enough
 _NEWTON_STEPS = 2
@@ -50,7 +49,7 @@ def strain_at_stress(
         (from_, target), h, weights = inputs
         sheared, felt = dynamics.sheared(stress, before, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
-        ahead = _after(dynamics, levels, felt, sheared, h)
+        (ahead,) = dynamics.later(levels, felt, sheared, (h,))
         slow = dynamics.combined("time_factor", ahead)
         w = dynamics.weights_of_step(weights, h, slow)
         scale = dynamics.combined("modulus_factor", ahead)
@@ -86,7 +85,8 @@ def strain_at_stress(
         after = w.end(stress, n1, n2, n3, n4)
         mean = (r1 + 2.0 * (r2 + r3) + r4) / 6.0
         sheared_after, felt = dynamics.sheared(after, mean, flow)
-        levels = _after(dynamics, levels, felt, 0.5 * (sheared + scale * sheared_after), h)
+        middle = 0.5 * (sheared + scale * sheared_after)
+        (levels,) = dynamics.later(levels, felt, middle, (h,))
         strain = strain + h * mean
         last = mean + swings * (mean - before)
         return (after, levels, last, strain), strain
@@ -104,11 +104,3 @@ def strain_at_stress(
     slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * width)
     given = dynamics.series.compliance * (imposed - imposed[0])
     return strain + given + dynamics.series.slip * jnp.concatenate([jnp.zeros(1), slipped])
-
-
-def _after(dynamics: Dynamics, levels, rate, stress, width):
-    """Return the states after a step in which source and decay are constant."""
-    return tuple(
-        relax(*effect.source_and_decay(values, rate, stress), level, width)
-        for (effect, values), level in zip(dynamics.states.items(), levels, strict=True)
-    )

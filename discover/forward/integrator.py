@@ -9,19 +9,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.effects import StateEffect
 from discover.forward.dynamics import Dynamics
 from discover.forward.periodic_start import Cycle, periodic_start
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import relax
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
-
-
-def _relax(effect: StateEffect, values, state, rate, stress, width):
-    """Return the state after a step in which source and decay are constant."""
-    return relax(*effect.source_and_decay(values, rate, stress), state, width)
 
 
 def integrate(
@@ -45,6 +38,9 @@ def integrate(
         The last cycle before the record, of a batch that holds runs with a periodic start.
     """
     width = jnp.diff(times)
+    if cycle is not None:
+        # a state that stays where it is says nothing of where a cycle brings it
+        dynamics = dynamics._replace(states_in_use=None)
     states, series = dynamics.states, dynamics.series
     # so that it is traced once, and not at each of the four stages
     slope = jax.jit(lambda stress, rate, slow: dynamics.change(stress, rate, slow, flow))
@@ -56,13 +52,10 @@ def integrate(
         scale = combined("modulus_factor", levels)
         shear_before, felt_rate = dynamics.sheared(stress, middle_rate, flow)
         shear_before = scale * shear_before
-        predicted = [
-            [_relax(e, v, s, felt_rate, shear_before, share * h) for share in (0.5, 1.0)]
-            for (e, v), s in zip(states.items(), levels, strict=True)
-        ]
+        halfway, at_end = dynamics.later(levels, felt_rate, shear_before, (0.5 * h, h))
         slow_first = combined("time_factor", levels)
-        slow_middle = combined("time_factor", [p[0] for p in predicted])
-        slow_last = combined("time_factor", [p[1] for p in predicted])
+        slow_middle = combined("time_factor", halfway)
+        slow_last = combined("time_factor", at_end)
         w = dynamics.weights_of_step(weights, h, slow_middle)
 
         def remainder(stress, rate, slow):
@@ -71,7 +64,7 @@ def integrate(
 
         n1 = remainder(stress, first_rate + compliance_rate, slow_first)
         if series is not None:
-            scale_last = combined("modulus_factor", [p[1] for p in predicted])
+            scale_last = combined("modulus_factor", at_end)
             n1, compliance_rate = _compliance_rate(
                 dynamics, scale_last, stress, shear_before, missing, compliance_rate, n1, w.whole,
                 slow_middle, first_rate, last_rate, h, times[-1],
@@ -86,12 +79,9 @@ def integrate(
         shear_after, felt_rate = dynamics.sheared(after, middle_rate, flow)
         stress_after = dynamics.recorded(after, flow)
         if states:
-            guess = combined("modulus_factor", [p[1] for p in predicted]) * shear_after
+            guess = combined("modulus_factor", at_end) * shear_after
             middle_stress = 0.5 * (shear_before + guess)
-            levels = tuple(
-                _relax(e, v, s, felt_rate, middle_stress, h)
-                for (e, v), s in zip(states.items(), levels, strict=True)
-            )
+            (levels,) = dynamics.later(levels, felt_rate, middle_stress, (h,))
             factor = combined("modulus_factor", levels)
             shear_after, stress_after = factor * shear_after, factor * stress_after
         if series is not None:

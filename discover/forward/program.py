@@ -104,9 +104,12 @@ class Program:
 
     def in_use(self, theta: np.ndarray) -> InUse:
         """Return the branches that a parameter vector takes."""
-        changing = [e for e in self._states if e.changes_times]
-        times = any(theta[self.slices[e.name].start] != 0.0 for e in changing)
-        used = self.added.in_use(theta)._replace(times=np.int32(times))
+        states = [i for i, e in enumerate(self._states) if theta[self.slices[e.name].start] != 0.0]
+        several = len(self._states) + 1
+        used = self.added.in_use(theta)._replace(
+            states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
+            times=np.int32(any(self._states[i].changes_times for i in states)),
+        )
         if self._by_mode is None:
             return used
         differ = theta[self.slices[self._by_mode.name].start] != 0.0
@@ -161,7 +164,7 @@ class Program:
                 rate = _where_in_shear(flow, changed, rate)
         dynamics = self._dynamics(numbers, used, theta, flow)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept)
+        dynamics = dynamics._replace(states=kept, states_in_use=None)
         stress, felt = steady_states(dynamics, rate, flow)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
@@ -179,7 +182,7 @@ class Program:
                 rate = effect.felt_rate(self._values(theta, effect), places, rate)
         dynamics = self._dynamics(numbers, used, theta, None)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept)
+        dynamics = dynamics._replace(states=kept, states_in_use=None)
 
         def beside(felt):
             return self._beside(numbers, theta, felt, None)
@@ -360,6 +363,7 @@ class Program:
             self._beside(numbers, theta, jnp.ones(1), flow)[0],
             self._trace_relaxation(law, modulus, extra) if law.retracts else None,
             used.times,
+            used.states,
         )
 
     def _trace_relaxation(self, law: AbstractConstitutiveLaw, modulus, extra: Modes | None):

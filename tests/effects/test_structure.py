@@ -7,6 +7,7 @@ import pytest
 from independent import Structured, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
+from discover.closed_loop.loop import _candidates
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
@@ -116,7 +117,8 @@ def test_times_a_hundred_times_shorter_need_no_shorter_steps():
     truth = independent_of(name, critical).respond(steps(*RATES), TIMES).sigma12
     # but at the jump, where they change within a step
     settled = (np.abs(TIMES - 3.0) > 0.5) & (TIMES > 0.5)
-    np.testing.assert_allclose(found[settled], truth[settled], rtol=0.02)
+    # 1e-4 was measured; by explicit steps it is off by its whole size
+    np.testing.assert_allclose(found[settled], truth[settled], rtol=1e-3)
 
 
 @pytest.mark.parametrize("name", FAMILY)
@@ -176,3 +178,11 @@ def test_with_a_power_of_one_the_modulus_follows_moores_equation():
     ours = predicted(RUNS, name, exponent=1.0)
     # the same sums in another order
     np.testing.assert_allclose(ours, moore.predict(theta, make_batch(RUNS, 0.1)), rtol=1e-10)
+
+
+@pytest.mark.parametrize("asked", [None, "named"])
+def test_a_loop_that_is_not_asked_for_a_structure_tries_moores_alone(asked):
+    names = {effect.name for effect in _candidates(asked)}
+    assert "thixotropy" in names
+    assert names.isdisjoint(FAMILY)
+    assert [effect.name for effect in _candidates(list(FAMILY))] == list(FAMILY)
