@@ -49,6 +49,15 @@ def _shapes(request: pytest.FixtureRequest) -> Iterator[None]:
     jaxtyping.config.update("jaxtyping_disable", False)
 
 
+@pytest.fixture
+def as_users_run_it() -> Iterator[None]:
+    """Leave annotations unchecked: with the check a wrong type ends before the code under test."""
+    before = jaxtyping.config.jaxtyping_disable
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", before)
+
+
 # files of a minute and more, the longest first; what shares programs stands apart, so that one
 # worker finds what the other compiled
 _LONG = (

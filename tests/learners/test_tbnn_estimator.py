@@ -129,6 +129,7 @@ def test_a_wrong_setting_is_refused(data, options, message):
         TBNNUDE(**options).fit(data.runs)
 
 
+@pytest.mark.usefixtures("as_users_run_it")
 def test_runs_of_another_kind_are_refused():
     with pytest.raises(InputError, match="sequence of Run"):
         TBNNUDE().fit([np.zeros(3)])

@@ -87,6 +87,17 @@ def test_the_law_that_is_written_out_predicts_what_the_estimator_does(maxwell):
     assert sum(maxwell.draws_.weights) == pytest.approx(1.0)
 
 
+def test_draws_have_the_weights_of_the_laws_that_fit(maxwell):
+    pytest.importorskip("xarray")
+    draws = maxwell.to_xarray()
+    assert dict(draws.sizes) == {"chain": 1, "draw": 1000, "term": len(maxwell.library)}
+    found, held = draws["coefficient"].mean(("chain", "draw")).values, maxwell.draws_
+    spread = held.coefficients.std(axis=0)
+    # the mean of 1,000 draws scatters by 3 % of their spread
+    np.testing.assert_array_less(np.abs(found - held.weights @ held.coefficients),
+                                 0.2 * spread + 1e-12)  # fmt: skip
+
+
 def test_a_closed_form_is_refused_in_words():
     library = build_library(closed_forms=("exp",))
     with pytest.raises(InputError, match=r"without closed forms.*epsilon"):

@@ -215,6 +215,7 @@ def test_refitting_forgets(giesekus):
     assert model.predict(small_dataset("ucm")).shape == (4 * 65,)
 
 
+@pytest.mark.usefixtures("as_users_run_it")
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
@@ -232,6 +233,7 @@ def test_bad_parameters_give_one_clear_error(parameters, message):
         TensorSINDy(**parameters).fit(small_dataset("ucm"))
 
 
+@pytest.mark.usefixtures("as_users_run_it")
 def test_bad_runs_give_one_clear_error():
     with pytest.raises(InputError, match="at least one run"):
         TensorSINDy().fit([])

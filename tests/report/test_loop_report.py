@@ -91,6 +91,7 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
     )  # fmt: skip
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
     assert "Nothing is missing that these data show" in page
+    assert "with what was added" not in page
 
 
 def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):

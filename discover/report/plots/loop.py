@@ -113,7 +113,8 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
         return picture(
             drawing,
             "runs",
-            "Every run in the window of the loop. Runs in orange were held out: no fit saw them."
+            "Every run in the window of the loop."
+            + " Runs in orange were held out: no fit saw them." * any(r.held_out for r in records)
             + _what_is_drawn(records)
             + " Overlaid laws are the study's, fitted to nothing and without effects of the "
             "instrument." * bool(overlays),
@@ -331,9 +332,10 @@ def waterfall_picture(result: LoopResult) -> Picture:
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
         positions = np.arange(len(labels))
-        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19)]
         held_out = [p.held_out for p in pairs if p.held_out is not None]
-        if len(held_out) == len(pairs):
+        judged = len(held_out) == len(pairs)
+        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)]
+        if judged:
             series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
@@ -345,6 +347,7 @@ def waterfall_picture(result: LoopResult) -> Picture:
         heights = [100.0 * value for _, _, values, _ in series for value in values]
         panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
         panel.set_xticks(positions, labels)
+        panel.set_xlim(-0.6, max(len(labels), 2) - 0.4)  # a bar alone would fill the picture
         if len(labels) > 4:  # long names side by side would run into one another
             panel.tick_params(axis="x", labelsize=8, labelrotation=15)
         panel.set_ylabel("relative error (%)")
@@ -353,7 +356,9 @@ def waterfall_picture(result: LoopResult) -> Picture:
             drawing,
             "waterfall",
             "Error after each effect added: root mean square of prediction minus measurement over "
-            "the root-mean-square stress, mean over runs. Lines: from the best run to the worst.",
+            "the root-mean-square stress, mean over runs."
+            + " Lines: from the best run to the worst."
+            * (len(result.records) > 1),
         )
 
 
