@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from discover.closed_loop.search.search import exchanging
+from discover.closed_loop.search import exchanging
 from planting import OUTSIDE, Noise, Planter
 
 from discover.closed_loop import run_loop
