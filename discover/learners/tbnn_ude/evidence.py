@@ -108,7 +108,7 @@ def posterior_draws(
         for _ in range(_HALVINGS):
             drawn = rebuilt(rebuild, jnp.asarray(start + step))
             left = np.asarray(relative_misses(trajectories(drawn, problem), problem))
-            if float(np.linalg.norm(left)) <= fits * least:
+            if np.max(np.abs(left)) < np.inf and np.linalg.norm(left) <= fits * least:
                 found.append(drawn)
                 break
             step *= 0.5
