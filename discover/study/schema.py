@@ -238,7 +238,7 @@ class Compare(Section):
     optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"
     selection: Literal["bic", "held_out", "one_standard_error"] = "bic"
     max_terms: Annotated[int, Field(ge=1, le=12)] = 5
-    recipe: Literal["default", "paper"] = "default"
+    recipe: Literal["default", "thorough", "paper"] = "default"
     quick: bool = False
     members: Annotated[int, Field(ge=1, le=64)] = 3
     seed: Seed = 0

@@ -3,8 +3,10 @@
 Shear stress cannot tell many laws apart, and one network is one of them. Weights alone do not make
 members honest: on the same tensors they end in the same law. So the ways differ too.
 
-- Where coefficients vary, members take turns: one starts from the tensor that came next in the
-  first one's race, one has the first one's tensors with initial weights of its own.
+- Where coefficients vary, laws that were less likely than the first are members, whether they have
+  few tensors or vary little. The others take turns: one starts from the tensor that came next in
+  the race, one has the tensors that won it, with initial weights of its own. Without a race they
+  are drawn from what the data leave of the first one's weights.
 - Where constants suffice no initial weight takes part, and members learn from halves of the runs.
 
 What those disagree on that fit all data, the data leave open. They share the compiled programs of
@@ -12,6 +14,7 @@ the first, and none repeats its search.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -20,6 +23,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.recipe_default import (
@@ -71,14 +75,19 @@ def train_others(
             for half, key in zip(halves, keys, strict=True)
         ]
         return members, "trained on halves of the runs"
+    members = list(first.others[: len(keys)])
+    if first.left_out:
+        drawn = posterior_draws(first.law, problem, keys[len(members) :], FITS)
+        members += [replace(first, law=law, penalised_law=law) for law in drawn]
+        return members, "held to more variation, or drawn from what the data leave of the weights"
+    raced = min([first, *members], key=lambda one: len(one.tensors))
     # what the first one needed later may have been the better beginning
-    starts = sorted(first.passed_over, key=lambda tensor: tensor not in first.tensors)
-    members = []
-    for i, key in enumerate(keys):
-        groups = [first.tensors]
+    starts = sorted(first.passed_over, key=lambda tensor: tensor not in raced.tensors)
+    for i, key in enumerate(keys[len(members) :]):
+        groups = [raced.tensors]
         if i % 2 == 0 and i // 2 < len(starts):
             other = starts[i // 2]
-            beside = [t for t in first.tensors if t != other]
+            beside = [t for t in raced.tensors if t != other]
             groups = [(other,), beside[: recipe.max_tensors - 1]]
         members.append(
             train_along(problem, key, first.law, [g for g in groups if g], recipe, progress)
@@ -107,12 +116,15 @@ def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> Traini
 
 
 def choose_member(
-    members: Sequence[Trained], misfits: Float[np.ndarray, " members"], resolved: float
+    members: Sequence[Trained],
+    misfits: Float[np.ndarray, " members"],
+    resolved: float,
+    surprise: Float[np.ndarray, " members"] | None = None,
 ) -> tuple[int, Bool[np.ndarray, " members"]]:
     """Return the member to be reported, and which ones fit.
 
-    The fewest varying tensors among the members of nearly the least misfit: within noise a smaller
-    misfit is no merit, and a median of laws would be no law.
+    The likeliest of those that fit; without noise, the fewest varying tensors among those of nearly
+    the least misfit. A median of laws would be no law.
 
     Parameters
     ----------
@@ -122,11 +134,15 @@ def choose_member(
         Relative misfit of each on all runs.
     resolved
         Relative misfit that a rheometer does not resolve.
+    surprise
+        From `evidence.surprises`, where noise hides more than that.
     """
     least = float(np.min(misfits))
     fits = misfits <= max(FITS * least, resolved)
     if not np.isfinite(least) or not members[0].varies:
         return 0, np.where(np.arange(len(members)) == 0, True, fits)
+    if surprise is not None:
+        return int(np.argmin(np.where(fits, surprise, np.inf))), fits
     near = [int(i) for i in np.flatnonzero(misfits <= SIMILAR * least)]
     chosen = min(near, key=lambda i: (len(members[i].tensors), misfits[i]))
     return chosen, fits

@@ -24,11 +24,17 @@ from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction, as_runs
 from discover.learners.settings import PerMode, check_settings
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
+from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
-from discover.learners.tbnn_ude.recipe_default import DefaultRecipe, Trained, train_default
+from discover.learners.tbnn_ude.recipe_default import (
+    DefaultRecipe,
+    Trained,
+    train_default,
+    work,
+)
 from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
 from discover.learners.tbnn_ude.spread import (
     MemberPredictions,
@@ -41,7 +47,7 @@ from discover.simulate.solve import solve_batch
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
 
-RECIPES = ("default", "paper")
+RECIPES = ("default", "thorough", "paper")
 
 
 class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
@@ -50,7 +56,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     recipe
-        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"paper"``
+        ``"default"`` (Levenberg–Marquardt, constants first; see `recipe_default`), ``"thorough"``
+        (the same, with nothing left out where there are many modes, runs and steps), ``"paper"``
         (Adam, 7,200 iterations; see `recipe_paper`), or a `DefaultRecipe` or `PaperRecipe`.
     modulus, relaxation_time
         G in Pa and λ in s, numbers, or arrays with one value for each mode.
@@ -62,8 +69,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         The known `Fluid`, in place of `modulus`, `relaxation_time`, `base_law`,
         `known_relaxation` and `solvent_viscosity`.
     n_members
-        Networks that reach the data by different ways (see `ensemble`). One of the simplest that
-        fit is taken; what those that fit disagree on, the data leave open.
+        Networks that reach the data by different ways (see `ensemble`). The likeliest of those that
+        fit is taken, without noise the simplest; what they disagree on, the data leave open.
     projection_library
         Candidate terms in which the network is put into words; by default tensors with
         coefficients up to degree one.
@@ -173,12 +180,20 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)
         recipe = self._recipe()
-        problem = _problem(runs, known)
+        problem, fitted = _problem(runs, known), ""
+        if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
+            fewer = [_thinned(run, recipe.samples) for run in runs]
+            if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
+                problem = _problem(fewer, known)
+                fitted = f"at most {recipe.samples} samples of a run were fitted"
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
         misfits = member_misfits(members, problem)
-        chosen, fits = choose_member(trained, misfits, _resolved(recipe))
+        resolved, surprise = _resolved(recipe), None
+        if isinstance(recipe, DefaultRecipe) and np.min(misfits) > resolved and trained[0].varies:
+            surprise = surprises(members, problem)
+        chosen, fits = choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
         self.n_features_in_ = 1
@@ -220,7 +235,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                     for law, misfit, fitting in zip(members, misfits, fits, strict=True)
                 ],
             },
-            message=best.message,
+            message="; ".join(part for part in (best.message, trained[0].left_out, fitted) if part),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
         return self
@@ -252,7 +267,9 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             recipe = DefaultRecipe()
             if not self.quick:
                 return recipe
-            return replace(recipe, width=8, steps=6, polish_steps=30, max_tensors=1)
+            return replace(recipe, width=8, steps=6, polish_steps=30, max_tensors=1, variations=())
+        if self.recipe == "thorough":
+            return DefaultRecipe(affordable=np.inf)
         if self.recipe == "paper":
             return PaperRecipe(iterations_per_series=100 if self.quick else 900)
         raise InputError(f"recipe must be one of {', '.join(RECIPES)}; got {self.recipe!r}.")
@@ -283,6 +300,19 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
+
+
+def _thinned(run: Run, most: int) -> Run:
+    """Return a run of no more samples than these, evenly spread over those it has."""
+    if len(run) <= most:
+        return run
+    kept = np.unique(np.linspace(0, len(run) - 1, most).round().astype(int))
+    sampled = {
+        name: value[kept]
+        for name, value in vars(run).items()
+        if isinstance(value, np.ndarray) and value.shape == (len(run),)
+    }
+    return replace(run, **sampled)
 
 
 def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import trajectories
 from discover.programs import compiled
@@ -42,12 +42,17 @@ class Cloud(eqx.Module):
     rate
         Dimensionless rate of deformation, shape (m, 4).
     size
-        Norm of each basis tensor, shape (m, 8).
+        Norm of each basis tensor, times the weight, shape (m, 8).
+    weight
+        What a state counts for, shape (m,): one where there is one mode. Of several modes each
+        counts by its modulus over the stress of the run: a slow one's dimensionless stress may be
+        a million, and its modulus too small for the record to show it.
     """
 
     stress: Float[Array, "m 4"]
     rate: Float[Array, "m 4"]
     size: Float[Array, "m 8"]
+    weight: Float[Array, " m"]
 
     def coefficients(self, law: TensorBasisNetwork) -> Float[Array, "m 8"]:
         """Return the coefficients of a law at these states."""
@@ -79,7 +84,20 @@ def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cl
     rate = jax.vmap(rate_of_deformation)(shear_rate)
     basis = jax.vmap(integrity_basis)(stress, rate)
     size = jnp.sqrt(jax.vmap(jax.vmap(inner))(basis, basis))
-    return Cloud(stress, rate, size)
+    weight = _weights(problem).ravel()
+    return Cloud(stress, rate, weight[:, None] * size, weight)
+
+
+def _weights(problem: TrainingProblem) -> Float[Array, "runs states k"]:
+    runs, modes = problem.target.shape[0], problem.modulus.shape[0]
+    shape = (runs, STATES_PER_RUN, modes)
+    if modes == 1:
+        return jnp.ones(shape)
+    mask = problem.grids.sample_mask
+    squares = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1)
+    stress = jnp.sqrt(squares / jnp.maximum(jnp.sum(mask, axis=1), 1))
+    stress = jnp.where(stress > 0.0, stress, 1.0)  # a run at rest has no scale of its own
+    return jnp.broadcast_to(problem.modulus / stress[:, None, None], shape)
 
 
 class PriorWeights(eqx.Module):
@@ -131,3 +149,15 @@ def reweighted(
         return strength / (jnp.sqrt(jnp.mean(rows**2, axis=0)) + _FLOOR)
 
     return PriorWeights(reciprocal(amount), variation_share * reciprocal(variation))
+
+
+def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
+    """Return the weights of a plain quadratic penalty on variation, the same for every tensor.
+
+    Parameters
+    ----------
+    strength
+        κ. Amounts are penalised 1e-5 times as much: only where the data say nothing of them.
+    """
+    every = strength * jnp.ones(N_COEFFICIENTS)
+    return PriorWeights(1e-5 * every, every)

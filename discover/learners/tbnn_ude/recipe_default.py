@@ -12,13 +12,18 @@ the smallest law that explains it, in this order:
    taken away;
 2. if what they leave has structure, coefficient functions on one tensor, raced for each of the
    eight; then on one more tensor beside the best, while the misfit is above what a rheometer
-   resolves.
+   resolves;
+3. where noise hides more than that, many functions fit, and the one that happens to fit best may
+   be large, bent, and far off in N1. So the constants of the first stage are also tried with the
+   least variation that leaves noise alone, on all tensors at once, and the likelier law of the two
+   is taken (see `evidence`). With many modes, runs and steps only these are tried, and the training
+   says so: `affordable` has the rest.
 
 The last training of each stage is without penalty, or nearly: what is reported is not shrunk.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -28,8 +33,16 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
+from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Objective, minimise, relative_misses
-from discover.learners.tbnn_ude.prior import Cloud, cloud_of, parts, reweighted
+from discover.learners.tbnn_ude.prior import (
+    Cloud,
+    PriorWeights,
+    cloud_of,
+    least_variation,
+    parts,
+    reweighted,
+)
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
@@ -46,9 +59,16 @@ class DefaultRecipe:
     Attributes
     ----------
     width
-        Neurons in each of two hidden layers.
+        Neurons in each of two hidden layers; half as many where coefficients vary little.
+    affordable
+        Work (modes times runs times steps of time) up to which functions on single tensors are
+        tried; the recipe ``"thorough"`` always tries them.
+    samples
+        Most samples of a run that are fitted where the work is more than that.
     strengths
         Strength of the penalty in the rounds of the first stage, relative to the squared stress.
+    variations
+        Strength of the penalty on variation, likewise: the first that leaves noise alone ends.
     steps
         Levenberg–Marquardt steps a round, and for each tensor tried.
     polish_steps
@@ -64,7 +84,10 @@ class DefaultRecipe:
     """
 
     width: int = 12
+    affordable: float = 6000.0
+    samples: int = 100
     strengths: tuple[float, ...] = (1e-3, 1e-4)
+    variations: tuple[float, ...] = (1.0, 0.1, 1e-2, 1e-3)
     steps: int = 10
     polish_steps: int = 40
     max_tensors: int = 3
@@ -95,6 +118,10 @@ class Trained:
         Tensors whose coefficients vary, in the order in which they were taken.
     passed_over
         The other tensors, from which a law could have started, the least misfit first.
+    others
+        Less likely laws that were met on the way.
+    left_out
+        What was not tried, to save time, in words.
     """
 
     law: TensorBasisNetwork
@@ -105,6 +132,8 @@ class Trained:
     message: str
     tensors: tuple[int, ...] = ()
     passed_over: tuple[int, ...] = ()
+    others: "tuple[Trained, ...]" = ()
+    left_out: str = ""
 
 
 @eqx.filter_jit
@@ -133,7 +162,8 @@ def initial_law(
 def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     """Return the root mean square of every invariant, or one where it vanishes."""
     invariants = jax.vmap(scalar_invariants)(cloud.stress, cloud.rate)
-    size = jnp.sqrt(jnp.mean(invariants**2, axis=0))
+    shares = (cloud.weight**2 / jnp.mean(cloud.weight**2))[:, None]
+    size = jnp.sqrt(jnp.mean(shares * invariants**2, axis=0))
     return jnp.where(size > 1e-12, size, 1.0)
 
 
@@ -189,9 +219,9 @@ class _Session:
 
     def round(
         self, law: TensorBasisNetwork, strength: float, tensors: np.ndarray, network: bool,
-        steps: int, pace: list[float] | None = None,
+        steps: int, pace: list[float] | None = None, prior: PriorWeights | None = None,
     ) -> TensorBasisNetwork:  # fmt: skip
-        """Return a law trained for one round, with the prior reweighted at its start.
+        """Return a law trained for one round, by default with the prior reweighted at its start.
 
         It ends early where it falls far behind the pace of a rival's misfits.
         """
@@ -200,9 +230,9 @@ class _Session:
             return law
         make = Rebuild.with_network if network else Rebuild.of_constants
         rebuild = make(law, tensors, constant_scale(cloud))
-        objective = Objective(
-            self.problem, rebuild, cloud, reweighted(law, cloud, jnp.asarray(strength))
-        )
+        if prior is None:
+            prior = reweighted(law, cloud, jnp.asarray(strength))
+        objective = Objective(self.problem, rebuild, cloud, prior)
         target = 0.1 * self.recipe.exact
         weights = minimise(rebuild.start, objective, steps, self.record, target, pace)
         trained = rebuilt(rebuild, weights)
@@ -269,22 +299,62 @@ class _Session:
                 trials.append((self.misfit(trial), tensor, trial))
                 if min(trials, key=lambda trial: trial[:2])[1] == tensor:
                     pace = self.misfits[before:]
-            found = min(trials, key=lambda trial: trial[:2])
-            if not found[0] < misfit:
+            trials.sort(key=lambda trial: trial[:2])
+            if not trials[0][0] < misfit:
                 break
+            tensor, penalised, law = self.polished(trials, chosen)
             if not self.taken:
-                self.passed_over = [t for _, t, _ in sorted(trials, key=lambda trial: trial[:2])][
-                    1:
-                ]
-            self.taken.append(found[1])
-            chosen[found[1]] = True
-            law = penalised = found[2]
-            if not self.settled(law):
-                law = self.polish(law, found[0], chosen)
+                self.passed_over = [t for _, t, _ in trials if t != tensor]
+            self.taken.append(tensor)
+            chosen[tensor] = True
             misfit = self.misfit(law)
             if misfit < self.recipe.resolved or self.settled(law):
                 break
         return penalised, law
+
+    def polished(
+        self, trials: Sequence[tuple[float, int, TensorBasisNetwork]], chosen: np.ndarray
+    ) -> tuple[int, TensorBasisNetwork, TensorBasisNetwork]:
+        """Return the tensor that does best in the end, and its law before and after polish.
+
+        The race says little of what a few more steps make of the next ones: before a second tensor
+        is asked for, the first has to be the right one.
+        """
+        ends = []
+        for reached, tensor, trial in trials[:_POLISHED]:
+            if reached > _CLOSE * trials[0][0]:
+                break
+            tensors = chosen.copy()
+            tensors[tensor] = True
+            law = trial if self.settled(trial) else self.polish(trial, reached, tensors)
+            ends.append((self.misfit(law), tensor, trial, law))
+            if ends[-1][0] < self.recipe.resolved or self.settled(law):
+                return tensor, trial, law
+        _, tensor, trial, law = min(ends, key=lambda end: end[:2])
+        return tensor, trial, law
+
+    def nearly_constant(
+        self, start: TensorBasisNetwork, constants: Float[Array, "8"]
+    ) -> list[TensorBasisNetwork]:
+        """Return laws whose coefficients vary as little as the residual allows, the last the best.
+
+        Those before it are held to less variation still.
+        """
+        everything = np.ones(N_COEFFICIENTS, bool)
+        law = _with_tensors(start, everything)
+        law = eqx.tree_at(lambda tree: tree.constants, law, constants)
+        found = []
+        before = np.inf
+        for strength in self.recipe.variations:
+            prior = least_variation(jnp.asarray(strength))
+            law = self.round(law, strength, everything, True, self.recipe.steps, prior=prior)
+            misfit = self.misfit(law)
+            if misfit < before:  # the same law twice is no second opinion
+                found.append(law)
+            if self.settled(law) and misfit > _STILL_GAINS * before:
+                break
+            before = misfit
+        return found
 
     def along(
         self, start: TensorBasisNetwork, groups: Sequence[Sequence[int]]
@@ -311,6 +381,14 @@ class _Session:
 
 _CLEARINGS = 3
 _START_STEPS = 6
+_FAR = 0.1  # relative misfit of constants that no data have as noise
+_THINS = np.array([0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])  # a Giesekus fluid's
+_LEFT_OUT = (
+    "functions on single tensors were not tried, to save time (recipe 'thorough' tries them)"
+)
+_POLISHED = 2
+_CLOSE = 1.5  # what lies further behind the best of a race is not polished
+_STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds more than noise
 _MOST_POLISHES = 3
 
 PRIOR_SHARE = 1e-6
@@ -352,16 +430,49 @@ def train_default(
     session = _Session(problem, recipe, progress)
     start = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
     penalised, law = session.constants(start)
+    if session.misfit(law) > _FAR:
+        # from h = 0 the stress of a thinning fluid is too far away: from one that thins it is not
+        thins = eqx.tree_at(lambda tree: tree.constants, start, jnp.asarray(_THINS))
+        again = session.constants(thins)
+        if session.misfit(again[1]) < session.misfit(law):
+            penalised, law = again
     if session.settled(law) or recipe.max_tensors == 0:
         return _finish(session, law, penalised, False, "constant coefficients")
     # the invariants as the data's own stresses have them, from the best law so far
     scale = invariant_sizes(session.cloud(law))
-    start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
-    penalised_functions, functions = session.functions(start)
-    if session.misfit(functions) > 0.9 * session.misfit(law):
-        return _finish(session, law, penalised, False, "constant coefficients, no function better")
     what = "coefficients that vary with the invariants"
-    return _finish(session, functions, penalised_functions, True, what)
+    found, left_out = [], _LEFT_OUT
+    if work(problem) <= recipe.affordable:
+        start = initial_law(key, recipe.width, linear_relaxation, scale, base_law)
+        penalised_functions, functions = session.functions(start)
+        found = [_finish(session, functions, penalised_functions, True, what)]
+        left_out = ""
+    if not found or found[0].misfit > recipe.resolved:
+        narrow = max(recipe.width // 2, 4)
+        start = initial_law(key, narrow, linear_relaxation, scale, base_law)
+        path = session.nearly_constant(start, law.constants)
+        what += ", as little as the residual allows"
+        every = tuple(range(N_COEFFICIENTS))
+        ends = path[-1:] if found else path
+        found += [
+            replace(_finish(session, one, one, True, what), tensors=every) for one in reversed(ends)
+        ]
+    # what leaves noise alone is better than what does not, by however little
+    least = session.misfit(law)
+    found = [one for one in found if one.misfit <= 0.9 * least or session.settled(one.law)]
+    if not found:
+        end = "constant coefficients, no function better"
+        return replace(_finish(session, law, penalised, False, end), left_out=left_out)
+    if len(found) == 1:
+        return replace(found[0], left_out=left_out)
+    order = np.argsort(surprises([one.law for one in found], problem), kind="stable")
+    first, *others = (found[i] for i in order)
+    return replace(first, others=tuple(others), left_out=left_out)
+
+
+def work(problem: TrainingProblem) -> float:
+    """Return modes times runs times steps of time: what an integration of a problem costs."""
+    return float(problem.modulus.size * problem.grids.times.size)
 
 
 def train_constants(

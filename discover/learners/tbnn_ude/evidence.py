@@ -1,0 +1,150 @@
+"""Which of several laws that fit noisy data alike is the likelier, by what each had to be told.
+
+Two laws may leave the same noise and yet differ in what they took to get there: the one is smooth,
+the other bends wherever the noise does. The evidence of Laplace's approximation counts that: with
+weights w of a standard normal prior and Jacobian J of the residuals in units of the noise,
+
+    −2 ln E = χ² + |w|² + ln det(1 + JᵀJ),
+
+up to a constant that all laws share   [MacKay 1992, Neural Computation 4, 448].
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Key
+
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude.least_squares import data_scale, relative_misses
+from discover.learners.tbnn_ude.prior import cloud_of
+from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.variational import side_by_side, trajectories
+from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
+
+
+def surprises(
+    laws: Sequence[TensorBasisNetwork], problem: TrainingProblem
+) -> Float[np.ndarray, " laws"]:
+    """Return −2 ln E of every law; the least is the likeliest.
+
+    It is infinite for a law that runs away, if there is one that does not: in the training flows,
+    or in the same flows at twice the rate, in which every fluid has a finite stress.
+
+    The noise is what the best of them leaves. Where that is correlated, so that no law of these is
+    the whole one, its samples count as fewer, as a first-order autoregression has it.
+
+    Parameters
+    ----------
+    laws
+        Trained on the problem; at least one varies somewhere.
+    problem
+        The training data.
+    """
+    states = [trajectories(law, problem) for law in laws]
+    misses = [np.asarray(relative_misses(one, problem)) for one in states]
+    squares = np.array([np.sum(one**2) for one in misses])
+    squares = np.where(np.isfinite(squares), squares, np.inf)
+    best = int(np.argmin(squares))
+    if not 0.0 < squares[best] < np.inf:
+        return np.where(squares == squares[best], 0.0, np.inf)
+    mask = np.asarray(problem.grids.sample_mask)
+    precision = _independent(misses[best], mask) / squares[best]
+    enduring = np.isfinite(squares) & [endures(law, problem) for law in laws]
+    found = np.full(len(laws), np.inf)
+    usable = enduring if np.any(enduring) else np.isfinite(squares)
+    for i in np.flatnonzero(usable).tolist():
+        cost = _told(laws[i], states[i], problem, precision)
+        found[i] = precision * squares[i] + cost
+    return found
+
+
+def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
+    """Return whether a law's stress stays finite in the training flows at twice the rate."""
+    faster = eqx.tree_at(
+        lambda tree: (tree.protocols.table_rates, tree.protocols.amplitudes),
+        problem,
+        replace_fn=lambda rates: 2.0 * rates,
+    )
+    return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster)))))
+
+
+def posterior_draws(
+    law: TensorBasisNetwork,
+    problem: TrainingProblem,
+    keys: Key[Array, " draws"],
+    fits: float,
+) -> list[TensorBasisNetwork]:
+    """Return laws around a trained one that fit the data about as well.
+
+    They are drawn from the Gaussian of Laplace's approximation. Where the law is bent, or the noise
+    correlated, it reaches beyond the laws that fit: a draw is halved until it does.
+
+    Parameters
+    ----------
+    law
+        Trained on the problem, with coefficients that vary.
+    problem
+        The training data.
+    keys
+        One for each draw.
+    fits
+        Largest relative misfit over that of the law.
+    """
+    states = trajectories(law, problem)
+    misses = np.asarray(relative_misses(states, problem))
+    least = float(np.sqrt(np.sum(misses**2)))
+    precision = _independent(misses, np.asarray(problem.grids.sample_mask)) / max(least**2, 1e-300)
+    rebuild, acts, columns = _sensitivities(law, states, problem)
+    values, vectors = np.linalg.eigh(columns.T @ columns)
+    spread = vectors / np.sqrt(1.0 + precision * np.clip(values, 0.0, None))
+    start = np.asarray(rebuild.start)
+    found = []
+    for key in keys:
+        step = np.zeros_like(start)
+        step[acts] = spread @ np.asarray(jax.random.normal(key, (spread.shape[1],)))
+        for _ in range(_HALVINGS):
+            drawn = rebuilt(rebuild, jnp.asarray(start + step))
+            left = np.asarray(relative_misses(trajectories(drawn, problem), problem))
+            if np.max(np.abs(left)) < np.inf and np.linalg.norm(left) <= fits * least:
+                found.append(drawn)
+                break
+            step *= 0.5
+    return found
+
+
+_HALVINGS = 8
+
+
+def _told(law: TensorBasisNetwork, states, problem: TrainingProblem, precision: float) -> float:
+    """Return |w|² + ln det(1 + JᵀJ), over the weights that act."""
+    rebuild, acts, columns = _sensitivities(law, states, problem)
+    values = precision * np.linalg.eigvalsh(columns.T @ columns)
+    weights = np.asarray(rebuild.start)[acts]
+    return float(weights @ weights + np.sum(np.log1p(np.clip(values, 0.0, None))))
+
+
+def _sensitivities(
+    law: TensorBasisNetwork, states, problem: TrainingProblem
+) -> tuple[Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
+    """Return the weights of a law, which of them act, and what those change of the residuals."""
+    cloud = cloud_of(states, problem)
+    size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
+    moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
+    varies = np.any(np.asarray(law.network_mask) > 0)
+    make = Rebuild.with_network if varies else Rebuild.of_constants
+    rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
+    _, jacobian = side_by_side(rebuild.start, rebuild, problem)
+    acts = np.asarray(rebuild.moves)
+    columns = np.asarray(data_scale(problem)[..., None] * jacobian)[..., acts]
+    return rebuild, acts, columns.reshape(-1, int(np.sum(acts)))
+
+
+def _independent(misses: Float[np.ndarray, "runs n"], mask: np.ndarray) -> float:
+    """Return how many independent samples the residuals are worth."""
+    pairs = mask[:, 1:] & mask[:, :-1]
+    product = np.sum(np.where(pairs, misses[:, 1:] * misses[:, :-1], 0.0))
+    correlation = np.clip(product / max(float(np.sum(misses**2)), 1e-300), 0.0, 0.99)
+    return float(np.sum(mask) * (1.0 - correlation) / (1.0 + correlation))
