@@ -22,12 +22,12 @@ def names_of_limits(
     names
         Effects that are asked for.
     longest
-        Length of the longest run in s.
+        Length of the longest run in s; zero where all is steady, which tells no time.
     """
     return {
         effect.name: parameter.endless
         for effect in model.effects
         if effect.name in names
         for parameter, at in zip(effect.parameters, model.positions(effect.name), strict=True)
-        if parameter.endless and theta[at] >= longest
+        if parameter.endless and theta[at] >= longest > 0.0
     }

@@ -8,7 +8,8 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.discrepancy import discrepancy
+from discover.closed_loop.explanations.discrepancy import discrepancy, signatures
+from discover.closed_loop.explanations.widening import widening
 from discover.closed_loop.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
@@ -30,7 +31,8 @@ def mixed_bands(
     """Return where 95 % of the measurements should lie, were it one of the explanations.
 
     Each explanation gives a normal distribution about its prediction, as wide as its constants are
-    uncertain and as what it leaves of the fitted runs; they are mixed by their probabilities.
+    uncertain and as what it leaves of the fitted runs, and wider where that does not hold each of
+    those that is left out in turn (`widening`); they are mixed by their probabilities.
 
     Parameters
     ----------
@@ -56,13 +58,15 @@ def mixed_bands(
     parts: list[list[tuple[np.ndarray, np.ndarray, float]]] = [[] for _ in batches]
     for one, probability in zip(carried, probabilities, strict=True):
         others = [name for name in candidates if name not in one.effects]
-        lacking = discrepancy(model, fitted, one.fit, others, batches)
+        own = signatures(model, fitted, one.fit, others) if others else None
+        lacking = discrepancy(model, fitted, one.fit, others, batches, own)
         root = root_of_covariance(fitted, one.fit)[0] if one.fit.free else None
         left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
+        wider = widening(model, fitted, one.fit, own, left)
         for part, batch, square in zip(parts, batches, lacking, strict=True):
             found = _distribution(model, one.fit, root, square, left, batch)
             if found is not None:
-                part.append((*found, probability))
+                part.append((found[0], wider * found[1], probability))
     return [_limits(part, batch) for part, batch in zip(parts, batches, strict=True)]
 
 
