@@ -11,7 +11,7 @@ from discover.errors import InputError
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
 # A step of stress: over this share of the time to the next sample. A jump of the record exceeds
-# this share of its largest stress, and what is right beside it changes by less than this share of it
+# this share of its largest stress, and right beside it changes are less than this share of it
 _AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.05, 0.15
 
 
