@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
+from discover.closed_loop.explanations.growth import growth
 from discover.closed_loop.explanations.widening import widening
 from discover.dataset import Run
 from discover.effects import make_effect
@@ -48,3 +49,19 @@ def test_a_run_that_is_missed_by_more_asks_for_more():
 
 def test_slow_noise_that_differs_from_run_to_run_asks_for_more():
     assert factor(np.full(5, NOISE), 0.95) > factor(np.full(5, NOISE))
+
+
+def test_an_error_that_grows_with_the_rate_goes_on_growing():
+    rates = np.array([1.0, 2.0, 4.0])
+    found = growth(0.01 * rates**1.5, rates, np.array([2.0, 8.0]))
+    np.testing.assert_allclose(found, [1.0, 2.0**1.5])
+
+
+@pytest.mark.parametrize(
+    ("errors", "rates"),
+    [([0.03, 0.02, 0.01], [1.0, 2.0, 4.0]), ([0.01, 0.03], [1.0, 4.0]),
+     ([0.01, 0.02, 0.04], [1.0, 1.2, 1.4])],
+    ids=["it falls", "two runs", "of one speed"],
+)  # fmt: skip
+def test_an_error_not_seen_to_grow_stays(errors, rates):
+    assert growth(np.array(errors), np.array(rates), np.array([8.0])) == 1.0

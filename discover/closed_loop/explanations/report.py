@@ -83,9 +83,15 @@ def with_band(
     if not mixed:
         return [record for _, records in parts for record in records]
     told = [(held, records) for held, records in parts if held is not None]
+    every = [record for _, records in told for record in records]
+    alike = len({(one.control, one.flow, one.quantity) for one in every}) == 1
+    # of one kind of test alone does the rate say how fast it is
+    timed = alike and every[0].control == "rate"
+    rates = [np.array([np.max(np.abs(r.rate)) for r in records]) for _, records in told]
     bands = mixed_bands(
         model, batch, mixed, [of[one.effects] for one in mixed], [held for held, _ in told],
         judgement.left.noise, judgement.structured, candidates,
+        [rates[0], *rates] if timed else (),
     )  # fmt: skip
     thetas = [one.fit.theta for one in sorted(mixed, key=lambda one: [*of].index(one.effects))]
     each = [model.predictions(thetas, held) for held, _ in told]
