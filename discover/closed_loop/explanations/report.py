@@ -11,6 +11,7 @@ from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.mixture import mixed_bands
 from discover.closed_loop.explanations.weighing import explanations_of
 from discover.closed_loop.judgement import Judgement
+from discover.closed_loop.limits import names_of_limits
 from discover.closed_loop.run_record import RunRecord
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
@@ -53,7 +54,11 @@ def explain(
         records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
     errors = [errors_of(records, i) for i in range(len(thetas))]
     effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
-    return explanations_of(model, carried, errors, judgement, effective, unlisted, batch.longest)
+
+    def limits_of(one: Carried) -> dict[str, str]:
+        return names_of_limits(model, batch, runs[0], one.fit, one.effects)
+
+    return explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
 
 
 def with_band(
