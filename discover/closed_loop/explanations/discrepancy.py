@@ -20,8 +20,8 @@ def discrepancy(
     fit: Fit,
     effects: Sequence[str],
     batches: Sequence[Batch],
-    own: Float[np.ndarray, "effects runs n"] | None = None,
-) -> list[Float[np.ndarray, "runs n"]]:
+    own: Float[np.ndarray, "effects fitted m"] | None = None,
+) -> list[Float[np.ndarray, "_ _"]]:
     """Return the mean square of what small amounts of every other candidate would change.
 
     A law that holds all candidates beside the explanation, each in an amount with a Gaussian prior
