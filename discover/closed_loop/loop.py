@@ -210,7 +210,7 @@ def run_loop(
     judgement, instead = held_against_times(judgement, active, carried, times)
     for name in instead:
         search.aliases[name] = (*search.aliases.get(name, ()), FACTOR)
-    limits = names_of_limits(model, current.theta, active, batch.longest)
+    limits = names_of_limits(model, batch, fitted_runs, current, active)
     for name, other in limits.items():
         search.aliases[name] = (*search.aliases.get(name, ()), other)
     stages = tuple(

@@ -10,9 +10,9 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
-# A step of stress: over this share of the time to the next sample. A jump of the record is one
-# that exceeds this share of its largest stress, between samples that differ by less than the other
-_AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.3, 0.05
+# A step of stress: over this share of the time to the next sample. A jump of the record exceeds
+# this share of its largest stress, and right beside it changes are less than this share of it
+_AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.05, 0.15
 
 
 def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
@@ -45,8 +45,9 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
     """Return the stress at samples as what is imposed, from rest at t = 0.
 
     It goes in straight lines from sample to sample but where it jumps: at t = 0 if the first
-    samples hold one level, and between two levels (creep and recovery), where the jump comes right
-    after the last sample of the first. A jump takes a thousandth of the time to the next sample.
+    samples hold one level, and between two levels, however small the step between them (creep and
+    recovery, a staircase), where the jump comes right after the last sample of the first. A jump
+    takes a thousandth of the time to the next sample.
 
     Parameters
     ----------
@@ -68,19 +69,18 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
             f"{len(times)} samples, the largest stress {size:g} Pa. Leave the run out."
         )
     change = np.abs(np.diff(stress))
-    level = change < _LEVEL * size
     knots, levels = list(times[times > 0.0]), list(stress[times > 0.0])
     gap = float(times[1] - times[0]) if times[0] == 0.0 else float(times[0])
     begins = 0.0
-    if level[0] and abs(stress[0]) > _JUMP * size:
+    first = abs(float(stress[0]))
+    if first > _JUMP * size and change[0] < _LEVEL * first:
         begins = -_AT_ONCE * gap
         knots, levels = [begins, 0.0, *knots], [0.0, stress[0], *levels]
     else:
         knots, levels = [0.0, *knots], [stress[0] if times[0] == 0.0 else 0.0, *levels]
     for i in np.flatnonzero(change > _JUMP * size):
-        before = i == 0 or level[i - 1]
-        after = i + 1 == len(level) or level[i + 1]
-        if before and after:
+        beside = [change[k] for k in (i - 1, i + 1) if 0 <= k < len(change)]
+        if max(beside, default=0.0) < _LEVEL * change[i]:
             at = times[i] + _AT_ONCE * (times[i + 1] - times[i])
             place = int(np.searchsorted(knots, at))
             knots.insert(place, at)

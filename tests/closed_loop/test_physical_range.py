@@ -122,3 +122,5 @@ def test_a_time_that_is_open_over_decades_is_no_finding(interval, left_open):
     assert bool(undetermined(MODEL, theta, bounds, "thixotropy", 8.0)) == left_open
     # a structure that takes longer than any run to build up is known well enough
     assert not undetermined(MODEL, theta, bounds, "thixotropy", 1.0)
+    # but steady states know no time
+    assert bool(undetermined(MODEL, theta, bounds, "thixotropy", 0.0)) == left_open

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from discover.closed_loop.search import exchanging
 from planting import OUTSIDE, Noise, Planter
 
 from discover.closed_loop import run_loop
+from discover.closed_loop.search import exchanging
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.effects import named_effects
 from discover.errors import InputError

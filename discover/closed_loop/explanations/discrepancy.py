@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.optimize import fminbound
 
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
-from discover.statistics.residual import summarise
+from discover.statistics import independent_samples
 
 _DECADES = 6.0
 """By which the prior may be narrower or wider than what the best seen combination says."""
@@ -20,7 +20,8 @@ def discrepancy(
     fit: Fit,
     effects: Sequence[str],
     batches: Sequence[Batch],
-) -> list[Float[np.ndarray, "runs n"]]:
+    own: Float[np.ndarray, "effects fitted m"] | None = None,
+) -> list[Float[np.ndarray, "_ _"]]:
     """Return the mean square of what small amounts of every other candidate would change.
 
     A law that holds all candidates beside the explanation, each in an amount with a Gaussian prior
@@ -36,6 +37,8 @@ def discrepancy(
         Candidates that are not in it.
     batches
         Runs to predict; what was fitted may be one of them.
+    own
+        What the candidates do in the fitted runs (`signatures`), where that is known already.
 
     Returns
     -------
@@ -43,41 +46,51 @@ def discrepancy(
     """
     if not effects:
         return [np.zeros_like(np.asarray(batch.weight)) for batch in batches]
-    at = [model.positions(name)[0] for name in effects]
-    own = _signatures(model, fitted, fit.theta, at)
+    own = signatures(model, fitted, fit, effects) if own is None else own
+    seen = np.asarray(fitted.weight) > 0
     out = []
     for batch in batches:
-        other = own if batch is fitted else _signatures(model, batch, fit.theta, at)
-        changed = _changed(fitted, fit, own, other)
-        out.append(changed.reshape(np.asarray(batch.weight).shape))
+        other = own if batch is fitted else signatures(model, batch, fit, effects)
+        out.append(changed(fit, own, other, seen))
     return out
 
 
-def _changed(
-    fitted: Batch,
+def changed(
     fit: Fit,
-    own: Float[np.ndarray, "effects samples"],
-    other: Float[np.ndarray, "effects others"],
-) -> Float[np.ndarray, " others"]:
-    """Return the mean square change, from what each candidate does in the fitted and other runs."""
-    size = np.linalg.norm(own, axis=1)
+    own: Float[np.ndarray, "effects runs n"],
+    other: Float[np.ndarray, "effects others m"],
+    seen: Bool[np.ndarray, "runs n"],
+) -> Float[np.ndarray, "others m"]:
+    """Return the mean square change, from what each candidate does in the fitted and other runs.
+
+    Parameters
+    ----------
+    fit
+        Of the explanation.
+    own, other
+        What the candidates do (`signatures`) in the runs that were fitted, and in others.
+    seen
+        Samples by which the amounts of the candidates are told.
+    """
+    told = own[:, seen]
+    size = np.linalg.norm(told, axis=1)
     # what does nothing here, or cannot be followed, says nothing there
-    usable = (size > 0.0) & np.isfinite(size) & np.all(np.isfinite(other), axis=1)
+    finite = np.all(np.isfinite(other), axis=(1, 2))
+    usable = (size > 0.0) & np.isfinite(size) & finite
     if not np.any(usable):
-        return np.zeros(other.shape[1])
-    seen = np.asarray(fitted.weight).ravel() > 0
-    free = fit.jacobian.reshape(len(fit.free), seen.size)[:, seen]
-    residual = fit.residual.ravel()[seen]
-    scaled = own[usable] / size[usable, None]
-    design, change = scaled[:, seen].T, other[usable] / size[usable, None]
+        return np.zeros(other.shape[1:])
+    residual = fit.residual[seen]
+    design, change = (told[usable] / size[usable, None]).T, other[usable] / size[usable, None, None]
     if fit.free:
-        basis = np.linalg.qr(free.T)[0]
+        basis = np.linalg.qr(fit.jacobian[:, seen].T)[0]
         design = design - basis @ (basis.T @ design)
     # neighbours say the same: all rows together count as many as there are independent samples
-    effective = summarise(fit.residual, np.asarray(fitted.weight)).effective_samples
+    effective = sum(
+        independent_samples(row[s]) for row, s in zip(fit.residual, seen, strict=True) if np.any(s)
+    )
     mean, root = posterior(design, -residual, min(effective, float(len(residual))))
-    shift, spread = mean @ change, np.sum((root @ change) ** 2, axis=0)
-    return shift**2 + spread
+    shift = np.tensordot(mean, change, axes=1)
+    return shift**2 + np.sum(np.tensordot(root, change, axes=1) ** 2, axis=0)
 
 
 def posterior(
@@ -112,7 +125,10 @@ def posterior(
     return mean, root
 
 
-def _signatures(model, batch, theta, at) -> Float[np.ndarray, "effects samples"]:
-    residual = model.residuals([theta], batch)
-    slopes = jacobians(model, batch, [theta], residual, [tuple(at)])[0]
-    return slopes.reshape(len(at), -1)
+def signatures(
+    model: AugmentedModel, batch: Batch, fit: Fit, effects: Sequence[str]
+) -> Float[np.ndarray, "effects runs n"]:
+    """Return what a small amount of each effect changes in the weighted residuals, over it."""
+    at = tuple(model.positions(name)[0] for name in effects)
+    residual = model.residuals([fit.theta], batch)
+    return jacobians(model, batch, [fit.theta], residual, [at])[0]

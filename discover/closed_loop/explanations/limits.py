@@ -4,30 +4,59 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.forward import AugmentedModel
+from discover.closed_loop.search.augment import taken_out
+from discover.dataset import Run
+from discover.effects import ConstitutiveEffect
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
+
+DAMPING = "strain_damping"
+"""Among the aliases of an effect, that a damping function of the strain does as well."""
 
 
 def names_of_limits(
-    model: AugmentedModel, theta: np.ndarray, names: Sequence[str], longest: float
+    model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit, names: Sequence[str]
 ) -> dict[str, str]:
     """Return what effects cannot be told from, by name of the effect.
 
     A structure that builds up in a time that no run lasts is seen to break only: what it does is a
     damping by strain, and that it ever builds up, which the effect's name says, is not determined.
+    And in relaxation after steps of strain an effect that only multiplies each run by a number, to
+    within what is left, is any damping function that has these values: stress relaxation whose time
+    and strain separate tells no mechanism   [Wagner 1976, Rheol. Acta 15, 136].
 
     Parameters
     ----------
-    model, theta
-        The model and the parameters.
+    model, batch, runs
+        The model, and the fitted runs as a batch and as they are.
+    fit
+        To them.
     names
-        Effects that are asked for.
-    longest
-        Length of the longest run in s.
+        Effects in it that are asked for.
     """
-    return {
-        effect.name: parameter.endless
-        for effect in model.effects
-        if effect.name in names
-        for parameter, at in zip(effect.parameters, model.positions(effect.name), strict=True)
-        if parameter.endless and theta[at] >= longest
-    }
+    at_rest = all(run.protocol.control == "rate" and not np.any(run.rate) for run in runs)
+    found = {}
+    for effect in model.effects:
+        if effect.name not in names:
+            continue
+        for parameter, at in zip(effect.parameters, model.positions(effect.name), strict=True):
+            if parameter.endless and fit.theta[at] >= batch.longest > 0.0:
+                found[effect.name] = parameter.endless
+        if at_rest and isinstance(effect, ConstitutiveEffect):
+            theta, _ = taken_out(model, fit, effect.name)
+            if _only_factors(model, batch, fit, theta):
+                found[effect.name] = DAMPING
+    return found
+
+
+def _only_factors(model: AugmentedModel, batch: Batch, fit: Fit, without: np.ndarray) -> bool:
+    """Return whether two predictions of each run differ by a number, but for what a fit leaves."""
+    weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded) * batch.weight
+    both = np.asarray(model.residuals([fit.theta, without], batch)) + np.where(weight, recorded, 0)
+    if not np.all(np.isfinite(both)):
+        return False
+    own, other = both
+    power = np.maximum(np.sum(other**2, axis=1), np.finfo(float).tiny)
+    factor = np.sum(own * other, axis=1) / power
+    apart = np.sqrt(np.sum((own - factor[:, None] * other) ** 2, axis=1))
+    return bool(np.all(apart <= np.maximum(fit.run_errors, 1e-6)))

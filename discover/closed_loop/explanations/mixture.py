@@ -8,7 +8,9 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.discrepancy import discrepancy
+from discover.closed_loop.explanations.discrepancy import discrepancy, signatures
+from discover.closed_loop.explanations.growth import growth
+from discover.closed_loop.explanations.widening import widening
 from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
@@ -26,11 +28,13 @@ def mixed_bands(
     noise: float,
     structured: bool,
     candidates: Sequence[str],
+    rates: Sequence[Float[np.ndarray, " _"]] = (),
 ) -> list[Float[np.ndarray, "2 runs n"]]:
     """Return where 95 % of the measurements should lie, were it one of the explanations.
 
     Each explanation gives a normal distribution about its prediction, as wide as its constants are
-    uncertain and as what it leaves of the fitted runs; they are mixed by their probabilities.
+    uncertain and as what it leaves of the fitted runs, and wider where that does not hold each of
+    those that is left out in turn (`widening`); they are mixed by their probabilities.
 
     Parameters
     ----------
@@ -47,6 +51,9 @@ def mixed_bands(
         many runs say how large it is in another one, and the tails are Student's.
     candidates
         Effects that an explanation may still lack; see `discrepancy`.
+    rates
+        Largest rate of each run, of those that were fitted and then of each of `batches`; without
+        them nothing is said of what grows with the rate.
 
     Returns
     -------
@@ -56,19 +63,24 @@ def mixed_bands(
     parts: list[list[tuple[np.ndarray, np.ndarray, float]]] = [[] for _ in batches]
     for one, probability in zip(carried, probabilities, strict=True):
         others = [name for name in candidates if name not in one.effects]
-        lacking = discrepancy(model, fitted, one.fit, others, batches)
+        own = signatures(model, fitted, one.fit, others) if others else None
+        lacking = discrepancy(model, fitted, one.fit, others, batches, own)
         root = root_of_covariance(fitted, one.fit)[0] if one.fit.free else None
         left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
-        for part, batch, square in zip(parts, batches, lacking, strict=True):
-            found = _distribution(model, one.fit, root, square, left, batch)
+        wider = widening(model, fitted, one.fit, own, left)
+        faster = [np.ones(len(batch.weight)) for batch in batches]
+        if structured and rates:
+            faster = [growth(one.fit.run_errors, rates[0], other) for other in rates[1:]]
+        for part, batch, square, more in zip(parts, batches, lacking, faster, strict=True):
+            found = _distribution(model, one.fit, root, square, left * more[:, None], batch)
             if found is not None:
-                part.append((*found, probability))
+                part.append((found[0], wider * found[1], probability))
     return [_limits(part, batch) for part, batch in zip(parts, batches, strict=True)]
 
 
 def _distribution(
-    model: AugmentedModel, fit: Fit, root: np.ndarray | None, square: np.ndarray, left: float,
-    batch: Batch,
+    model: AugmentedModel, fit: Fit, root: np.ndarray | None, square: np.ndarray,
+    left: np.ndarray, batch: Batch,
 ) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
     """Return mean and standard deviation of what an explanation predicts; None if it runs away."""
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.mixture import mixed_bands
 from discover.closed_loop.explanations.weighing import explanations_of
 from discover.closed_loop.judging.before_after import errors_of, record_runs
@@ -53,7 +54,11 @@ def explain(
         records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
     errors = [errors_of(records, i) for i in range(len(thetas))]
     effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
-    return explanations_of(model, carried, errors, judgement, effective, unlisted, batch.longest)
+
+    def limits_of(one: Carried) -> dict[str, str]:
+        return names_of_limits(model, batch, runs[0], one.fit, one.effects)
+
+    return explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
 
 
 def with_band(
@@ -83,9 +88,15 @@ def with_band(
     if not mixed:
         return [record for _, records in parts for record in records]
     told = [(held, records) for held, records in parts if held is not None]
+    every = [record for _, records in told for record in records]
+    alike = len({(one.control, one.flow, one.quantity) for one in every}) == 1
+    # of one kind of test alone does the rate say how fast it is
+    timed = alike and every[0].control == "rate"
+    rates = [np.array([np.max(np.abs(r.rate)) for r in records]) for _, records in told]
     bands = mixed_bands(
         model, batch, mixed, [of[one.effects] for one in mixed], [held for held, _ in told],
         judgement.left.noise, judgement.structured, candidates,
+        [rates[0], *rates] if timed else (),
     )  # fmt: skip
     thetas = [one.fit.theta for one in sorted(mixed, key=lambda one: [*of].index(one.effects))]
     each = [model.predictions(thetas, held) for held, _ in told]

@@ -1,11 +1,10 @@
 """Probabilities of explanations, and of none of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanation, Explanations
@@ -28,7 +27,7 @@ def explanations_of(
     judgement: Judgement,
     effective_samples: float,
     unlisted: float = np.inf,
-    longest: float = np.inf,
+    limits_of: Callable[[Carried], Mapping[str, str]] = lambda one: {},
 ) -> Explanations:
     """Return the probabilities of what was carried, twins merged, the likeliest first.
 
@@ -44,8 +43,8 @@ def explanations_of(
         Independent samples of what it leaves.
     unlisted
         Criterion of what explains the records and is none of them.
-    longest
-        Length of the longest run in s; what only a longer one would show has another name too.
+    limits_of
+        Other names of effects of a set, of which the records show only a limit.
     """
     classes = _classes(carried)
     best = min(unlisted, *(one.criterion for one in carried))
@@ -59,7 +58,7 @@ def explanations_of(
     for members, share in zip(classes, shares, strict=True):
         spelled = []
         for one in (carried[i] for i in members):
-            limits = names_of_limits(model, one.fit.theta, one.effects, longest)
+            limits = limits_of(one)
             kinds |= {other: kinds[name] for name, other in limits.items()}
             spelled.append(one.effects)
             if limits:

@@ -66,7 +66,8 @@ def undetermined(
     name
         The effect.
     longest
-        Length of the longest run in s. A time beyond it that may be endless is known well enough.
+        Length of the longest run in s. A time beyond it that may be endless is known well enough,
+        but not from steady states, which know no time: there it is zero.
     """
     effect = _effect(model, name)
     for parameter, at in zip(effect.parameters, model.positions(name), strict=True):
@@ -74,7 +75,7 @@ def undetermined(
         low, high = model.low[at], model.high[at]
         amplitude = parameter is effect.parameters[0]
         endless = "high" in parameter.ends
-        if endless and parameter.unit == "s" and value >= longest:
+        if endless and parameter.unit == "s" and value >= longest > 0.0:
             continue
         touches = not endless and _reached(above, high)
         # an amplitude may be small and is then dropped; an inner constant is known from one side

@@ -1,0 +1,37 @@
+"""Steps of an imposed stress: told from a stress that only goes fast, small ones too."""
+
+import numpy as np
+import pytest
+
+from discover.protocols import imposed_stress
+from discover.protocols.control import jumps_at_start
+
+TIMES = np.linspace(0.1, 15.0, 150)
+LEVELS = np.array([6.0, 14.0, 24.0, 36.0, 60.0])
+
+
+def jumps(protocol) -> list[float]:
+    """Times after which the stress is another within a thousandth of a sample."""
+    times = np.asarray(protocol.table_times)
+    return [round(float(t), 2) for t in times[:-1][np.diff(times) < 1e-3]]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_staircase_of_stress_is_made_of_jumps(noise):
+    staircase = LEVELS[np.minimum((TIMES - 0.05) // 3.0, 4).astype(int)]
+    wobble = noise * staircase * np.random.default_rng(0).standard_normal(150)
+    found = imposed_stress(TIMES, staircase + wobble)
+    assert jumps_at_start(found)
+    # after the last sample at the old stress; the first one ends at 0
+    assert [t for t in jumps(found) if t > 0.05] == [3.0, 6.0, 9.0, 12.0]
+
+
+@pytest.mark.parametrize(
+    "stress",
+    [60.0 * np.sin(TIMES), 60.0 * np.sin(12.0 * TIMES), 4.0 * TIMES, 30.0 * TIMES**0.5],
+    ids=["slow wave", "five samples a cycle", "ramp", "bent ramp"],
+)
+def test_a_stress_that_only_goes_fast_does_not_jump(stress):
+    found = imposed_stress(TIMES, stress)
+    assert not jumps_at_start(found)
+    assert jumps(found) == []
