@@ -33,10 +33,10 @@ def run_loop_on_each(
 ) -> LoopResult:
     """Close the loop on all runs, and judge it by loops that each leave one run out.
 
-    What is found, and the verdict, come from all runs. The held-out errors are means over loops
-    that search afresh without one run, so that neither its stress nor the choice of effects has
-    seen it   [Stone 1974, J. R. Stat. Soc. B 36, 111]. They judge the way of finding a law rather
-    than the one law found, and that the loops find the same effects is part of the judgement.
+    What is found comes from all runs. The held-out errors are means over loops that search afresh
+    without one run, so that neither its stress nor the choice of effects has seen it   [Stone 1974,
+    J. R. Stat. Soc. B 36, 111]. They judge the way of finding a law rather than the one law found,
+    and so does the verdict: see `judged_by`.
 
     Parameters
     ----------
@@ -89,10 +89,45 @@ def run_loop_on_each(
         found = tuple(stage.effect for stage in part.stages)
         folds.append(Fold(name, part.verdict, found, before, after))
     return replace(
-        whole,
+        judged_by(whole, folds),
         error_before=_with_folds(whole.error_before, [fold.error_before for fold in folds]),
         error_after=_with_folds(whole.error_after, [fold.error_after for fold in folds]),
         folds=tuple(folds),
+    )
+
+
+def judged_by(whole: LoopResult, folds: Sequence[Fold]) -> LoopResult:
+    """Return the result of all runs, unexplained where most loops that left one out are.
+
+    A verdict is a claim about runs that nobody has seen, and only these loops had one. Of n, k of
+    which fail, the next fails with probability (k + 1)/(n + 2), by Laplace's rule of succession;
+    *none of these* is no less probable.
+
+    Parameters
+    ----------
+    whole
+        Of the loop on all runs.
+    folds
+        Of the loops that left one out.
+    """
+    against = sum(fold.verdict == "unexplained" for fold in folds)
+    if whole.verdict not in ("effects_added", "no_effect_needed") or 2 * against <= len(folds):
+        return whole
+    text = (
+        f"{whole.remaining['description']} But of {len(folds)} searches that each left one run out "
+        f"{against} end in unexplained: what was found does not carry over to a run that it has "
+        "not seen. Some effect is still missing, or has another form."
+    )
+    return replace(
+        whole,
+        verdict="unexplained",
+        remaining={
+            **whole.remaining,
+            "structured": True,
+            "carries_over": False,
+            "description": text,
+        },
+        explanations=whole.explanations.doubted((against + 1) / (len(folds) + 2)),
     )
 
 

@@ -1,7 +1,7 @@
 """What a closed loop says of several explanations."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -62,6 +62,20 @@ class Explanations:
         asked = set(effects)
         found = (e for e in self.likeliest_first if any(set(m) == asked for m in e.members))
         return next(found, None)
+
+    def doubted(self, unexplained: float) -> "Explanations":
+        """Return them with *none of these* no less probable than a number from 0 to 1."""
+        if unexplained <= self.unexplained_probability:
+            return self
+        share = (1.0 - unexplained) / (1.0 - self.unexplained_probability)
+        return Explanations(
+            tuple(
+                replace(one, probability=share * one.probability) for one in self.likeliest_first
+            ),
+            unexplained,
+            {name: share * value for name, value in self.inclusion.items()},
+            {kind: share * value for kind, value in self.inclusion_by_kind.items()},
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``loop.json`` holds of them."""
