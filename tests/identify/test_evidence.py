@@ -111,11 +111,11 @@ class FakeSearch(SupportSearch):
 
 
 def test_the_rule_keeps_ties_and_drops_what_the_data_rule_out(monkeypatch):
-    from discover.identify import rivals
+    from discover.identify.rivals import fitted_rivals
     from discover.learners.tensor_sindy.refit import Fit
     from tensor_library import build_library
 
-    monkeypatch.setattr(rivals, "_polish", lambda search, fits: fits)
+    monkeypatch.setattr(fitted_rivals, "_polish", lambda search, fits: fits)
     shape = (2, N // 2, 3)
     weight = np.zeros(shape)
     weight[..., 0] = 1.0 / np.sqrt(N)
@@ -141,7 +141,7 @@ def test_the_rule_keeps_ties_and_drops_what_the_data_rule_out(monkeypatch):
         fit((1, 4), 0.001 * wave),
     )
     search = FakeSearch(problem, {f.support: f for f in (chosen, tie, wrong, near, larger)})
-    table = rivals.find_rivals(search, chosen)
+    table = fitted_rivals.find_rivals(search, chosen)
     names = [next(iter(r.law.coefficients)) for r in table.rivals]
     # a tie, and one that differs by far less than the noise; not the wrong one, not the larger one
     assert names == ["gammadot.gammadot", "gammadot"]
