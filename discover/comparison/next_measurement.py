@@ -55,7 +55,9 @@ class IdentifiabilityCell:
         chosen, rivals = proposal.curves[0], proposal.curves[1:]
         size = np.sqrt(np.mean(chosen**2, axis=0))
         size[2] = size[1]
-        furthest = np.max(np.sqrt(np.mean((rivals - chosen) ** 2, axis=1)), axis=0, initial=0.0)
+        with np.errstate(over="ignore", invalid="ignore"):  # a rival may run away
+            apart = np.sqrt(np.mean((rivals - chosen) ** 2, axis=1))
+        furthest = np.max(apart, axis=0, initial=0.0)
         share = furthest / np.maximum(size, 1e-300)
         difference = {
             name: float(value) if np.isfinite(value) else None

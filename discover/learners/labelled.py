@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.learners.run_prediction import as_runs
+from discover.learners.runs import as_runs
 
 if TYPE_CHECKING:
     import xarray

@@ -10,14 +10,10 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.material_functions import at_measured_rate
 from discover.dataset.run import Run
-from discover.errors import InputError
-from discover.first_use import require_double
 from discover.learners.estimator_file import EstimatorFile, write_estimator
 from discover.learners.provenance import Provenance
-from discover.learners.settings import PerMode
-from discover.protocols import settled
+from discover.learners.runs import as_runs
 
 if TYPE_CHECKING:
     import xarray
@@ -25,43 +21,6 @@ if TYPE_CHECKING:
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
     from discover.learners.result import LearnerResult
-
-
-def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
-    """Return the runs as a list, each as one that follows a rate in time.
-
-    One at a given stress follows its measured rate. One that starts periodic gets as many cycles
-    before it as the longest relaxation time, of these in s, needs.
-
-    Raises
-    ------
-    InputError
-        If there is none, one is something else or follows no rate (a flow curve, a creep test), a
-        mode is too slow to become periodic, or JAX computes in single precision.
-    """
-    require_double()
-    if isinstance(runs, Run):
-        raise InputError(
-            f"A learner takes several runs; got the single run {runs.name!r}. Put it in a list: "
-            "fit([run])."
-        )
-    if isinstance(runs, str) or not isinstance(runs, Iterable):
-        raise InputError(
-            f"A learner takes a data set or a sequence of Run; got a {type(runs).__name__}. "
-            "Load a folder with load_dataset."
-        )
-    listed = list(runs)
-    if not listed:
-        raise InputError("A learner needs at least one run; got none.")
-    for run in listed:
-        if not isinstance(run, Run):
-            raise InputError(
-                f"A learner takes a sequence of Run; got a {type(run).__name__}. Load a "
-                "folder or make a synthetic data set."
-            )
-    longest = float(np.max(np.asarray(relaxation_time)))
-    followed = [at_measured_rate(run) for run in listed]
-    return [replace(run, protocol=settled(run.protocol, longest)) for run in followed]
 
 
 class RunPrediction:

@@ -190,7 +190,7 @@ def test_the_comparison_refuses_moduli(tmp_path):
 
 
 def test_an_estimator_refuses_a_flow_curve_and_follows_the_rate_of_a_given_stress(tmp_path):
-    from discover.learners.run_prediction import as_runs
+    from discover.learners.runs import as_runs
 
     curve = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
     with pytest.raises(InputError, match="is a flow curve"):

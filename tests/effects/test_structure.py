@@ -7,7 +7,7 @@ import pytest
 from independent import Structured, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
-from discover.closed_loop.loop import _candidates
+from discover.closed_loop.candidates import candidates_of
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
@@ -182,7 +182,7 @@ def test_with_a_power_of_one_the_modulus_follows_moores_equation():
 
 @pytest.mark.parametrize("asked", [None, "named"])
 def test_a_loop_that_is_not_asked_for_a_structure_tries_moores_alone(asked):
-    names = {effect.name for effect in _candidates(asked)}
+    names = {effect.name for effect in candidates_of(asked)}
     assert "thixotropy" in names
     assert names.isdisjoint(FAMILY)
-    assert [effect.name for effect in _candidates(list(FAMILY))] == list(FAMILY)
+    assert [effect.name for effect in candidates_of(list(FAMILY))] == list(FAMILY)

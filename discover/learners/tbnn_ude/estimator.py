@@ -21,7 +21,8 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.run_prediction import RunPrediction
+from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.evidence import surprises

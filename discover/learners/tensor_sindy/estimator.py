@@ -19,7 +19,8 @@ from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.run_prediction import RunPrediction, as_runs
+from discover.learners.run_prediction import RunPrediction
+from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.learners.run_prediction import as_runs
+from discover.learners.runs import as_runs
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from tensor_library.library import TermLibrary
