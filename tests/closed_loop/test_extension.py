@@ -50,6 +50,7 @@ def test_a_mobility_is_found_in_extension_alone(base, kind):
     assert loop.error_after.fit == pytest.approx(0.01, rel=0.2)
 
 
+@pytest.mark.slow
 def test_nothing_is_found_where_the_declared_law_made_the_extension(base):
     loop = dc.close_loop(extension("uniaxial", 0.0), base, explanations=1)
     assert loop.verdict == "no_effect_needed"

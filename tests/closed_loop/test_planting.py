@@ -93,6 +93,7 @@ def names(result):
     return [{stage.effect, *stage.aliases} for stage in result.stages]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 def test_nothing_is_named_in_data_without_a_flaw(planter, correlation):
     for seed in (1, 2):

@@ -137,6 +137,7 @@ def test_both_learners_see_the_records_without_the_gain(weak, with_gain):
                 assert found.errors(name, flow)["sigma12"] == pytest.approx(0.01, rel=0.35)
 
 
+@pytest.mark.slow
 def test_without_the_gain_the_same_law_misses_by_it(weak):
     found = compared(weak)
     (flow,) = found.judged
@@ -144,6 +145,7 @@ def test_without_the_gain_the_same_law_misses_by_it(weak):
     assert found.to_json()["learners"]["tensor_sindy"]["constants"] == {}
 
 
+@pytest.mark.slow
 def test_the_constants_stand_in_the_results_with_what_is_known_of_them(with_gain):
     learners = with_gain.to_json()["learners"]
     sparse, network = (learners[n]["constants"] for n in ("tensor_sindy", "tbnn_ude"))

@@ -21,6 +21,7 @@ FLUIDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FLUIDS)
 def test_a_loop_names_what_is_in_the_fluid_and_no_structure_with_more_constants(name):
     generator = np.random.default_rng(0)

@@ -61,6 +61,7 @@ def test_members_differ_in_their_tensors_and_in_their_weights(first, others):
     assert not np.allclose(weights[0], weights[2])
 
 
+@pytest.mark.slow
 def test_every_member_learns(problem, first, others):
     misfits = member_misfits([first.law, *(member.law for member in others)], problem)
     assert np.all(misfits[1:] < 0.2 * misfits[0])

@@ -195,6 +195,7 @@ def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
     assert model.result_.details["recipe"] == "PaperRecipe"
 
 
+@pytest.mark.slow
 def test_an_absurd_learning_rate_is_survived(giesekus_problem):
     recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=50.0)
     law, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)

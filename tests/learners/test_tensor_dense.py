@@ -51,6 +51,7 @@ def maxwell():
     return fitted(UpperConvectedMaxwell())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [Giesekus(0.6), RoliePoly(1.0, 0.1)], ids=["inside", "outside"])
 def test_bands_hold_an_unseen_flow_of_a_law_inside_the_library_and_of_one_outside(law):
     inside, width = inside_and_width(fitted(law), law)
