@@ -96,6 +96,21 @@ def thin_sweep(
     return keep, note
 
 
+def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
+    """Return which of n samples to keep so that at most so many stay, evenly in their order.
+
+    Parameters
+    ----------
+    n
+        How many there are.
+    most
+        How many may stay, 2 or more.
+    """
+    keep = np.zeros(n, dtype=bool)
+    keep[np.unique(np.round(np.linspace(0, n - 1, min(n, most))).astype(int))] = True
+    return keep
+
+
 def thin_run(run: Run, most: int) -> Run:
     """Return a run with at most so many of its samples, evenly chosen in their order.
 
@@ -112,8 +127,7 @@ def thin_run(run: Run, most: int) -> Run:
     n = len(run)
     if n <= most:
         return run
-    keep = np.zeros(n, dtype=bool)
-    keep[np.unique(np.round(np.linspace(0, n - 1, most)).astype(int))] = True
+    keep = evenly_chosen(n, most)
     thinned = run.window(keep)
     sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
     if (

@@ -1,6 +1,8 @@
 """What a residual is made of: noise, or structure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -77,8 +79,16 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
     """
     if len(values) < FEWEST_FAST:
         return 0.0
-    # the coefficients 1, 3, 3, 1 have a sum of squares of 20
-    return float(1.4826 * np.median(np.abs(np.diff(values, 3))) / np.sqrt(20.0))
+    return _median_difference([values], 3)
+
+
+def _median_difference(rows: Sequence[Float[np.ndarray, " _"]], order: int) -> float:
+    """Return the standard deviation that differences of an order in all rows tell of white noise.
+
+    The sum of squares of their coefficients is that of binomial ones: 20 for 1, 3, 3, 1.
+    """
+    differences = np.concatenate([np.diff(row, order) for row in rows])
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(comb(2 * order, order)))
 
 
 def noise_floor(
@@ -121,9 +131,7 @@ def _pooled_fast_part(
     median of those of one run alone, would take a misfit for noise.
     """
     rows = [r[w > 0] * np.sqrt(np.count_nonzero(w)) for r, w in zip(residual, weight, strict=True)]
-    differences = np.concatenate([np.diff(row, 4) for row in rows])
-    # the coefficients 1, 4, 6, 4, 1 have a sum of squares of 70
-    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(70.0))
+    return _median_difference(rows, 4)
 
 
 def _limited_size(values: Float[np.ndarray, " n"]) -> float:

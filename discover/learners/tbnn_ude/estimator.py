@@ -14,6 +14,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
+from discover.dataset.thinning import evenly_chosen
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
@@ -183,7 +184,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         recipe = self._recipe()
         problem, fitted = _problem(runs, known), ""
         if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
-            fewer = [_thinned(run, recipe.samples) for run in runs]
+            fewer = [run.window(evenly_chosen(len(run), recipe.samples)) for run in runs]
             if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
                 problem = _problem(fewer, known)
                 fitted = f"at most {recipe.samples} samples of a run were fitted"
@@ -301,19 +302,6 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         misfit = float(np.linalg.norm(np.asarray(law_misfit(law, problem))))
         message = f"the paper's recipe, {losses.size} iterations; relative misfit {misfit:.2g}"
         return Trained(law, law, losses, misfit, True, message)
-
-
-def _thinned(run: Run, most: int) -> Run:
-    """Return a run of no more samples than these, evenly spread over those it has."""
-    if len(run) <= most:
-        return run
-    kept = np.unique(np.linspace(0, len(run) - 1, most).round().astype(int))
-    sampled = {
-        name: value[kept]
-        for name, value in vars(run).items()
-        if isinstance(value, np.ndarray) and value.shape == (len(run),)
-    }
-    return replace(run, **sampled)
 
 
 def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
