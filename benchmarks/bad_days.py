@@ -82,7 +82,8 @@ def write(case: Case, noisy: Runs, folder: Path) -> dict[str, Path]:
 @contextmanager
 def without_pages() -> Iterator[None]:
     """Write JSON and predictions alone: to draw a page takes as long as to decide."""
-    from discover.report import comparison_report, loop_report
+    from discover.report.comparison import report as comparison_report
+    from discover.report.loop import report as loop_report
     from discover.report.predictions import (
         comparison_predictions,
         loop_predictions,

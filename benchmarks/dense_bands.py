@@ -134,8 +134,8 @@ def dense_bands(runs, unseen):
 
 def sparse_bands(runs, unseen):
     """Return the bands of the sparse law with its rivals."""
-    from discover.comparison.next_measurement import contenders
-    from discover.comparison.training import searched
+    from discover.comparison.fitting.training import searched
+    from discover.comparison.judging.next_measurement import contenders
     from discover.identify.rivals.bands import prediction_bands
     from discover.learners.tensor_sindy import TensorSINDy
     from tensor_library import build_library

@@ -7,11 +7,11 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.flows import QUANTITIES
+from discover.comparison.outcomes.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
-from discover.report.plots.flows import curves, last_cycle
+from discover.report.plots.comparison.flows import curves, last_cycle
 from discover.report.plots.style import Picture, figure, legend_above, picture
 from discover.report.wording import FIGURE_SYMBOLS
 from discover.study.read import read_study

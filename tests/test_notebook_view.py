@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.equations import Box, Equation, EquationTerm
 from discover.equations import Tested as WhereTested
 from discover.identify import (

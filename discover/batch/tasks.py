@@ -105,8 +105,8 @@ def run_compare(
     if there is not None:
         return there
     from discover.comparison.run_comparison import compare
-    from discover.report.comparison_report import write_comparison
-    from discover.report.comparison_verdict import comparison_verdict
+    from discover.report.comparison.report import write_comparison
+    from discover.report.comparison.verdict import comparison_verdict
     from discover.report.overlay import comparison_overlays, read_overlays
     from discover.study.build import declared_model, load_study_data
 
@@ -142,9 +142,9 @@ def run_close_loop(
         return there
     from discover.closed_loop import run_loop, run_loop_on_each
     from discover.dataset.conditions import material_and_temperature
-    from discover.report.loop_report import write_loop
+    from discover.report.loop.report import write_loop
+    from discover.report.loop.verdict import loop_verdict
     from discover.report.overlay import loop_overlays, read_overlays
-    from discover.report.verdicts import loop_verdict
     from discover.study.build import declared_model, forward_model, load_study_data
 
     progress("loading data", 0.0)

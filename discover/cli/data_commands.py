@@ -97,7 +97,7 @@ def show(
 def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
     """Write the page on a data folder and a first study beside it; return the page's path."""
     from discover.dataset.checking.folder import check_folder
-    from discover.report.data_page import data_page, first_study
+    from discover.report.data.page import data_page, first_study
     from discover.study.atomic import make_folder, write_text
 
     here = Path(name)
@@ -160,7 +160,7 @@ def shift(
     from discover.dataset.linear_agreement import linear_agreements
     from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.dataset.superposition import read_temperatures, shift_table, superpose
-    from discover.report.superposition_page import (
+    from discover.report.data.superposition import (
         agreement_words,
         superposition_page,
         superposition_words,

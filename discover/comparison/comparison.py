@@ -6,16 +6,16 @@ from typing import Any
 
 import pandas as pd
 
-from discover.comparison.classical import ClassicalFit
 from discover.comparison.equations import outcome_equation
-from discover.comparison.explanation import Explanation
-from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
-from discover.comparison.identifiability import Rival
-from discover.comparison.next_measurement import NextMeasurement
-from discover.comparison.outcome import LearnerOutcome, plain
-from discover.comparison.range import Placement, place
-from discover.comparison.statements import IN_LIBRARY, Statement
-from discover.comparison.truth import TrueTerm
+from discover.comparison.fitting.classical import ClassicalFit
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import Rival
+from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.outcomes.flows import Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.outcomes.outcome import LearnerOutcome, plain
+from discover.comparison.outcomes.range import Placement, place
+from discover.comparison.outcomes.truth import TrueTerm
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.structure.structure import Structure

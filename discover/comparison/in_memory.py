@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any, overload
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.fitting.training import searched
 from discover.comparison.run_comparison import compare as compare_study
-from discover.comparison.training import searched
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid

@@ -4,29 +4,29 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from discover.comparison.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.comparison import Comparison, SweepPoint
-from discover.comparison.constant import in_words as in_words_of
-from discover.comparison.dense_library import open_where_dense_is_wide
-from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
-from discover.comparison.explanation import Explanation, explain
-from discover.comparison.flows import comparison_flows
-from discover.comparison.identifiability import (
+from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
+from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
+from discover.comparison.fitting.training import study_library, train
+from discover.comparison.instrument import Frame, Learned, classical_along
+from discover.comparison.instrument.known import Known
+from discover.comparison.instrument.known import known_part as _known
+from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
+from discover.comparison.judging.explanation import Explanation, explain
+from discover.comparison.judging.identifiability import (
     find_rivals,
     physics_of,
     structure_of,
 )
-from discover.comparison.instrument import Frame, Learned, classical_along
-from discover.comparison.known import Known
-from discover.comparison.known import known_part as _known
-from discover.comparison.next_measurement import NextMeasurement, next_measurement
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.sampled_rates import left_by_sampled_rates
-from discover.comparison.statements import make_statements
-from discover.comparison.training import study_library, train
-from discover.comparison.truth import TrueTerm, true_terms
-from discover.comparison.unseen_runs import hold_against_unseen
+from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.judging.statements import make_statements
+from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.constant import in_words as in_words_of
+from discover.comparison.outcomes.flows import comparison_flows
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcomes.truth import TrueTerm, true_terms
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.dataset.material_functions import at_measured_rate

@@ -7,8 +7,8 @@ from typing import Any
 
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
-from discover.report.comparison_report import write_comparison
-from discover.report.loop_report import write_loop
+from discover.report.comparison.report import write_comparison
+from discover.report.loop.report import write_loop
 from discover.report.page import made_by
 from discover.study.run_folder import RunFolder
 

@@ -9,7 +9,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.closed_loop import RunRecord
-from discover.comparison.flows import QUANTITIES, Flow, predict
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
 from discover.dataset.table import read_table, shown
 from discover.errors import InputError

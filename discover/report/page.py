@@ -113,3 +113,8 @@ def _environment() -> Environment:
         as_link=_as_link,
     )
     return environment
+
+
+def safe_name(name: str) -> str:
+    """Return a file name without anything that a file system could take amiss."""
+    return "".join(c if c.isalnum() or c in "._-" else "_" for c in name)[:100]

@@ -8,7 +8,7 @@ import pandas as pd
 
 from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
-from discover.comparison.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.learners.registry import BANDS_ONLY
 from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder

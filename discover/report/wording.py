@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import MODULI
 
@@ -233,3 +233,7 @@ def selection_sentence(outcome: LearnerOutcome) -> str:
 def chosen_names(support: Sequence[str]) -> list[str]:
     """Return the terms of a support in the field's letters."""
     return [readable(name) for name in support] or ["no term"]
+
+
+QUESTIONS = ("What was found", "How sure", "What to measure next")
+"""What the three sentences of every verdict answer, in order."""

@@ -49,7 +49,7 @@ def trained(monkeypatch):
 def undrawn(monkeypatch):
     """Pages without pictures, where what a command does with its page is asked and not the page."""
     monkeypatch.setattr(
-        "discover.report.comparison_report.comparison_pictures", lambda *_: ([], [])
+        "discover.report.comparison.report.comparison_pictures", lambda *_: ([], [])
     )
 
 
@@ -102,7 +102,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     assert law["tested"]["judged_in"]["De"][1] == 1.5
     before = (out / "comparison.json").read_bytes()
     with monkeypatch.context() as patch:
-        patch.setattr("discover.report.comparison_report.comparison_pictures", lambda *_: ([], []))
+        patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))
         fresh = invoke("compare", study, "--out", out, "--overwrite", "--json")
     assert len(trained) == 4
     assert json.loads(fresh.stdout) == json.loads(before)

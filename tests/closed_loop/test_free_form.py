@@ -11,7 +11,7 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.closed_loop.results.free_curve import nearest_form
-from discover.report.verdicts import loop_verdict
+from discover.report.loop.verdict import loop_verdict
 
 MODULUS, TIME, NOISE, LIMIT = 100.0, 1.0, 0.01, 60.0
 FLOWS = {

@@ -10,7 +10,7 @@ from independent.rolie_poly import RoliePoly
 
 import discover as dc
 from discover.errors import InputError
-from discover.report.verdicts import loop_verdict
+from discover.report.loop.verdict import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005

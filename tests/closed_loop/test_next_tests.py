@@ -10,7 +10,7 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.closed_loop import NextTest, NextTests
 from discover.closed_loop.results.next_test import DECISIVE, entropy
-from discover.report.verdicts import loop_verdict
+from discover.report.loop.verdict import loop_verdict
 
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 TRUTH = Giesekus(0.5, 100.0, 1.0)

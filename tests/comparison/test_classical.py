@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.comparison.classical import CLASSICAL, fit_classical_laws
-from discover.comparison.flows import Flow
+from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
+from discover.comparison.outcomes.flows import Flow
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.study.build import DeclaredModel

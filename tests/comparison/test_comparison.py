@@ -8,11 +8,11 @@ import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
-from discover.comparison.explanation import Explanation
-from discover.comparison.flows import comparison_flows, predict
-from discover.comparison.identifiability import find_rivals
-from discover.comparison.statements import make_statements
-from discover.comparison.truth import true_terms
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import find_rivals
+from discover.comparison.judging.statements import make_statements
+from discover.comparison.outcomes.flows import comparison_flows, predict
+from discover.comparison.outcomes.truth import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
@@ -172,7 +172,7 @@ def test_rivals_of_other_terms_are_simulated_in_one_program(slip_case, monkeypat
         simulated.append((fluid, flow, predict(fluid, flow)))
         return simulated[-1][-1]
 
-    monkeypatch.setattr("discover.comparison.identifiability.predict", watched)
+    monkeypatch.setattr("discover.comparison.judging.identifiability.predict", watched)
     known = {flow.key: predict(model.fluid, flow) for flow in flows}
     rivals = find_rivals(chosen, met, model, flows, build_library(degree=0), known)
     assert {frozenset(r.terms) for r in rivals} >= {frozenset(row["support"]) for row in met}

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.comparison.dense_library import open_where_dense_is_wide
-from discover.comparison.flows import Flow
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid
 from discover.laws.giesekus import Giesekus
 from discover.learners import LearnerResult

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from discover.comparison.disagreement import contested, disagreements, open_where_contested
-from discover.comparison.flows import Flow
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols import start_up
 

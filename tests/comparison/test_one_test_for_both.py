@@ -8,9 +8,9 @@ from discover.closed_loop.judging.judgement import judge
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.silence import records_are_silent
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.comparison.explanation import explain
-from discover.comparison.flows import Flow
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.judging.explanation import explain
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch

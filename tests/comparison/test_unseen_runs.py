@@ -7,10 +7,10 @@ import pytest
 from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
-from discover.comparison.explanation import explain
-from discover.comparison.flows import Flow
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.unseen_runs import hold_against_unseen
+from discover.comparison.judging.explanation import explain
+from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
 from discover.protocols import start_up as protocol
 from discover.statistics.residual import Expectation

@@ -11,7 +11,7 @@ from discover.dataset import load_dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.superposition import superpose
 from discover.errors import InputError
-from discover.report.superposition_page import superposition_words
+from discover.report.data.superposition import superposition_words
 
 OMEGA = np.geomspace(0.1, 100.0, 25)
 CELSIUS = np.arange(100.0, 200.0, 15.0)

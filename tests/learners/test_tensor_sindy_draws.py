@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.comparison.next_measurement import contenders
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.judging.next_measurement import contenders
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.run import Run
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.learners.tensor_sindy.deviance import draws_of_fit

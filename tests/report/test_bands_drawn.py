@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.flows import Flow
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
-from discover.report.plots.flows import _draw_band
+from discover.report.plots.comparison.flows import _draw_band
 
 TIMES = np.arange(5.0)
 FLOW = Flow("startup", "test", start_up(2.0), TIMES, np.full(5, 2.0), {})

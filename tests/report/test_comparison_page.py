@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from discover.comparison import Comparison, Flow, LearnerOutcome
-from discover.comparison.explanation import Explanation
-from discover.comparison.identifiability import Rival
-from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import Rival
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import oscillatory_shear
-from discover.report.comparison_report import write_comparison
-from discover.report.comparison_tables import error_rows
-from discover.report.comparison_verdict import comparison_verdict
+from discover.report.comparison.report import write_comparison
+from discover.report.comparison.tables import error_rows
+from discover.report.comparison.verdict import comparison_verdict
 from discover.report.parts import Missing, attempt
-from discover.report.verdicts import QUESTIONS
 from discover.report.wording import (
+    QUESTIONS,
     estimate,
     interval,
     percent,
@@ -111,7 +111,7 @@ def page_of(comparison, folder):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Leave pictures out where only words are asked for."""
-    module = "discover.report.comparison_report.comparison_pictures"
+    module = "discover.report.comparison.report.comparison_pictures"
     monkeypatch.setattr(module, lambda *_: ([], []))
 
 
@@ -153,8 +153,8 @@ def test_a_part_that_cannot_be_drawn_is_one_sentence_and_the_others_are_drawn(
     def broken(*args):
         raise TypeError("'<' not supported\nbetween instances of 'NoneType' and 'float'.")
 
-    monkeypatch.setattr("discover.report.comparison_tables.error_rows", broken)
-    monkeypatch.setattr("discover.report.comparison_pictures.selection_picture", broken)
+    monkeypatch.setattr("discover.report.comparison.tables.error_rows", broken)
+    monkeypatch.setattr("discover.report.comparison.pictures.selection_picture", broken)
     page = page_of(made_up(), tmp_path / "broken")
     why = "TypeError, '<' not supported between instances of 'NoneType' and 'float'."
     for part in ("The table of errors", "The picture of the selection"):
@@ -168,7 +168,7 @@ def test_numbers_are_written_before_the_page(tmp_path, no_pictures, monkeypatch)
     def broken(*args, **content):
         raise RuntimeError
 
-    monkeypatch.setattr("discover.report.comparison_report.render", broken)
+    monkeypatch.setattr("discover.report.comparison.report.render", broken)
     with pytest.raises(RuntimeError):
         write_comparison(made_up(), RunFolder(tmp_path, "x"), True)
     assert json.loads((tmp_path / "comparison.json").read_text("utf-8"))["verdict"] == "explained"

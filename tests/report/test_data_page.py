@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from discover.cli.app import app
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
-from discover.report.data_page import data_page, first_study
+from discover.report.data.page import data_page, first_study
 from discover.study import parse_study
 from discover.study.build import declared_model, load_study_data
 

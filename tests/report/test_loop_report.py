@@ -21,14 +21,18 @@ from discover.closed_loop.results.loop_result import (
     StageParameter,
 )
 from discover.effects import make_effect
-from discover.report.loop_report import _noise_range, write_loop
+from discover.report.loop.report import write_loop
+from discover.report.loop.tables import noise_range
+from discover.report.loop.verdict import loop_verdict
 from discover.report.page import render
 from discover.report.plots.cycles import in_last_cycle
-from discover.report.plots.loop import residual_picture, run_error_picture, runs_picture
-from discover.report.plots.loop_lissajous import lissajous_picture
+from discover.report.plots.loop.errors import run_error_picture
+from discover.report.plots.loop.lissajous import lissajous_picture
+from discover.report.plots.loop.residual import residual_picture
+from discover.report.plots.loop.rivals import rivals_picture
+from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
-from discover.report.plots.rivals import rivals_picture
-from discover.report.verdicts import QUESTIONS, loop_verdict
+from discover.report.wording import QUESTIONS
 from discover.study import RunFolder
 
 
@@ -308,12 +312,12 @@ def test_nothing_is_called_augmented_where_nothing_was_added():
 
 def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residuals():
     given = loop_result()
-    assert _noise_range(given) is None  # 0.5 % that somebody gave: no run has it
+    assert noise_range(given) is None  # 0.5 % that somebody gave: no run has it
     residual = given.records[0].relative_residual[-1]
     noise = float(np.sqrt(np.mean(residual**2)))
     fitted = replace(given.records[0], name="second.csv")
     estimated = replace(given, records=(*given.records, fitted), noise_floor=noise)
-    assert _noise_range(estimated) == pytest.approx([noise, noise])
+    assert noise_range(estimated) == pytest.approx([noise, noise])
 
 
 def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path):

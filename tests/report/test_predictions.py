@@ -8,9 +8,9 @@ import pytest
 
 from discover.closed_loop import ErrorPair, LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
-from discover.comparison.flows import Flow
-from discover.comparison.next_measurement import NextMeasurement
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.report.predictions import (

@@ -14,31 +14,32 @@ import pytest
 from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import compare
-from discover.comparison.next_measurement import NextMeasurement
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.effects import library_effects, named_effects
 from discover.effects.library_term import library_term
 from discover.equations.mathml import law_element, term_element
 from discover.identify.rivals.bands import PredictionBand
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.report.comparison_report import safe_name, write_comparison
-from discover.report.comparison_tables import error_rows
-from discover.report.comparison_verdict import comparison_verdict
+from discover.report.comparison.report import write_comparison
+from discover.report.comparison.tables import error_rows
+from discover.report.comparison.verdict import comparison_verdict
 from discover.report.mathtext import formula, plain
+from discover.report.page import safe_name
 from discover.report.palette import style_sheet
-from discover.report.plots.flows import curves, flow_picture, training_picture
-from discover.report.plots.pipkin import (
+from discover.report.plots.comparison.flows import curves, flow_picture, training_picture
+from discover.report.plots.comparison.pipkin import (
     differences,
     error_map_picture,
     identifiability_picture,
 )
+from discover.report.plots.comparison.selection import selection_picture
+from discover.report.plots.comparison.studies import third_harmonic
 from discover.report.plots.residual_map import comparison_residual_map
-from discover.report.plots.selection import selection_picture
-from discover.report.plots.studies import third_harmonic
 from discover.report.plots.style import SPARSE
-from discover.report.verdicts import QUESTIONS
 from discover.report.wording import (
+    QUESTIONS,
     percent,
     readable,
     selection_sentence,
@@ -384,8 +385,8 @@ def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
 
 def test_reports_leave_a_notebook_its_pictures():
     """Reports once changed matplotlib's backend, and a notebook showed no picture from then on."""
-    code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison_report; "
-    code += "import discover.report.loop_report, discover.report.mathtext as m, sys; "
+    code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison.report; "
+    code += "import discover.report.loop.report, discover.report.mathtext as m, sys; "
     code += "assert '<svg' in m.formula('x^2', 'a'); print(matplotlib.get_backend()); "
     code += "print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -5,10 +5,16 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from discover.comparison.classical import CLASSICAL, FLOOR, ClassicalFit, contender, parameter_of
-from discover.comparison.flows import Flow, of_recorded, predict, relative_errors
+from discover.comparison.fitting.classical import (
+    CLASSICAL,
+    FLOOR,
+    ClassicalFit,
+    contender,
+    parameter_of,
+)
 from discover.comparison.instrument.fitted_along import CLASSICAL_EFFECTS, FittedAlong
 from discover.comparison.instrument.frame import Frame
+from discover.comparison.outcomes.flows import Flow, of_recorded, predict, relative_errors
 from discover.identify.side_by_side.many_laws import fluid_of
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid

@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.constant import Constant
 from discover.comparison.instrument.corrected import InRecord, corrected
+from discover.comparison.outcomes.constant import Constant
 from discover.dataset.thinning import thin_run
 from discover.effects import KnownEffect, library_term, make_effect
 from discover.errors import InputError

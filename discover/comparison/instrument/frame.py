@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from discover.comparison.flows import Flow, Stresses
 from discover.comparison.instrument.corrected import InRecord
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.outcomes.flows import Flow, Stresses
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.study.build import DeclaredModel, StudyData
 

@@ -10,7 +10,7 @@ from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
-from discover.report.plots.loop import THOUSANDS, shortened
+from discover.report.plots.loop.runs import THOUSANDS, shortened
 from discover.report.plots.style import (
     BEFORE,
     GREEN,

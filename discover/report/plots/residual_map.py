@@ -10,8 +10,8 @@ from matplotlib.patches import Patch
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
-from discover.report.plots.flows import units
-from discover.report.plots.loop import along_in_common, models_of, shortened
+from discover.report.plots.comparison.flows import units
+from discover.report.plots.loop.runs import along_in_common, models_of, shortened
 from discover.report.plots.style import (
     INK,
     NETWORK,

@@ -1,0 +1,123 @@
+"""Does a law explain the runs that it was learned from? The loop's question, asked of learners."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.learners.registry import BANDS_ONLY
+from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
+from discover.statistics.residual import STRUCTURE, Expectation
+
+ARITHMETIC = 1e-5
+"""Relative misfit that both integrations together may leave: the floor of the sparse search."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Whether any law explains the training runs, and what each leaves of them.
+
+    Attributes
+    ----------
+    lack_of_fit
+        By learner.
+    """
+
+    lack_of_fit: Mapping[str, LackOfFit] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> FitVerdict:
+        """``"explained"`` if one learner's law leaves noise; ``"no_signal"`` if one finds none."""
+        found = {one.verdict for one in self.lack_of_fit.values()}
+        if "explained" in found:
+            return "explained"
+        return "no_signal" if "no_signal" in found else "unexplained"
+
+    @property
+    def by(self) -> tuple[str, ...]:
+        """Learners whose law explains the runs."""
+        return tuple(n for n, one in self.lack_of_fit.items() if one.verdict == "explained")
+
+    @property
+    def in_library(self) -> bool:
+        """Whether a law of the library explains the runs: the sparse learner's does."""
+        return "tensor_sindy" in self.by
+
+    def to_json(self) -> dict[str, Any]:
+        """Return verdict and lack of fit as ``comparison.json`` holds them."""
+        return {
+            "verdict": self.verdict,
+            "lack_of_fit": {
+                name: {
+                    "misfit": one.misfit,
+                    "noise": one.noise,
+                    "lag_one_correlation": one.lag_one_correlation,
+                    "probability": one.probability,
+                    "verdict": one.verdict,
+                    "outliers": one.outliers,
+                    "reason": one.reason,
+                }
+                for name, one in self.lack_of_fit.items()
+            },
+        }
+
+
+def explain(
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Iterable[Flow],
+    expectation: Expectation,
+    normal_stresses_used: bool = False,
+) -> Explanation:
+    """Return whether what each learner's law leaves of the training runs is noise.
+
+    Parameters
+    ----------
+    outcomes
+        By learner. One that fits nearly any σ12 explains nothing, and is left out unless it is
+        alone.
+    flows
+        The flows; only those of training are looked at.
+    expectation
+        What a complete law may leave.
+    normal_stresses_used
+        Whether measured normal stresses were part of the fit.
+    """
+    training = [flow for flow in flows if flow.kind == "training"]
+    return Explanation(
+        {
+            name: _left(outcome, training, expectation, normal_stresses_used)
+            for name, outcome in outcomes.items()
+            if name not in BANDS_ONLY or len(outcomes) == 1
+        }
+    )
+
+
+def _left(
+    outcome: LearnerOutcome,
+    training: Sequence[Flow],
+    expectation: Expectation,
+    normal_stresses_used: bool,
+) -> LackOfFit:
+    residuals, records, rates = [], [], []
+    for flow in training:
+        prediction = outcome.predictions[flow.key]
+        for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
+            record = flow.reference.get(quantity) if quantity != "sigma12" else flow.measured
+            if record is None or not np.any(record):
+                continue
+            if prediction is None or not np.all(np.isfinite(prediction[quantity])):
+                nan = float("nan")
+                reason = f"the law runs away in {flow.name}, a run that it was learned from"
+                return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
+            residuals.append(np.asarray(prediction[quantity] - record, dtype=float))
+            records.append(np.asarray(record, dtype=float))
+            rates.append(np.asarray(flow.rate, dtype=float))
+    found = lack_of_fit(residuals, records, expectation, rates)
+    limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
+    if found.verdict == "unexplained" and found.misfit <= limit:
+        reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"
+        return replace(found, verdict="explained", reason=reason)
+    return found

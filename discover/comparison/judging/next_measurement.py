@@ -1,0 +1,222 @@
+"""After a comparison: bands on the test flows, and what to measure next."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.design.experiments import OBSERVED, candidate_experiments
+from discover.identify.design.next_experiment import Proposal, propose_experiments
+from discover.identify.rivals.bands import PredictionBand, prediction_bands
+from discover.identify.side_by_side.many_laws import Contender
+from discover.laws.multimode import Fluid
+from discover.study.schema import NextExperiment
+
+LEAST_NOISE = 0.01
+"""Relative noise assumed of the next experiment where the data at hand show less."""
+
+_MOST_RIVALS = 6
+_MOST_DRAWS = 40
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class IdentifiabilityCell:
+    """What one oscillation would tell of the rivals.
+
+    Attributes
+    ----------
+    weissenberg, deborah
+        Its place on the Pipkin diagram.
+    observed
+        What would be measured.
+    difference
+        Root-mean-square difference of each quantity between the chosen law and the rival furthest
+        from it, relative to the chosen law's; N2's is relative to N1. None where a rival runs
+        away.
+    decides
+        Whether it is expected to rule out every rival, readjusted within its intervals.
+    """
+
+    weissenberg: float
+    deborah: float
+    observed: tuple[str, ...]
+    difference: Mapping[str, float | None]
+    decides: bool
+
+    @classmethod
+    def of(cls, proposal: Proposal) -> "IdentifiabilityCell":
+        """Return the cell of an oscillation."""
+        if proposal.experiment.pipkin is None:
+            raise ValueError(f"{proposal.experiment.title} is no oscillation.")
+        chosen, rivals = proposal.curves[0], proposal.curves[1:]
+        size = np.sqrt(np.mean(chosen**2, axis=0))
+        size[2] = size[1]
+        with np.errstate(over="ignore", invalid="ignore"):  # a rival may run away
+            apart = np.sqrt(np.mean((rivals - chosen) ** 2, axis=1))
+        furthest = np.max(apart, axis=0, initial=0.0)
+        share = furthest / np.maximum(size, 1e-300)
+        difference = {
+            name: float(value) if np.isfinite(value) else None
+            for name, value in zip(OBSERVED, share, strict=True)
+        }
+        decides = len(proposal.falling) == len(proposal.evidence)
+        return cls(*proposal.experiment.pipkin, proposal.observed, difference, decides)
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """What the laws that remain leave open, and what would close it.
+
+    Attributes
+    ----------
+    laws
+        Names of the laws, the chosen one first.
+    proposals
+        The best experiments, best first; empty where no rival is known.
+    bands
+        By the key of the flow.
+    noise
+        Relative noise that the evidence assumes.
+    oscillations
+        What every oscillation of the candidates would decide, in any order.
+    """
+
+    laws: tuple[str, ...] = ()
+    proposals: Sequence[Proposal] = ()
+    bands: Mapping[str, PredictionBand] = field(default_factory=dict)
+    noise: float = LEAST_NOISE
+    oscillations: Sequence[Proposal] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything but the curves."""
+        return {
+            "laws": list(self.laws),
+            "noise": self.noise,
+            "proposals": [proposal.to_json() for proposal in self.proposals],
+            "bands": {key: band.to_json() for key, band in self.bands.items()},
+            "pipkin": [
+                {
+                    "Wi": cell.weissenberg,
+                    "De": cell.deborah,
+                    "observed": list(cell.observed),
+                    "difference": dict(cell.difference),
+                    "decides": cell.decides,
+                }
+                for cell in self.identifiability()
+            ],
+        }
+
+    def identifiability(self) -> list["IdentifiabilityCell"]:
+        """Return what each oscillation would tell of the rivals, over the Pipkin diagram."""
+        return [IdentifiabilityCell.of(proposal) for proposal in self.oscillations]
+
+
+def next_measurement(
+    outcome: LearnerOutcome,
+    rivals: Iterable[Any],
+    declared: Fluid,
+    flows: Sequence[Flow],
+    options: NextExperiment,
+    seed: int = 0,
+) -> NextMeasurement:
+    """Return bands and proposals for the law that sparse regression chose.
+
+    Parameters
+    ----------
+    outcome
+        Of the sparse learner.
+    rivals
+        Laws with ``terms`` and ``inner``, closest first.
+    declared
+        The known part.
+    flows
+        Flows to draw bands for.
+    options
+        What the user could run.
+    seed
+        Of the draws from the parameters' uncertainty.
+    """
+    chosen, others = contenders(outcome, rivals)
+    misfit = float(outcome.details.get("misfit") or 0.0)
+    noise = options.noise or max(misfit, LEAST_NOISE)
+    bands = {}
+    if flows:
+        found = prediction_bands(
+            chosen,
+            others,
+            declared,
+            [flow.protocol for flow in flows],
+            [flow.times for flow in flows],
+            n_draws=_MOST_DRAWS,
+            seed=seed,
+        )
+        bands = {flow.key: band for flow, band in zip(flows, found, strict=True)}
+    proposals = []
+    if others:
+        moduli, times = (np.asarray(v) for v in (declared.modulus, declared.relaxation_time))
+        # the mean time that the zero-shear normal stress over the viscosity shows
+        mean_time = float(np.sum(moduli * times**2) / np.sum(moduli * times))
+        experiments = candidate_experiments(
+            mean_time, options.flows, options.weissenberg_numbers, options.deborah_numbers
+        )
+        proposals = propose_experiments(
+            chosen, others, declared, experiments, noise, options.observe, seed=seed
+        )
+    names = (chosen.name, *(law.name for law in others))
+    oscillations = [p for p in proposals if p.experiment.pipkin is not None]
+    return NextMeasurement(names, proposals[:_SHOWN], bands, noise, oscillations)
+
+
+def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contender, list[Contender]]:
+    """Return the chosen law and its rivals, with the covariances that the search knows."""
+    details = outcome.details
+    known = {frozenset(row["support"]): row for row in details.get("rivals", ())}
+    terms = {term.term: term.coefficient for term in outcome.terms}
+    inner = {name: value for term in outcome.terms for name, value in term.inner.items()}
+    size = len(terms) + len(inner)
+    chosen = Contender(law_name(terms), terms, inner, **_uncertainty(details, size))
+    others = []
+    for rival in list(rivals)[:_MOST_RIVALS]:
+        row = known.get(frozenset(rival.terms))
+        if row is not None and dict(zip(row["support"], row["coefficients"], strict=True)) == dict(
+            rival.terms
+        ):
+            size = len(row["support"]) + len(row["inner"])
+            fitted = dict(zip(row["support"], row["coefficients"], strict=True))
+            known_row = _uncertainty(row, size)
+            others.append(Contender(law_name(fitted), fitted, row["inner"], **known_row))
+        else:
+            used = dict(rival.inner)
+            others.append(Contender(law_name(rival.terms), dict(rival.terms), used))
+    return chosen, others
+
+
+def law_name(terms: Mapping[str, float]) -> str:
+    """Return a law as the sum of its terms, for tables."""
+    text = " ".join(f"{value:+.3g} {name}" for name, value in terms.items())
+    return text.removeprefix("+") or "no term"
+
+
+def _uncertainty(row: Mapping[str, Any], size: int) -> dict[str, Any]:
+    """Return what is known of a law's parameters, as `Contender` takes it."""
+    found = row.get("draws") or {"method": "linear"}
+    drawn = np.asarray(found.get("values", ()), dtype=float)
+    weighed = found["method"] == "weighed" and drawn.ndim == 2 and drawn.shape[1] == size
+    return {
+        "covariance": _covariance(row, size),
+        "drawn": drawn if weighed else None,
+        "without_band": str(found.get("reason", "")) if found["method"] == "none" else "",
+    }
+
+
+def _covariance(row: Mapping[str, Any], size: int) -> np.ndarray | None:
+    matrix = row.get("covariance")
+    if matrix is None:
+        return None
+    values = np.asarray(matrix, dtype=float)
+    usable = values.shape == (size, size) and np.all(np.isfinite(values))
+    return values if usable else None

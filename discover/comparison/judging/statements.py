@@ -1,0 +1,248 @@
+"""What is to be said of N1 and N2, which the learners seldom see: open, or on which condition not.
+
+No data say that the law is in the library. So the best that can be said of a quantity which was
+not measured is conditional, and nothing is said where no law of the library explains the data.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import EXACT, SEPARATED, Rival, law_structure
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.identify import Structure
+from discover.identify.exact.relations import spell_briefly
+from discover.identify.rivals.bands import PredictionBand
+
+Determined = Literal["no", "if_the_law_is_in_the_library"]
+
+IN_LIBRARY: Determined = "if_the_law_is_in_the_library"
+
+_NORMAL_STRESSES = ("N1", "N2")
+WIDEST = 1.0
+"""Half of a band over the quantity, from which on it says nothing of it."""
+
+_IN_NOISE = 2.0
+"""A measurement may stand off a band by so many times the noise of the records."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What the data say of a quantity.
+
+    Attributes
+    ----------
+    quantity
+        ``"N1"``, ``"N2"``.
+    determined
+        On which condition the data decide it.
+    text
+        The reason, for a reader.
+    """
+
+    quantity: str
+    determined: Determined
+    text: str
+
+    @property
+    def undetermined(self) -> bool:
+        """Whether the data do not decide it at all."""
+        return self.determined == "no"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the statement as ``comparison.json`` holds it."""
+        return {
+            "quantity": self.quantity,
+            "undetermined": self.undetermined,
+            "determined": self.determined,
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class BandCheck:
+    """What a band says of a quantity, over the flows that were looked at.
+
+    Attributes
+    ----------
+    half_width
+        Half of the widest band over the prediction's norm, N2's over that of N1; None without a
+        band.
+    missed
+        Title of a flow whose truth or measurement stands outside the band; empty if none does.
+    off
+        How far outside, root-mean-square over that of the reference.
+    """
+
+    half_width: float | None
+    missed: str = ""
+    off: float = 0.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether there is a band that is narrower than the quantity and that nothing refutes."""
+        return self.half_width is not None and self.half_width < WIDEST and not self.missed
+
+
+def check_band(
+    quantity: str,
+    flows: Sequence[Flow],
+    bands: Mapping[str, PredictionBand],
+    noise: float,
+) -> BandCheck:
+    """Return how wide the bands of a quantity are, and whether what is known lies inside.
+
+    Parameters
+    ----------
+    quantity
+        ``"sigma12"``, ``"N1"`` or ``"N2"``.
+    flows
+        Flows that may have a band.
+    bands
+        By the key of the flow.
+    noise
+        Relative noise of the records.
+    """
+    column = QUANTITIES.index(quantity)
+    half_width, missed, off = None, "", 0.0
+    for flow in flows:
+        band = bands.get(flow.key)
+        if band is None:
+            continue
+        width = 0.5 * band.widths()[quantity]
+        half_width = max(half_width or 0.0, width if np.isfinite(width) else np.inf)
+        reference = flow.reference.get(quantity)
+        scale = flow.reference.get("N1" if quantity == "N2" else quantity)
+        size = 0.0 if scale is None else float(np.linalg.norm(scale))
+        if reference is None or size == 0.0:
+            continue
+        low, high = band.rivals_low[:, column], band.rivals_high[:, column]
+        outside = float(np.linalg.norm(reference - np.clip(reference, low, high))) / size
+        allowed = SEPARATED if flow.is_truth else max(SEPARATED, _IN_NOISE * noise)
+        if not outside <= allowed and outside > off:
+            missed, off = flow.title, outside
+    return BandCheck(half_width, missed, off)
+
+
+def make_statements(
+    explanation: Explanation,
+    flows: Sequence[Flow],
+    rivals: Sequence[Rival],
+    structure: Structure | None = None,
+    bands: Mapping[str, PredictionBand] | None = None,
+    normal_stresses_used: bool = False,
+) -> list[Statement]:
+    """Return what the training data say of N1 and N2, with the reason.
+
+    Parameters
+    ----------
+    explanation
+        Whether any law explains the training data. Where no law of the library does, nothing is
+        determined.
+    flows
+        The flows; the training ones say what was measured, the others judge the bands.
+    rivals
+        From `find_rivals`.
+    structure
+        From `structure_of`, where the sparse learner ran; it decides what σ12 could say.
+    bands
+        Of the sparse law, by the key of the flow. Without one nothing is determined.
+    normal_stresses_used
+        Whether measured normal stresses were part of the fit.
+    """
+    if explanation.verdict == "no_signal":
+        text = "The records hold no signal, so they say nothing of {}."
+        return [Statement(q, "no", text.format(q)) for q in _NORMAL_STRESSES]
+    if "tensor_sindy" in explanation.lack_of_fit and not explanation.in_library:
+        return [Statement(q, "no", _unexplained(q, explanation)) for q in _NORMAL_STRESSES]
+    at = law_structure(structure)
+    if at is None:
+        return _without_structure(explanation, flows, rivals, normal_stresses_used)
+    found = []
+    for quantity in at.quantities:
+        if quantity.verdict == "measured":
+            continue
+        determined: Determined = "no"
+        text = quantity.text
+        if not quantity.open:
+            noise = explanation.lack_of_fit["tensor_sindy"].noise
+            check = check_band(quantity.quantity, flows, bands or {}, noise)
+            determined = IN_LIBRARY if check.holds else "no"
+            text = f"{text} {_of_band(quantity.quantity, check)}"
+        found.append(Statement(quantity.quantity, determined, text))
+    return found
+
+
+def _unexplained(quantity: str, explanation: Explanation) -> str:
+    text = (
+        f"No law in the library explains σ12, so the {quantity} of the law shown is that of a law "
+        "which is known to be incomplete."
+    )
+    if explanation.by:
+        text += (
+            " The neural network explains σ12, but many laws of its kind do, and they differ in "
+            f"{quantity}."
+        )
+    return text
+
+
+def _of_band(quantity: str, check: BandCheck) -> str:
+    beyond = f"A law outside the library may give the same σ12 and another {quantity}."
+    if check.half_width is None:
+        return f"No band says how far it could lie from the {quantity} shown. {beyond}"
+    if check.missed:
+        return (
+            f"But in {check.missed} the {quantity} known lies outside the band, by "
+            f"{100 * check.off:.2g} %, so the band is not to be believed. {beyond}"
+        )
+    if not check.holds:
+        return f"But the parameters' intervals leave a band that is wider than {quantity} itself."
+    width = f"± {100 * max(check.half_width, 1e-5):.2g} %"
+    of = " of N1" if quantity == "N2" else ""
+    return f"Then its 95 % band is {width}{of} at the widest. {beyond}"
+
+
+def _without_structure(
+    explanation: Explanation,
+    flows: Sequence[Flow],
+    rivals: Sequence[Rival],
+    normal_stresses_used: bool,
+) -> list[Statement]:
+    measured = [flow.reference for flow in flows if flow.kind == "training" and not flow.is_truth]
+    seen = {q for q in _NORMAL_STRESSES if normal_stresses_used and any(q in m for m in measured)}
+    found = []
+    if "N2" not in seen:
+        example = next(
+            (
+                r
+                for r in rivals
+                if (r.errors_to_chosen.get("N2") or 0.0) > SEPARATED
+                and (r.errors_to_chosen.get("sigma12") or 0.0) <= EXACT
+            ),
+            None,
+        )
+        text = (
+            "N2 was not measured, and σ12 in simple shear does not decide it: terms that act "
+            "on σ33 alone leave no trace in σ12 or N1. The N2 shown is that of the simplest law "
+            "that fits."
+        )
+        if example is not None:
+            text += (
+                " Checked by simulation: "
+                + spell_briefly(example.terms)
+                + f" gives the same σ12 but an N2 that differs by "
+                f"{100.0 * (example.errors_to_chosen['N2'] or 0.0):.2g} % of N1."
+            )
+        found.append(Statement("N2", "no", text))
+    if "N1" not in seen:
+        text = (
+            "N1 was not measured. It follows from the upper convected derivative that the model "
+            "assumes together with what was found, and no band says how far else it could lie."
+        )
+        if explanation.verdict == "unexplained":
+            text = "N1 was not measured, and no law found explains σ12."
+        found.append(Statement("N1", "no", text))
+    return found

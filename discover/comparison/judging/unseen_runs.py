@@ -1,0 +1,117 @@
+"""Runs held out of a comparison: a law that they refute explains nothing."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+from discover.statistics import LackOfFit, noise_model
+from discover.statistics.residual import STRUCTURE, Expectation
+from discover.statistics.unseen import CARRIED, Unseen, refutes
+
+_HALF_BAND = 1.96  # standard deviations
+
+
+def hold_against_unseen(
+    explanation: Explanation,
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Iterable[Flow],
+    bands: Mapping[str, PredictionBand],
+    expectation: Expectation,
+) -> Explanation:
+    """Return what explains the training runs and is not refuted by measured runs held out.
+
+    Parameters
+    ----------
+    explanation
+        Of the training runs.
+    outcomes
+        By learner.
+    flows
+        All flows.
+    bands
+        Of the sparse law, by the key of the flow.
+    expectation
+        What a complete law may leave.
+    """
+    flows = list(flows)
+    training = [flow for flow in flows if flow.kind == "training"]
+    unseen = [
+        flow
+        for flow in flows
+        if flow.kind == "held_out" and not flow.is_truth and "sigma12" in flow.reference
+    ]
+    if not unseen:
+        return explanation
+    found = dict(explanation.lack_of_fit)
+    for name in explanation.by:
+        columns = [_columns(outcomes[name], flow, bands.get(flow.key)) for flow in unseen]
+        reason = _refuted(outcomes[name], training, unseen, columns, found[name], expectation)
+        if reason:
+            found[name] = replace(found[name], verdict="unexplained", reason=reason)
+    return Explanation(found)
+
+
+def _refuted(
+    outcome: LearnerOutcome,
+    training: Sequence[Flow],
+    unseen: Sequence[Flow],
+    columns: Sequence[np.ndarray],
+    left: LackOfFit,
+    expectation: Expectation,
+) -> str:
+    """Return why the runs held out refute a law, in words; empty if they do not."""
+    residuals, records = [], []
+    for flow in unseen:
+        residual = _residual(outcome, flow)
+        if residual is None:
+            return f"the law runs away in {flow.name}, a run held out"
+        residuals.append(residual)
+        records.append(np.asarray(flow.reference["sigma12"], dtype=float))
+    pairs = zip(residuals, records, strict=True)
+    missed = float(np.mean([_size(row) / (_size(record) or 1.0) for row, record in pairs]))
+    if missed <= max(ARITHMETIC, STRUCTURE * outcome.resolution):
+        return ""
+    fitted = [row for flow in training if (row := _residual(outcome, flow)) is not None]
+    known = [np.asarray(flow.measured, dtype=float) for flow in training]
+    against = Unseen(residuals, records, columns, noise_model(fitted).correlation)
+    told = all(len(column) for column in columns)  # how uncertain the constants are
+    if told and refutes(against, fitted, known, expectation):
+        return (
+            f"runs held out are missed by {100 * missed:.2g} %, more than noise and uncertain "
+            "constants leave"
+        )
+    if missed > CARRIED * max(left.misfit, left.expected, ARITHMETIC):
+        return (
+            f"runs held out are missed by {100 * missed:.2g} %, those of training by "
+            f"{100 * left.misfit:.2g} %"
+        )
+    return ""
+
+
+def _residual(outcome: LearnerOutcome, flow: Flow) -> np.ndarray | None:
+    predicted = outcome.predictions.get(flow.key)
+    record = flow.measured if flow.kind == "training" else flow.reference["sigma12"]
+    if predicted is None or record is None or not np.all(np.isfinite(predicted["sigma12"])):
+        return None
+    return np.asarray(predicted["sigma12"] - record, dtype=float)
+
+
+def _columns(outcome: LearnerOutcome, flow: Flow, band: PredictionBand | None) -> np.ndarray:
+    """Return changes of σ12 by one standard deviation each, shape (directions, n); (0, n): none."""
+    if outcome.learner == "tensor_sindy":
+        directions = None if band is None else band.directions
+        return np.zeros((0, len(flow.times))) if directions is None else directions
+    limits = outcome.bands.get(flow.key)
+    if limits is None:
+        return np.zeros((0, len(flow.times)))
+    low, high = limits["sigma12"]
+    return (high - low)[None] / (2.0 * _HALF_BAND)
+
+
+def _size(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

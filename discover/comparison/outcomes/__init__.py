@@ -1,0 +1,1 @@
+"""What each learner gave, on flows that neither saw."""

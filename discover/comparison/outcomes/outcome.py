@@ -1,0 +1,228 @@
+"""What one learner found and predicts, in a form that can be kept in a file."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Real
+
+from discover.comparison.outcomes.constant import Constant
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, Stresses, predict
+from discover.laws.multimode import Fluid
+from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.term_tables import TermTables
+from discover.learners.weighted_laws import WeightedLaws
+from discover.protocols.protocol import stack_protocols
+from discover.simulate.grid import make_grids
+
+Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
+"""Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
+
+
+@dataclass(frozen=True)
+class LearnerOutcome(TermTables):
+    """A learner's result with its predictions in every flow of the comparison.
+
+    Attributes
+    ----------
+    learner
+        Name of the learner.
+    terms
+        The law term by term.
+    train_seconds
+        Wall-clock time of the fit.
+    loss_history
+        Iterations and losses, both of shape (m,).
+    details
+        What else the learner says; JSON-able.
+    message
+        One sentence on how the fit ended.
+    predictions
+        By the key of the flow; None where the law runs away. Where weighted laws make a band, its
+        middle.
+    physics
+        Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
+    bands
+        By the key of the flow: lowest and highest prediction of each quantity over the laws that
+        fit as well; of weighted laws their 95 % band. None for a flow in which one of them, or half
+        of the weight, runs away; empty where there is one law.
+    resolution
+        Relative misfit of the training runs that arithmetic may leave.
+    constants
+        Constants that were fitted along, by name.
+    """
+
+    learner: str
+    terms: tuple[RecoveredTerm, ...]
+    train_seconds: float
+    loss_history: tuple[Real[np.ndarray, " m"], Real[np.ndarray, " m"]]
+    details: Mapping[str, Any] = field(default_factory=dict)
+    message: str = ""
+    predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
+    physics: Mapping[str, Any] | None = None
+    bands: Mapping[str, Limits | None] = field(default_factory=dict)
+    resolution: float = 0.0
+    constants: Mapping[str, Constant] = field(default_factory=dict)
+
+    def half_widths(self, flow: Flow) -> dict[str, float]:
+        """Return the root-mean-square half-width of each band over that of the prediction.
+
+        N2's is relative to N1, as its error is. Empty where there is no band.
+        """
+        limits, predicted = self.bands.get(flow.key), self.predictions.get(flow.key)
+        if limits is None or predicted is None:
+            return {}
+        found = {}
+        for quantity, (low, high) in limits.items():
+            size = np.linalg.norm(predicted["N1" if quantity == "N2" else quantity])
+            if size > 0:
+                found[quantity] = float(0.5 * np.linalg.norm(high - low) / size)
+        return found
+
+    @classmethod
+    def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
+        """Return the outcome of a fit, with the fluid it found simulated in every flow."""
+        predictions = {flow.key: predict(fluid, flow) for flow in flows}
+        if result.weighted is None:
+            bands = _bands(result, fluid, flows)
+        else:
+            middle, bands = _weighted_bands(result.weighted, fluid, flows)
+            predictions |= middle
+        return cls(
+            result.learner,
+            result.terms,
+            result.train_seconds,
+            result.loss_history,
+            result.details,
+            result.message,
+            predictions,
+            bands=bands,
+        )
+
+    def to_state(self) -> dict[str, Any]:
+        """Return everything as JSON-able values; `from_state` undoes it exactly."""
+        return {
+            "learner": self.learner,
+            "terms": [asdict(term) for term in self.terms],
+            "train_seconds": self.train_seconds,
+            "loss_history": [np.asarray(part).tolist() for part in self.loss_history],
+            "details": plain(self.details),
+            "message": self.message,
+            "predictions": {
+                name: None if p is None else {q: v.tolist() for q, v in p.items()}
+                for name, p in self.predictions.items()
+            },
+            "physics": plain(self.physics),
+            "bands": {
+                name: None
+                if b is None
+                else {q: [v.tolist() for v in pair] for q, pair in b.items()}
+                for name, b in self.bands.items()
+            },
+            "resolution": self.resolution,
+            "constants": {name: asdict(constant) for name, constant in self.constants.items()},
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
+        """Return the outcome that was kept."""
+        terms = tuple(
+            RecoveredTerm(
+                **{
+                    **t,
+                    "ci95": None if t["ci95"] is None else tuple(t["ci95"]),
+                    "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
+                    "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
+                }
+            )
+            for t in state["terms"]
+        )
+        iterations, losses = (np.asarray(part, dtype=float) for part in state["loss_history"])
+        predictions = {
+            name: None if p is None else {q: np.asarray(v, dtype=float) for q, v in p.items()}
+            for name, p in state["predictions"].items()
+        }
+        return cls(
+            state["learner"],
+            terms,
+            float(state["train_seconds"]),
+            (iterations, losses),
+            state["details"],
+            state["message"],
+            predictions,
+            state.get("physics"),
+            {
+                name: None
+                if b is None
+                else {q: (np.asarray(low), np.asarray(high)) for q, (low, high) in b.items()}
+                for name, b in state.get("bands", {}).items()
+            },
+            float(state.get("resolution", 0.0)),
+            {
+                name: Constant(**{**row, "ci95": row["ci95"] and tuple(row["ci95"])})
+                for name, row in state.get("constants", {}).items()
+            },
+        )
+
+
+_BANDS = ("training", "held_out", "test")
+_STRAIN_STEP = 0.2
+
+
+def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
+    if len(result.members) < 2:
+        return {}
+    fluids = [
+        Fluid(law, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity)
+        for law in result.members
+    ]
+    bands: dict[str, Limits | None] = {}
+    for flow in flows:
+        if flow.kind not in _BANDS:
+            continue
+        predicted = [predict(member, flow) for member in fluids]
+        told = [p for p in predicted if p is not None]
+        bands[flow.key] = None
+        if len(told) == len(fluids):
+            rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
+            bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
+    return bands
+
+
+def _weighted_bands(
+    weighted: WeightedLaws, fluid: Fluid, flows: list[Flow]
+) -> tuple[dict[str, Stresses], dict[str, Limits | None]]:
+    """Return the middle of the band of every flow, and its limits."""
+    shown = [flow for flow in flows if flow.kind in _BANDS]
+    if not shown:
+        return {}, {}
+    protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
+    found = weighted.bands(
+        (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
+        stack_protocols(protocols),
+        make_grids(protocols, times, strain_step=_STRAIN_STEP),
+        [len(t) for t in times],
+    )
+    middle, bands = {}, {}
+    for flow, band in zip(shown, found, strict=True):
+        bands[flow.key] = None
+        if band is not None:
+            middle[flow.key] = {q: band[q][1] for q in QUANTITIES}
+            bands[flow.key] = {q: (band[q][0], band[q][2]) for q in QUANTITIES}
+    return middle, bands
+
+
+def plain(value: Any) -> Any:
+    """Return nested details with numpy values as plain ones and what is not finite as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value if isinstance(value, str | int | float | bool | None) else str(value)

@@ -1,0 +1,81 @@
+"""The report on a comparison: page, figures, JSON and LaTeX."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from discover.comparison.comparison import Comparison
+from discover.report.comparison.pictures import comparison_pictures
+from discover.report.comparison.sections import sections
+from discover.report.comparison.verdict import comparison_verdict
+from discover.report.equations import equations_tex
+from discover.report.overlay import Overlay
+from discover.report.page import made_by, render, safe_name
+from discover.report.parts import Missing, attempt
+from discover.report.plots.style import Picture
+from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
+from discover.report.wording import QUESTIONS
+from discover.study.run_folder import RunFolder
+
+
+def write_comparison(
+    comparison: Comparison,
+    folder: RunFolder,
+    linear_relaxation: bool,
+    study_text: str = "",
+    run: dict | None = None,
+    overlays: Sequence[Overlay] = (),
+) -> Path:
+    """Write ``comparison.json``, ``predictions.csv``, ``equations.tex``, the figures and the page.
+
+    The numbers come first. A picture or a table that cannot be drawn then costs its own place on
+    the page and nothing else.
+
+    Parameters
+    ----------
+    comparison
+        What to report.
+    folder
+        Where to.
+    linear_relaxation
+        Whether −σ was part of the known law.
+    study_text
+        The study file, shown at the end.
+    run
+        What the page says of the run that made it, where that was no command.
+    overlays
+        Curves that the study asks for beside the learners'.
+
+    Returns
+    -------
+    The page.
+    """
+    content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
+    content += "\n"
+    folder.write("comparison.json", content)
+    predictions = write_predictions(comparison_predictions(comparison, overlays), folder)
+    folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
+    pictures, training = comparison_pictures(comparison, overlays)
+    for drawn in (*pictures, *training):
+        if isinstance(drawn, Picture):
+            folder.write(f"figures/{safe_name(drawn.name)}.svg", drawn.svg)
+    run = run or made_by(
+        folder.fingerprint,
+        f"discover compare {comparison.name}.toml --seed {comparison.seed}",
+        ("comparison.json", "predictions.csv", "equations.tex", "figures/*.svg"),
+        study_text,
+    )
+    sentences = attempt("The verdict", lambda: comparison_verdict(comparison))
+    page = render(
+        "comparison.html",
+        data={PREDICTIONS: predictions, "comparison.json": content},
+        comparison=comparison,
+        questions=QUESTIONS,
+        sentences=[] if isinstance(sentences, Missing) else sentences,
+        lost=[sentences] if isinstance(sentences, Missing) else [],
+        pictures=pictures,
+        sections=sections(comparison, run, linear_relaxation),
+        training_pictures=training,
+        run=run,
+    )
+    return folder.write("report.html", page)

@@ -1,0 +1,379 @@
+"""The tables of a comparison's page, row by row, as the templates take them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.judging.identifiability import EXACT, Rival
+from discover.comparison.outcomes.constant import in_words as constant_in_words
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.equations import Equation
+from discover.equations.mathml import law_element, term_element, term_mathml
+from discover.laws.registry import LAWS
+from discover.learners import RecoveredTerm
+from discover.learners.registry import BANDS_ONLY, learner_title
+from discover.report.plots.style import learner_colour
+from discover.report.wording import (
+    FIGURE_SYMBOLS,
+    RULES,
+    interval,
+    known,
+    readable,
+    selection_sentence,
+    significant,
+)
+
+
+def selection(comparison: Comparison) -> dict[str, Any] | None:
+    """Return the sparse learner's path, or None where there is none.
+
+    A misfit or a criterion is None where a law runs away in a run left out.
+    """
+    sparse = comparison.outcomes.get("tensor_sindy")
+    path = [] if sparse is None else sparse.details.get("path") or []
+    if sparse is None or not path:
+        return None
+    chosen = (sparse.details.get("selectors") or {}).get("chosen") or {}
+    lowest = min((row["bic"] for row in path if known(row["bic"])), default=0.0)
+    rows = [
+        {
+            "size": row["size"],
+            "math": " + ".join(term_element(name, row["inner"]) for name in row["support"]) or "–",
+            "misfit": row["misfit"],
+            "held_out": row["held_out"],
+            "range": list(_by_run(row).values()),
+            "bic": row["bic"] - lowest if known(row["bic"]) else None,
+            "rules": ", ".join(
+                RULES.get(rule, str(rule))
+                for rule, support in chosen.items()
+                if support == row["support"]
+            ),
+        }
+        for row in path
+    ]
+    spelled = titles(comparison)
+    runs = [
+        {"title": spelled.get(name, name), "errors": [_by_run(row).get(name) for row in path]}
+        for name in _by_run(path[0])
+    ]
+    return {"rows": rows, "runs": runs, "sentence": selection_sentence(sparse)}
+
+
+def _by_run(row: Mapping[str, Any]) -> Mapping[str, float | None]:
+    return row.get("held_out_by_run") or {}
+
+
+def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the errors in flows that no fit saw, with half of the band where there is one."""
+    rows = []
+    for flow in comparison.judged:
+        band = comparison.next_measurement.bands.get(flow.key)
+        widths = {} if band is None else band.widths(with_rivals=False)
+        cells = []
+        for who in ("before", *comparison.outcomes):
+            if who == "tensor_sindy":
+                mine = {name: _half(width) for name, width in widths.items()}
+            else:
+                mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
+            law = comparison.before if who == "before" else comparison.outcomes[who].predictions
+            cells += [
+                {
+                    "value": value,
+                    "half_width": None if value is None else mine.get(name),
+                    "runs_away": law[flow.key] is None and name in flow.reference,
+                }
+                for name, value in comparison.errors(who, flow).items()
+            ]
+        rows.append(
+            {
+                "title": flow.title,
+                "anchor": f"flow_{flow.name}",
+                "range": comparison.placement(flow).text,
+                "cells": cells,
+            }
+        )
+    return rows
+
+
+def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return every law fitted to the runs, classical and learned: constants, misfit, errors.
+
+    Errors are means, of the recorded stress, over the flows that no fit saw, those inside the
+    fitted range apart from those beyond it.
+    """
+    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
+    rows = []
+    for fit in comparison.classical:
+        constants = ", ".join(
+            f"{name} = {significant(value, 3)}"
+            for name, value in (
+                *((readable(name), value) for name, value in fit.parameters.items()),
+                *((constant_in_words(name), value) for name, value in fit.along.items()),
+            )
+        )
+        rows.append(
+            {
+                "law": fit.title,
+                "constants": constants + (", the end of its range" if fit.at_bound else ""),
+                "number": len(fit.parameters) + len(fit.along),
+                "misfit": fit.misfit,
+                "criterion": fit.criterion,
+                **_mean_errors(fit.errors, placed),
+            }
+        )
+    for name, outcome in comparison.outcomes.items():
+        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
+        path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
+        left = comparison.explanation.lack_of_fit.get(name)
+        sparse = name == "tensor_sindy"
+        rows.append(
+            {
+                "law": learner_title(name),
+                "constants": ", ".join(
+                    f"{constant_in_words(c.name)} = {significant(c.value, 3)}"
+                    for c in outcome.constants.values()
+                ),
+                "number": sum(1 + len(t.inner) for t in outcome.terms) + len(outcome.constants)
+                if sparse
+                else None,
+                "misfit": None if left is None else left.misfit,
+                "criterion": path[chosen]["bic"] if path and chosen is not None else None,
+                **_mean_errors(errors, placed),
+            }
+        )
+    least = min((row["criterion"] for row in rows if row["criterion"] is not None), default=0.0)
+    for row in rows:
+        if row["criterion"] is not None:
+            row["criterion"] -= least
+    return rows
+
+
+def _mean_errors(
+    errors: Mapping[str, Mapping[str, float | None]], inside: Mapping[str, bool]
+) -> dict[str, float | None]:
+    """Return the mean error of the recorded stress inside the fitted range and beyond it."""
+    means: dict[str, float | None] = {}
+    for name, wanted in (("inside", True), ("beyond", False)):
+        flows = [flow for flow, is_inside in inside.items() if is_inside is wanted]
+        # what is recorded comes first
+        values = [next(iter(errors[flow].values())) for flow in flows]
+        said = [value for value in values if value is not None]
+        # a law that cannot be integrated through one of the flows has no mean
+        means[name] = float(np.mean(said)) if said and len(said) == len(values) else None
+    return means
+
+
+def _half(width: float | None) -> float | None:
+    return None if width is None or not np.isfinite(width) else 0.5 * width
+
+
+def network_interval(comparison: Comparison) -> bool:
+    """Return whether the terms of the network have intervals; True without a network."""
+    network = comparison.outcomes.get("tbnn_ude")
+    return network is None or any(term.ci95 for term in network.terms)
+
+
+def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the constants that were fitted along, one line for each learner."""
+    rows = [
+        {
+            "constant": constant_in_words(constant.name),
+            "learner": learner_title(name),
+            "value": constant.value,
+            "ci95": constant.ci95,
+            "unit": constant.unit,
+        }
+        for name, outcome in comparison.outcomes.items()
+        for constant in outcome.constants.values()
+    ]
+    return sorted(rows, key=lambda row: row["constant"])
+
+
+def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> dict[str, Any]:
+    """Return a law found with the known part below it, as mathematics, and how its fit ended."""
+    message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
+    shown = _shown_terms(outcome)
+    if len(shown) < len(outcome.terms):
+        message += f". Shown are the {len(shown)} terms largest along the runs"
+    named = known.named
+    if named is not None and not named.is_written:
+        message += f". The h of the known law {named.law} is to be added: nobody wrote it out"
+        named = None
+    return {
+        "title": learner_title(outcome.learner),
+        "colour": learner_colour(outcome.learner),
+        "math": law_element([*known.terms, *shown], linear_relaxation, named),
+        "message": message,
+        "seconds": outcome.train_seconds,
+    }
+
+
+def learner_columns(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the title of each learner, and whether its terms have intervals."""
+    return [
+        {"title": learner_title(name), "intervals": any(term.ci95 for term in outcome.terms)}
+        for name, outcome in comparison.outcomes.items()
+    ]
+
+
+def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the terms that were found, or should have been, learner by learner."""
+    truth = {t.term: t for t in comparison.truth or ()}
+    found: dict[str, dict[str, RecoveredTerm]] = {}
+    for name, outcome in comparison.outcomes.items():
+        for term in _shown_terms(outcome):
+            found.setdefault(term.term, {})[name] = term
+    rows = []
+    for name in dict.fromkeys([*truth, *found]):
+        cells, inner = [], []
+        if name in truth and truth[name].inner:
+            inner += [
+                f"truth: {readable(key)} = {significant(value)}"
+                for key, value in truth[name].inner.items()
+            ]
+        for learner, outcome in comparison.outcomes.items():
+            term = found.get(name, {}).get(learner)
+            cells.append(
+                {
+                    "debiased": None if term is None else term.coefficient,
+                    "penalised": None if term is None else term.coefficient_penalised,
+                    "ci95": None if term is None else term.ci95,
+                    "intervals": any(t.ci95 for t in outcome.terms),
+                }
+            )
+            if term is not None:
+                inner += [
+                    f"{learner_title(learner)}: {readable(key)} = {significant(value)}"
+                    + (f" ({interval(term.inner_ci95[key])})" if key in term.inner_ci95 else "")
+                    for key, value in term.inner.items()
+                ]
+                inner += [
+                    f"{learner_title(learner)}, if the coefficient is one: {readable(key)} = "
+                    f"{significant(value)} ({interval((low, high))})"
+                    for key, (value, low, high) in term.inner_at_one.items()
+                ]
+        true = truth.get(name)
+        rows.append(
+            {
+                "math": term_element(name),
+                "inner": ", ".join(inner),
+                "truth": (0.0 if true is None else true.coefficient),
+                "cells": cells,
+            }
+        )
+    return rows
+
+
+_MOST_TERMS = 8
+"""Of a law that holds its whole library, shown; the rest is in comparison.json."""
+
+
+def _shown_terms(outcome: LearnerOutcome) -> tuple[RecoveredTerm, ...]:
+    """Return the terms that a page shows; of a whole library the largest along the trajectories."""
+    return outcome.terms[:_MOST_TERMS] if outcome.learner in BANDS_ONLY else outcome.terms
+
+
+def coefficients(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the network's coefficients along the training runs."""
+    network = comparison.outcomes.get("tbnn_ude")
+    table = {} if network is None else network.details.get("coefficients", {})
+    return [
+        {"math": term_element(name), "mean": row["mean"], "spread": row["spread"]}
+        for name, row in table.items()
+    ]
+
+
+def proposals(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the experiments proposed, best first."""
+    following = comparison.next_measurement
+    return [
+        {
+            "title": proposal.experiment.title,
+            "observed": ", ".join(FIGURE_SYMBOLS[name] for name in proposal.observed),
+            "falling": f"{len(proposal.falling)} of {len(following.laws) - 1}",
+            "weakest": min(filter(known, proposal.evidence.values()), default=None),
+        }
+        for proposal in following.proposals
+    ]
+
+
+def rivals_text(comparison: Comparison) -> str:
+    """Return what the search says of the laws that the data do not rule out."""
+    sparse = comparison.outcomes.get("tensor_sindy")
+    text = "" if sparse is None else str(sparse.details.get("rivals_text", ""))
+    # the text is on laws that were fitted; a twin follows from mathematics and is never ruled out
+    exact = sum((r.errors_to_chosen["sigma12"] or 0.0) <= EXACT for r in comparison.rivals)
+    twins = "One law below gives" if exact == 1 else f"{exact} laws below give"
+    return f"{text} {twins} the same σ12 whatever the flow." if text and exact else text
+
+
+def titles(comparison: Comparison) -> dict[str, str]:
+    """Return the flows in the field's notation, by their names."""
+    return {flow.name: flow.title for flow in comparison.flows}
+
+
+def distillations(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return what simpler laws learn from the true one."""
+
+    def values(parameters: Mapping[str, float]) -> str:
+        return ", ".join(f"{readable(k)} = {significant(v)}" for k, v in parameters.items())
+
+    return [
+        {
+            "teacher": LAWS[row["teacher"]].title,
+            "student": LAWS[row["student"]].title,
+            "penalised": values(row["penalised"]),
+            "debiased": values(row["debiased"]),
+            "misfit": row["misfit"],
+        }
+        for row in comparison.distillations
+    ]
+
+
+def structure(comparison: Comparison) -> dict[str, Any] | None:
+    """Return what the training flows could tell of the library; None where not looked at."""
+    if comparison.structure is None:
+        return None
+    relations = [readable(relation.text) for relation in comparison.structure.relations]
+    return {"text": comparison.structure.text, "relations": relations}
+
+
+_MARKS = {True: "✓", False: "✗", None: "–"}
+
+
+def physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return one row for each check, with what every law says to it."""
+    reports = [report or {"checks": []} for report in comparison.physics.values()]
+    names = dict.fromkeys(check["name"] for report in reports for check in report["checks"])
+    rows = []
+    for name in names:
+        cells = []
+        for report in reports:
+            check = next((c for c in report["checks"] if c["name"] == name), None)
+            cells.append(
+                {"mark": _MARKS[None], "text": ""}
+                if check is None
+                else {"mark": _MARKS[check["passed"]], "text": check["text"]}
+            )
+        rows.append({"name": name, "cells": cells})
+    return rows
+
+
+def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
+    """Return a law that the data do not tell from the one found."""
+    sum_of_terms = "".join(
+        f"<mo>{'−' if value < 0 else '+'}</mo>{term_mathml(name, rival.inner, abs(value))}"
+        for name, value in rival.terms.items()
+    ).removeprefix("<mo>+</mo>")
+    place = rival.separated_by
+    return {
+        "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
+        "reason": rival.reason,
+        "errors": rival.errors_to_chosen,
+        "separated": f"{FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
+        f"{titles.get(place['protocol'], place['protocol'])}"
+        if place
+        else "nothing that was tried",
+    }

@@ -1,0 +1,260 @@
+"""The verdict on a comparison: what was found, how sure, what to measure next."""
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.outcomes.constant import in_words
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.report.wording import (
+    SYMBOLS,
+    estimate,
+    interval,
+    learner_as_subject,
+    percent,
+    readable,
+    sentence,
+    significant,
+    terms_text,
+    worst,
+)
+from discover.statistics import LackOfFit
+
+CORRELATED = 0.3
+"""A correlation of neighbours that is worth its number in a sentence."""
+
+
+def comparison_verdict(comparison: Comparison) -> list[str]:
+    """Return the verdict on a comparison: three sentences, in the order of `QUESTIONS`."""
+    return [_found(comparison), _how_sure(comparison), _next(comparison)]
+
+
+def _found(comparison: Comparison) -> str:
+    explanation = comparison.explanation
+    if explanation.verdict == "no_signal":
+        return (
+            "No signal: the records hold nothing that a law could be told from, so no law is "
+            "reported as found."
+        )
+    left = explanation.lack_of_fit
+    sparse = comparison.outcomes.get("tensor_sindy")
+    network = comparison.outcomes.get("tbnn_ude")
+    parts = []
+    if explanation.verdict == "explained":
+        names = " and ".join(_law_of(name) for name in explanation.by)
+        verb = "explains" if len(explanation.by) == 1 else "explain"
+        sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
+        rest = "what is left" if len(explanation.by) == 1 else "what each leaves"
+        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) is noise")
+    else:
+        several = "neither law explains" if len(left) > 1 else "the law does not explain"
+        parts.append(f"unexplained: {several} the data")
+    for name, one in left.items():
+        if one.verdict != "explained":
+            parts.append(f"{_law_of(name)} leaves {_left(one)}")
+    if sparse is not None and explanation.in_library:
+        parts.append(_terms_found(comparison, sparse))
+        parts += _constants_found(sparse)
+    elif sparse is not None and not sparse.terms:
+        parts.append("sparse regression found no term that helps")
+    elif sparse is not None:
+        n = len(sparse.terms)
+        parts.append(
+            f"sparse regression's {n} terms describe the data and are no finding"
+            if n > 1
+            else "sparse regression's term describes the data and is no finding"
+        )
+    if network is not None and network.terms and "tbnn_ude" in explanation.by:
+        largest = max(network.terms, key=lambda t: abs(t.coefficient))
+        parts.append(
+            f"put into words, the neural network's largest term is "
+            f"{significant(largest.coefficient)} {readable(largest.term)}{_of_projection(network)}"
+        )
+    elif network is not None and "tbnn_ude" in explanation.by:
+        parts.append("put into words, the neural network found no term")
+    return sentence([*parts, *_where_usable(comparison)])
+
+
+def _of_projection(network: LearnerOutcome) -> str:
+    """Return how well the words describe the network; empty where nobody asked."""
+    missed = network.details.get("projection_misfit")
+    if missed is None:
+        return ""
+    n = len(network.terms)
+    return f" ({n} term{'s' if n > 1 else ''} miss{'' if n > 1 else 'es'} {percent(missed)} of it)"
+
+
+_LIMITS = {
+    "conformation tensor positive definite": "whose conformation tensor loses positive "
+    "definiteness in {where}",
+    "integrates beyond training": "whose stress runs away in {where}",
+}
+
+
+def _where_usable(comparison: Comparison) -> list[str]:
+    """Return which laws that explain the data are good for nothing beyond them, and why."""
+    parts = []
+    for name in comparison.explanation.by:
+        checks = (comparison.physics.get(name) or {}).get("checks", ())
+        failed = {c["name"]: c for c in checks if c["passed"] is False}
+        why = [text.format(**failed[check]) for check, text in _LIMITS.items() if check in failed]
+        if why:
+            law = _law_of(name)
+            parts.append(f"{law}, {' and '.join(why)}, is for the fitted range only")
+    return parts
+
+
+def _law_of(learner: str) -> str:
+    return f"{_within(learner)}'s law"
+
+
+def _within(learner: str) -> str:
+    """Return a learner as it stands within a sentence."""
+    name = learner_as_subject(learner)
+    return name[:1].lower() + name[1:]
+
+
+def _left(one: LackOfFit) -> str:
+    """Return what a law leaves of the data, in words."""
+    if not np.isfinite(one.misfit):
+        return f"everything, for {one.reason}"
+    text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
+    if one.lag_one_correlation > CORRELATED:
+        text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
+    return text
+
+
+_MOST_TERMS = 4
+"""More are a table and no sentence."""
+
+
+def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
+    text = f"if the law is in the library, it is {terms_text(sparse)}"
+    if len(sparse.terms) > _MOST_TERMS:
+        text = f"if the law is in the library, it has {len(sparse.terms)} terms (Laws found)"
+    if comparison.truth is None:
+        return text
+    wanted = {t.term for t in comparison.truth}
+    found = {t.term for t in sparse.terms}
+    if found == wanted:
+        return f"{text}, exactly the terms of the law that made the data"
+    missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
+    extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
+    return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+
+
+def _constants_found(sparse: LearnerOutcome) -> list[str]:
+    said = []
+    for constant in sparse.constants.values():
+        text = f"{in_words(constant.name)} is {estimate(constant.value, constant.ci95)}"
+        text += f" {constant.unit}" if constant.unit else ""
+        said.append(f"{text} (95 % interval {interval(constant.ci95)})")
+    return [f"fitted along with it, {' and '.join(said)}"] if said else []
+
+
+def _how_sure(comparison: Comparison) -> str:
+    if comparison.verdict == "no_signal":
+        return "Nothing is determined by these data: neither a law nor N1 nor N2."
+    parts = [part for name in comparison.outcomes for part in _unseen(comparison, name)]
+    if not parts:
+        parts.append("nothing was held out, so no prediction was put to the test")
+    parts += _determined(comparison)
+    for name, report in comparison.physics.items():
+        failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
+        if failed:
+            parts.append(
+                f"{_within(name)}'s law fails {len(failed)} of the checks of physical "
+                f"soundness ({', '.join(failed)})"
+            )
+    return sentence(parts)
+
+
+def _unseen(comparison: Comparison, name: str) -> list[str]:
+    """Return what becomes of a law in flows that no fit saw, inside the fitted range and beyond."""
+    predictions = comparison.outcomes[name].predictions
+    inside = [flow for flow in comparison.judged if comparison.placement(flow).inside]
+    beyond = [flow for flow in comparison.judged if not comparison.placement(flow).inside]
+    parts, runaway = [], []
+    for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
+        runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
+        errors = {flow.name: comparison.errors(name, flow) for flow in flows}
+        shear = all(flow.records_shear_stress for flow in flows)
+        recorded = "σ12" if shear else "the recorded stress"
+        said = [
+            f"{symbol} by {percent(value)}"
+            for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
+            if (value := worst(errors, quantity.split()[0])) is not None
+        ]
+        if said:
+            parts.append(f"{', '.join(said)} {where}")
+    law = _within(name)
+    told = [f"{law} misses, in flows that no fit saw, at most {' and '.join(parts)}"]
+    return (told if parts else []) + (
+        [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
+    )
+
+
+def _determined(comparison: Comparison) -> list[str]:
+    """Return what is said of N1, N2 and the coefficients."""
+    parts = []
+    names = " and ".join(comparison.undetermined)
+    if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
+        parts.append(
+            f"since no law in the library explains the data, nothing is determined by them, "
+            f"neither {names.replace(' and ', ' nor ')} nor any coefficient"
+        )
+        return parts
+    if names:
+        parts.append(
+            f"not determined by these data: {names}, shown as the choice of the law that fits"
+        )
+    if decided := [s.quantity for s in comparison.statements if not s.undetermined]:
+        parts.append(
+            f"{' and '.join(decided)} follow{'s' if len(decided) == 1 else ''} from σ12 only if "
+            "the law is in the library"
+        )
+    return parts
+
+
+def _next(comparison: Comparison) -> str:
+    explanation = comparison.explanation
+    if explanation.verdict == "no_signal":
+        return (
+            "Measure where the stress stands out of the noise: at higher rates, with a more "
+            "sensitive transducer, or with a larger sample."
+        )
+    lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
+    if lacking or explanation.verdict == "unexplained":
+        return (
+            "Before measuring more, find what the law lacks: discover close-loop tries effects of "
+            "the instrument and of the flow on the same runs, and [compare] library and max_terms "
+            "allow more terms."
+        )
+    following = comparison.next_measurement
+    if following.proposals:
+        return _proposal(following)
+    if comparison.undetermined:
+        names = " and ".join(comparison.undetermined)
+        return f"Measure {names}: nothing else decides between laws that give the same σ12."
+    rates = [float(np.max(np.abs(f.rate))) for f in comparison.flows_of("training")]
+    unit = "" if comparison.noise is not None else " 1/s"
+    return (
+        "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
+        f"a shear rate above {significant(max(rates), 3)}{unit}."
+    )
+
+
+def _proposal(following: NextMeasurement) -> str:
+    best = following.proposals[0]
+    n_rivals = len(following.laws) - 1
+    laws = "the one rival law" if n_rivals == 1 else f"the {n_rivals} rival laws"
+    leave = f"{laws} that these data leave in the library"
+    if not best.falling:
+        return f"None of the experiments allowed is expected to rule out {leave}."
+    what = " and ".join(SYMBOLS[name] for name in best.observed)
+    fall = len(best.falling)
+    outcome = leave if fall == n_rivals else f"{fall} of {leave}"
+    return (
+        f"Measure {what} in {best.experiment.title}: at {percent(following.noise)} noise it is "
+        f"expected to rule out {outcome}."
+    )

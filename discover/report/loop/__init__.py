@@ -1,0 +1,1 @@
+"""The page of a closed loop."""

@@ -1,0 +1,133 @@
+"""The report on a closed loop: page, figures, JSON and LaTeX."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.protocols.kinematics import in_words
+from discover.report.loop import tables
+from discover.report.loop.verdict import loop_verdict
+from discover.report.overlay import Overlay
+from discover.report.page import made_by, render, safe_name
+from discover.report.plots.loop.by_mode import by_mode_picture
+from discover.report.plots.loop.errors import ranking_picture, run_error_picture, waterfall_picture
+from discover.report.plots.loop.free_form import free_form_picture
+from discover.report.plots.loop.lissajous import lissajous_picture
+from discover.report.plots.loop.next_test import next_test_picture
+from discover.report.plots.loop.residual import reading_picture, residual_picture
+from discover.report.plots.loop.rivals import rivals_picture
+from discover.report.plots.loop.runs import runs_picture
+from discover.report.plots.residual_map import loop_residual_map
+from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
+from discover.report.wording import QUESTIONS
+from discover.study.run_folder import RunFolder
+
+
+def write_loop(
+    result: LoopResult,
+    folder: RunFolder,
+    name: str,
+    summary: str,
+    study_text: str = "",
+    run: dict | None = None,
+    conditions: str = "",
+    overlays: Sequence[Overlay] = (),
+) -> Path:
+    """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
+
+    Parameters
+    ----------
+    result
+        What to report.
+    folder
+        Where to.
+    name, summary
+        Title, and the data and declared model in words.
+    study_text
+        The study file, shown at the end.
+    run
+        What the page says of the run that made it, where that was no command.
+    conditions
+        Material and temperature, for the title.
+    overlays
+        Curves that the study asks for beside the models.
+
+    Returns
+    -------
+    The page.
+    """
+    pictures = [
+        waterfall_picture(result),
+        runs_picture(result, overlays),
+        lissajous_picture(result, overlays),
+        free_form_picture(result),
+        loop_residual_map(result),
+        residual_picture(result),
+        rivals_picture(result),
+        reading_picture(result),
+        run_error_picture(result),
+        ranking_picture(result),
+        by_mode_picture(result),
+        next_test_picture(result),
+    ]
+    drawn = [p for p in pictures if p is not None]
+    for one in drawn:
+        folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)
+    content = json.dumps(result.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
+    content += "\n"
+    folder.write("loop.json", content)
+    folder.write("equations.tex", loop_tex(result))
+    predictions = write_predictions(loop_predictions(result, overlays), folder)
+    page = render(
+        "loop.html",
+        data={PREDICTIONS: predictions, "loop.json": content},
+        name=f"{name}, {conditions}" if conditions else name,
+        summary=summary,
+        result=result,
+        questions=QUESTIONS,
+        sentences=loop_verdict(result),
+        error_rows=tables.error_rows(result)
+        + [tables.overlay_row(result, one) for one in overlays],
+        recorded=in_words(record.quantity for record in result.records),
+        noise_range=tables.noise_range(result),
+        run_rows=tables.run_rows(result),
+        explanations=tables.explanations(result),
+        inclusion=tables.inclusion(result),
+        next_tests=tables.next_tests(result),
+        stages=[tables.stage_row(stage, i) for i, stage in enumerate(result.stages)],
+        declared_effects=tables.declared_effects(result),
+        rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
+        folds=[tables.fold_row(fold) for fold in result.folds],
+        law=tables.law(result),
+        remaining=tables.remaining_rows(result),
+        readings=[
+            (f"Of the {name} model", reading.sentences)
+            for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
+            if name == "declared" or result.stages
+        ],
+        pictures=drawn,
+        run=run
+        or made_by(
+            folder.fingerprint,
+            f"discover close-loop {name}.toml",
+            ("loop.json", "predictions.csv", "equations.tex", "figures/*.svg"),
+            study_text,
+        ),
+    )
+    return folder.write("report.html", page)
+
+
+def loop_tex(result: LoopResult) -> str:
+    """Return what each stage added as LaTeX."""
+    lines = ["% Written by discover: what was added to the declared model, stage by stage."]
+    for stage in result.stages:
+        values = ", ".join(
+            f"{name} = {p.value:.6g} {p.unit} [{p.ci95[0]:.6g}, {p.ci95[1]:.6g}]"
+            for name, p in stage.parameters.items()
+        )
+        lines.append(
+            f"% {stage.effect} ({stage.kind}): {values}\n"
+            f"\\begin{{equation}}\n  {stage.equation}\n\\end{{equation}}"
+        )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,249 @@
+"""The verdict on a closed loop: what was found, how sure, what to measure next."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.results.loop_result import (
+    ConstantByMode,
+    LoopResult,
+    Stage,
+    StageParameter,
+)
+from discover.laws.registry import LAWS
+from discover.report.free_form_words import free_form_sentence
+from discover.report.wording import (
+    FIGURE_SYMBOLS,
+    effect_title,
+    effects_title,
+    estimate,
+    interval,
+    percent,
+    readable,
+    sentence,
+    significant,
+)
+from discover.statistics.residual import FEWEST_TESTED
+
+KINDS = {
+    "constitutive": "in the fluid",
+    "kinematic": "in the flow that the fluid felt",
+    "signal": "in the instrument's signal",
+}
+
+_LOOP = {
+    "effects_added": "The declared model lacked something, and adding it explains the data",
+    "no_effect_needed": "Nothing is missing that these data show: the declared model explains them",
+    "unexplained": "What is left still has structure that no candidate explains",
+    "no_signal": "The records hold no signal that a law could be told from",
+}
+
+_UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
+
+_NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
+
+_MOST_NAMES = 3
+
+_SETTLED = 0.95
+
+
+def loop_verdict(result: LoopResult) -> list[str]:
+    """Return the verdict on a closed loop: three sentences, in the order of `QUESTIONS`."""
+    return [_loop_found(result), _loop_sure(result), _loop_next(result)]
+
+
+def _loop_found(result: LoopResult) -> str:
+    names = _several([effect_title(stage.effect) for stage in result.stages], "and")
+    if result.verdict == "no_signal" and not names:
+        return (
+            f"{_LOOP['no_signal']}: they hold hardly anything but noise, or do not follow what was "
+            "imposed."
+        )
+    if result.verdict == "no_signal":
+        return (
+            f"{_LOOP['no_signal']}: {names} would explain them, with a fluid that is as good as "
+            "absent."
+        )
+    if result.verdict == "unexplained" and names and result.remaining.get("without_fluid"):
+        return (
+            f"No candidate explains the data: what comes nearest ({names}) leaves as much without "
+            "the fluid."
+        )
+    # what comes near without explaining is not called added
+    lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
+    parts = []
+    for i, stage in enumerate(result.stages):
+        values = ", ".join(
+            f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+            + f" (95 % {interval(p.ci95)})"
+            for name, p in stage.parameters.items()
+        )
+        parts.append(
+            f"{lead if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
+        )
+    verdict = _LOOP[result.verdict]
+    if result.verdict == "unexplained":
+        if not result.remaining.get("noise_known", True):
+            verdict = _UNKNOWN_NOISE
+        elif not result.remaining.get("carries_over", True):
+            verdict = _NOT_CARRIED
+        if result.free_form and result.free_form[0].explains:
+            parts.append(f"but {free_form_sentence(result.free_form[0])}")
+        elif result.free_form:
+            parts.append(f"and {free_form_sentence(result.free_form[0])}")
+    if result.laws:
+        parts.append(_law_chosen(result.laws))
+    return sentence([verdict, *parts])
+
+
+def _law_chosen(laws: Sequence[LawFit]) -> str:
+    """Return which law was taken of several, and from which these runs do not tell it."""
+    best, *others = laws
+    alike = [LAWS[one.law].title for one in others if not one.is_told_apart]
+    told = f"; these runs do not tell it from {_several(alike, 'and')}" if alike else ""
+    ends = f" ({_several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
+    return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
+
+
+def named(name: str, parameter: StageParameter) -> str:
+    """Return a parameter's name in the field's letters, and of one by mode, at which time it is."""
+    text = readable(name.replace("_", " "))
+    if not isinstance(parameter, ConstantByMode) or not parameter.degree:
+        return text
+    time = significant(parameter.mean_time_s, 3)
+    return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"
+
+
+def _loop_sure(result: LoopResult) -> str:
+    before, after = result.error_before, result.error_after
+    parts, said = [], ""
+    if before.held_out is not None and after.held_out is not None:
+        unseen = "on runs that no fit saw"
+        if result.folds:
+            unseen = "on each run, by a search that did not see it,"
+        said, sizes = _change(result, before.held_out, after.held_out)
+        parts.append(f"{unseen} the error {said} {sizes}")
+        if result.held_in_band is not None:
+            share = percent(result.held_in_band)
+            parts.append(f"the 95 % band of all explanations holds {share} of their samples")
+    verb, sizes = _change(result, before.fit, after.fit)
+    # a verb is said again only where it is another one
+    told = sizes if verb == said else f"the error {verb} {sizes}"
+    linear = result.remaining.get("linear_error") or 0.0
+    noise = f"where noise explains {percent(result.noise_floor)}"
+    if linear > result.noise_floor:
+        noise += f" and the misfit of the linear sweep by its modes {percent(linear)}"
+    if not result.remaining.get("noise_known", True):
+        noise = "of which nobody knows how much is noise"
+    parts.append(f"on the fitted runs {told}, {noise}")
+    if before.held_out is None:
+        parts.append("no run was held out to judge by")
+    if few := result.remaining.get("not_judging", ()):
+        verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
+        parts.append(f"{_several(few, 'and')} {verb}")
+    if count := result.remaining.get("outliers", 0):
+        which = "samples are outliers" if count > 1 else "sample is an outlier"
+        parts.append(f"{count} {which} and did not count")
+    if result.verdict == "effects_added" and (told := _alternatives(result)):
+        parts.append(told)
+    for stage in result.stages:
+        if stage.aliases:
+            others = _several([*map(effect_title, stage.aliases)], "or")
+            parts.append(f"these data cannot tell {effect_title(stage.effect)} from {others}")
+    return sentence(parts)
+
+
+def _alternatives(result: LoopResult) -> str:
+    """Return what is likelier than what was found, or nearly as likely; empty if nothing is."""
+    found = result.explanations.likeliest_first
+    own = result.explanations.holding([stage.effect for stage in result.stages])
+    others = [e for e in found if e is not own]
+    if own is None or not others:
+        return ""
+    share = own.probability / sum(e.probability for e in found)
+    if share > _SETTLED:
+        return ""
+    names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
+    rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
+    return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
+
+
+def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:
+    """Return what an error did, as a verb, and from where to where, as far as digits show it."""
+    if percent(before) == percent(after):
+        return "stays at" if result.stages or result.folds else "is", percent(after)
+    return "falls" if after < before else "rises", f"from {percent(before)} to {percent(after)}"
+
+
+def _several(names: Sequence[str], word: str) -> str:
+    """Return the first of several names, and how many more there are."""
+    shown = list(names[:_MOST_NAMES])
+    if more := len(names) - len(shown):
+        shown.append(f"{more} more")
+    return f" {word} ".join(shown)
+
+
+def _loop_next(result: LoopResult) -> str:
+    rates = [float(np.max(np.abs(record.rate))) for record in result.records]
+    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
+    if result.verdict == "no_signal" or result.remaining.get("without_fluid"):
+        return (
+            "See that the sensor is connected and the sample there, and measure where the stress "
+            "stands out of the noise: with a larger sample, a more sensitive transducer, or "
+            f"{faster}."
+        )
+    if result.verdict in _EXPLAINED and (told := _telling_test(result)):
+        return told
+    doubtful = _most_doubtful(result.stages)
+    if doubtful is not None and result.verdict != "unexplained":
+        check = doubtful.check.rstrip(". ")
+        if not check[1:2].isdigit():  # N2 keeps its capital
+            check = check[:1].lower() + check[1:]
+        title = effect_title(doubtful.effect)
+        if not doubtful.aliases:
+            return f"To confirm {title}: {check}."
+        others = _several([*map(effect_title, doubtful.aliases)], "and")
+        return f"To tell {title} from {others}: {check}."
+    if not result.remaining.get("noise_known", True):
+        return (
+            f"Record at least {FEWEST_TESTED} samples in each run, or repeat a run to learn its "
+            "noise and write it in the study ([loop] noise)."
+        )
+    if result.verdict == "unexplained":
+        return (
+            "Repeat one run with another geometry or instrument: what changes is the instrument's, "
+            "what stays is the fluid's."
+        )
+    hidden = max(
+        result.noise_floor,
+        *(float(result.remaining.get(name, 0.0)) for name in ("resolution", "linear_error")),
+    )
+    return (
+        f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
+        f"tests the model hardest is a faster flow: {faster}."
+    )
+
+
+_EXPLAINED = ("effects_added", "no_effect_needed")
+
+
+def _telling_test(result: LoopResult) -> str:
+    """Return the test that tells the likeliest explanation from others; empty if none does."""
+    following = result.next_tests
+    best = following.best
+    if best is None:
+        return ""
+    titles = [effects_title(effects) for effects in following.explanations]
+    first, *_ = best.pairs
+    chosen = first[0]
+    others = _several([titles[j] for i, j in best.pairs if i == chosen], "and")
+    what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
+    count = len(following.tests)
+    return f"To tell {titles[chosen]} from {others}: {best.title}{what}, of {count} tests weighed."
+
+
+def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:
+    """Return the stage to confirm first: one with aliases before one without."""
+    with_aliases = [stage for stage in stages if stage.aliases]
+    return next(iter([*with_aliases, *stages]), None)

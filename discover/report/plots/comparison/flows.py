@@ -1,0 +1,243 @@
+"""Stresses in one flow: against time, as Lissajous curves, and in start-up."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.learners.registry import learner_title
+from discover.report.overlay import Overlay
+from discover.report.plots.cycles import about_middle, in_last_cycle
+from discover.report.plots.style import (
+    BEFORE_STYLE,
+    MEASURED,
+    OVERLAY_STYLES,
+    SHADE,
+    SPARSE,
+    TRUTH_STYLE,
+    Picture,
+    figure,
+    learner_style,
+    legend_above,
+    literal,
+    make_logarithmic,
+    picture,
+    runs_through_decades,
+)
+from discover.report.wording import FIGURE_SYMBOLS, recorded_symbol
+
+START_UP_SHOWN = 10.0
+
+
+def units(comparison: Comparison) -> tuple[str, str, str]:
+    """Return labels of stress, time and rate units: scaled for computed data, SI for measured."""
+    if comparison.noise is not None:
+        return " / G", "t / λ", "λγ̇"
+    return " (Pa)", "t (s)", "γ̇ (1/s)"
+
+
+def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()):
+    """Yield label, style and stresses of everything known in a flow, in drawing order."""
+    before = comparison.before[flow.key]
+    if before is not None:
+        yield "before (known part alone)", BEFORE_STYLE, before
+    if flow.reference:
+        label = "truth" if flow.is_truth else "measured"
+        style = TRUTH_STYLE if flow.is_truth else {"color": MEASURED, "marker": ".", "ls": "none"}
+        yield label, style, flow.reference
+    for name, outcome in comparison.outcomes.items():
+        prediction = outcome.predictions[flow.key]
+        if prediction is not None:
+            yield learner_title(name), learner_style(name), prediction
+    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
+        if flow.key in overlay.curves:
+            yield literal(overlay.label), style, overlay.curves[flow.key]
+
+
+def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()) -> Picture:
+    """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
+    stress_unit, time_label, rate_label = units(comparison)
+    last = last_cycle(flow)
+    strain = about_middle(flow.strain, last)[last]
+    closed = {"elastic": (strain, "strain γ"), "viscous": (flow.rate[last], rate_label)}
+    shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
+    with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
+        for row, quantity in zip(axes, shown, strict=True):
+            for label, style, stresses in curves(comparison, flow, overlays):
+                if quantity in stresses:
+                    row[0].plot(flow.times, stresses[quantity], label=label, **style)
+                    for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
+                        panel.plot(along, stresses[quantity][last], **style)
+            _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
+            _mark_training(row[0], flow)
+            _frame(row[0], comparison, flow, quantity, flow.times >= 0)
+            for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
+                _draw_band(panel, comparison, flow, quantity, last, along)
+                _frame(panel, comparison, flow, quantity, last)
+            row[0].set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
+        axes[-1, 0].set_xlabel(time_label)
+        axes[0, 0].set_title(literal(flow.title))
+        for column, (kind, (_, label)) in enumerate(closed.items(), 1):
+            axes[0, column].set_title(f"{kind} Lissajous curve, last cycle")
+            axes[-1, column].set_xlabel(label)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            f"flow_{flow.name}",
+            f"{flow.title}: {_seen(comparison, flow)} "
+            "Left, stresses against time; beyond the times shaded grey the prediction runs past "
+            "the length of the training series. Middle and right, the last cycle against strain "
+            "and against shear rate. Shaded in orange is what the data leave open: the 95 % "
+            "intervals of the parameters, and the rival laws. Curves of the known part alone may "
+            "leave the frame.",
+        )
+
+
+def start_up_picture(
+    comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
+) -> Picture:
+    """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
+    stress_unit, time_label, _ = units(comparison)
+    quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
+    with figure(1, len(quantities), height=2.9) as (drawing, axes):
+        shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
+        if not flow.is_truth:
+            shown = np.ones_like(shown)
+        for panel, quantity in zip(axes[0], quantities, strict=True):
+            for label, style, stresses in curves(comparison, flow, overlays):
+                if quantity in stresses:
+                    panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
+            _draw_band(panel, comparison, flow, quantity, shown)
+            _frame(panel, comparison, flow, quantity, shown)
+            drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
+            panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
+            panel.set_xlabel(time_label)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            f"flow_{flow.name}",
+            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
+        )
+
+
+def training_picture(comparison: Comparison) -> Picture:
+    """Return the data that the learners saw, and how they fit them."""
+    flows = comparison.flows_of("training")
+    stress_unit, time_label, _ = units(comparison)
+    recorded = recorded_symbol(flow.protocol.quantity for flow in flows)
+    columns = min(4, len(flows))
+    rows = -(-len(flows) // columns)
+    with figure(rows, columns, height=1.8) as (drawing, axes):
+        for panel in axes.ravel()[len(flows) :]:
+            panel.set_visible(False)
+        for panel, flow in zip(axes.ravel(), flows, strict=False):
+            if flow.measured is not None:
+                panel.plot(flow.times, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
+            for name, outcome in comparison.outcomes.items():
+                prediction = outcome.predictions[flow.key]
+                if prediction is not None:
+                    style = learner_style(name)
+                    panel.plot(
+                        flow.times, prediction["sigma12"], label=learner_title(name), **style
+                    )
+            _draw_band(panel, comparison, flow, "sigma12", slice(None))
+            panel.set_title(literal(flow.title), fontsize=8)
+            if runs_through_decades(flow.times, flow.rate):
+                make_logarithmic(panel.xaxis)
+        for panel in axes[-1]:
+            panel.set_xlabel(time_label)
+        for panel in axes[:, 0]:
+            panel.set_ylabel(recorded + stress_unit)
+        legend_above(drawing, axes)
+        return picture(
+            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
+        )
+
+
+def _seen(comparison: Comparison, flow: Flow) -> str:
+    if flow.name in {f.name for f in comparison.flows_of("training")}:
+        return "the learners saw σ₁₂ of this flow in the shaded times, and nothing else of it."
+    return "no learner saw this flow."
+
+
+def _new_kind(comparison: Comparison) -> str:
+    """Return how a start-up differs from the flows fitted."""
+    if all(flow.oscillatory for flow in comparison.flows_of("training")):
+        return "a kind of flow that training, all oscillatory, did not contain."
+    return "no learner saw this flow."
+
+
+_FITTING_AS_WELL = {
+    "tensor_dense": "95 % of the dense library's laws",
+    "tbnn_ude": "networks that fit as well",
+}
+
+
+def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
+    """Shade what the data leave open: the intervals of the parameters, rivals, and members.
+
+    Against time, or against what is given of the samples shown.
+    """
+    along = flow.times[shown] if along is None else along
+    for name, label in _FITTING_AS_WELL.items():
+        outcome = comparison.outcomes.get(name)
+        limits = None if outcome is None else outcome.bands.get(flow.key)
+        if limits is not None:
+            low, high = limits[quantity]
+            panel.fill_between(
+                along,
+                low[shown],
+                high[shown],
+                color=learner_style(name)["color"],
+                alpha=0.18,
+                linewidth=0,
+                label=label,
+            )
+    band = comparison.next_measurement.bands.get(flow.key)
+    if band is None:
+        return
+    column = QUANTITIES.index(quantity)
+    panel.fill_between(
+        along,
+        band.rivals_low[shown, column],
+        band.rivals_high[shown, column],
+        color=SPARSE,
+        alpha=0.18,
+        linewidth=0,
+        label="left open by the data (95 %, with rivals)",
+    )
+
+
+def _mark_training(panel, flow: Flow) -> None:
+    if flow.training_end is not None and flow.training_end < flow.times[-1]:
+        panel.axvspan(
+            flow.times[0], flow.training_end, color=SHADE, lw=0, label="training times", zorder=0
+        )
+
+
+def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
+    """Let truth and learners, not what came before, decide the range."""
+    values = [
+        stresses[quantity][shown]
+        for label, _, stresses in curves(comparison, flow)
+        if quantity in stresses and not label.startswith("before")
+    ]
+    if quantity == "N2" and "N1" in flow.reference:
+        # a small N2 would look large: always at least a hundredth of N1
+        values.append(0.01 * np.max(np.abs(flow.reference["N1"])) * np.array([-1.0, 1.0]))
+    joined = np.concatenate(values) if values else np.zeros(1)
+    joined = joined[np.isfinite(joined)]
+    joined = joined if joined.size else np.zeros(1)
+    low, high = float(np.min(joined)), float(np.max(joined))
+    margin = 0.15 * (high - low) or 1.0
+    panel.set_ylim(low - margin, high + margin)
+
+
+def last_cycle(flow: Flow) -> np.ndarray:
+    """Return which samples of a flow lie in its last cycle, a little more so that it closes."""
+    frequencies = np.asarray(flow.protocol.frequencies)
+    active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
+    if active.size == 0 or np.min(active) <= 0:
+        return np.ones(flow.times.size, dtype=bool)
+    return in_last_cycle(flow.times, float(np.min(active)))

@@ -1,0 +1,58 @@
+"""What to measure next: predictions of the laws that remain, in the experiment proposed."""
+
+from discover.comparison.comparison import Comparison
+from discover.identify.design.experiments import OBSERVED
+from discover.report.plots.comparison.flows import units
+from discover.report.plots.style import (
+    CHOSEN_STYLE,
+    RIVAL_STYLES,
+    Picture,
+    figure,
+    legend_above,
+    picture,
+)
+from discover.report.wording import FIGURE_SYMBOLS, readable
+
+
+def next_picture(comparison: Comparison) -> Picture | None:
+    """Return what the chosen law and its rivals predict in the best experiment."""
+    following = comparison.next_measurement
+    if not following.proposals:
+        return None
+    best = following.proposals[0]
+    stress_unit, time_label, _ = units(comparison)
+    with figure(1, len(best.observed), height=3.0) as (drawing, axes):
+        for panel, quantity in zip(axes[0], best.observed, strict=True):
+            column = OBSERVED.index(quantity)
+            panel.plot(
+                best.experiment.times,
+                best.curves[0, :, column],
+                **CHOSEN_STYLE,
+                linewidth=2.2,
+                label=f"chosen: {_typeset(following.laws[0])}",
+            )
+            rivals = zip(following.laws[1:], best.curves[1:], strict=True)
+            for i, (name, curve) in enumerate(rivals):
+                panel.plot(
+                    best.experiment.times,
+                    curve[:, column],
+                    **RIVAL_STYLES[i % len(RIVAL_STYLES)],
+                    label=_typeset(name),
+                )
+            # a rival that runs away must not flatten the others
+            low, high = best.curves[0, :, column].min(), best.curves[0, :, column].max()
+            margin = 0.6 * (high - low) or 0.5
+            panel.set_ylim(low - margin, high + margin)
+            panel.set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
+            panel.set_xlabel(time_label)
+        legend_above(drawing, axes, columns=2)
+        return picture(
+            drawing,
+            "next_experiment",
+            f"The experiment proposed: {best.experiment.title}. The chosen law and its rivals, all "
+            "of which the data at hand allow.",
+        )
+
+
+def _typeset(law: str) -> str:
+    return readable(law).replace("-", "−")

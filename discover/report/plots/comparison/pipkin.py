@@ -1,0 +1,158 @@
+"""Maps over the Pipkin diagram: how strongly the flow pulls, against how fast it changes.
+
+The diagram is that of Pipkin 1972, Lectures on Viscoelasticity Theory: De across, Wi upwards.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from discover.comparison.comparison import Comparison
+from discover.comparison.judging.identifiability import EXACT
+from discover.comparison.judging.next_measurement import IdentifiabilityCell
+from discover.comparison.outcomes.flows import QUANTITIES
+from discover.learners.registry import learner_title
+from discover.report.plots.style import (
+    GREEN,
+    INK,
+    NETWORK,
+    SPARSE,
+    TRUTH,
+    Picture,
+    figure,
+    legend_above,
+    picture,
+)
+from discover.report.wording import FIGURE_SYMBOLS, percent
+
+_STRONGEST = 0.55  # more would drown the number in the cell
+_LOWEST, _HIGHEST = 1e-4, 1.0
+"""Relative errors at which the colour of a cell begins and ends."""
+
+Cells = Mapping[tuple[float, float], float | None]
+
+
+def error_map_picture(comparison: Comparison) -> Picture | None:
+    """Return the error of the known part and of each learner over Wi and De."""
+    if not comparison.flows_of("pipkin"):
+        return None
+    rows = {"before": "before", **{n: learner_title(n) for n in comparison.outcomes}}
+    with figure(len(rows), 3, width=10.0, height=2.5) as (drawing, axes):
+        for row, (who, title) in zip(axes, rows.items(), strict=True):
+            table = comparison.error_map(who)
+            for panel, quantity in zip(row, QUANTITIES, strict=True):
+                cells = {place: errors[quantity] for place, errors in table.items()}
+                _draw_cells(panel, cells, NETWORK)
+                panel.set_title(f"{FIGURE_SYMBOLS[quantity]}, {title}")
+                _mark_training(panel, comparison, cells)
+        _label(axes)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "pipkin_error",
+            "Pipkin map of error: relative L2 error in one late cycle of γ̇ = Wi cos(De t), N₂'s "
+            "relative to N₁; a dash where the law runs away. Open circles: flows whose σ₁₂ the "
+            "learners saw. Away from them a law is an extrapolation.",
+        )
+
+
+def identifiability_picture(comparison: Comparison) -> Picture | None:
+    """Return where in Wi and De the laws that remain differ, and where measuring decides."""
+    cells = comparison.next_measurement.identifiability()
+    if not cells:
+        return None
+    kinds = [q for q in QUANTITIES if any(q == c.observed[-1] for c in cells)]
+    with figure(1, len(kinds), width=10.0, height=2.9) as (drawing, axes):
+        for panel, quantity in zip(axes[0], kinds, strict=True):
+            mine = [c for c in cells if c.observed[-1] == quantity]
+            _draw_cells(panel, differences(mine, quantity), SPARSE)
+            deciding = [c for c in mine if c.decides]
+            places = [_place(mine, c.weissenberg, c.deborah) for c in deciding]
+            if places:
+                panel.plot(
+                    [x + 0.3 for x, _ in places], [y + 0.28 for _, y in places], "*", ms=6.0,
+                    color=GREEN, label="measuring it here is expected to rule out every rival",
+                )  # fmt: skip
+            also = "" if quantity == "sigma12" else " measured besides σ₁₂"
+            panel.set_title(f"{FIGURE_SYMBOLS[quantity]}{also}")
+            if comparison.noise is not None:  # otherwise runs have no Wi in these units
+                _mark_training(panel, comparison, differences(mine, quantity))
+        _label(axes)
+        legend_above(drawing, axes)
+        noise = percent(comparison.next_measurement.noise)
+        return picture(
+            drawing,
+            "pipkin_identifiability",
+            "Pipkin map of identifiability: how far the rival furthest from the chosen law is from "
+            "it, relative to the chosen law, N₂ relative to N₁; ∞ where a rival runs away. Where "
+            "the number is 0 no measurement of this quantity, however good, tells these laws "
+            f"apart. A star: at {noise} noise it decides against all of them, their parameters "
+            "readjusted within their intervals.",
+        )
+
+
+def differences(cells: Sequence[IdentifiabilityCell], quantity: str) -> Cells:
+    """Return the difference of a quantity by place: infinite where a rival runs away.
+
+    What is below the error of the integration is zero.
+    """
+    found = {}
+    for cell in cells:
+        value = cell.difference[quantity]
+        rounded = np.inf if value is None else 0.0 if value < EXACT else value
+        found[cell.weissenberg, cell.deborah] = rounded
+    return found
+
+
+def _draw_cells(panel, cells: Cells, colour: str) -> None:
+    """Draw one number a cell, the deeper the larger on a logarithmic scale."""
+    weissenberg, deborah = _axes_of(cells)
+    for (wi, de), value in cells.items():
+        x, y = deborah.index(de), weissenberg.index(wi)
+        strength = 0.0 if value is None else _strength(value)
+        panel.bar(x, 1.0, 1.0, y - 0.5, color=colour, alpha=strength * _STRONGEST, linewidth=0)
+        text = "∞" if value == np.inf else percent(value).replace(" %", "")
+        panel.text(x, y - 0.12, text, ha="center", va="center", fontsize=8, color=INK)
+    panel.set_xticks(range(len(deborah)), [f"{v:g}" for v in deborah])
+    panel.set_yticks(range(len(weissenberg)), [f"{v:g}" for v in weissenberg])
+    panel.set_xlim(-0.5, len(deborah) - 0.5)
+    panel.set_ylim(-0.5, len(weissenberg) - 0.5)
+    panel.grid(False)
+
+
+def _strength(value: float) -> float:
+    span = np.log(_HIGHEST / _LOWEST)
+    return float(np.clip(np.log(max(value, 1e-300) / _LOWEST) / span, 0.0, 1.0))
+
+
+def _axes_of(cells: Cells) -> tuple[list[float], list[float]]:
+    return sorted({wi for wi, _ in cells}), sorted({de for _, de in cells})
+
+
+def _place(cells: Sequence[IdentifiabilityCell], wi: float, de: float) -> tuple[int, int]:
+    weissenberg, deborah = _axes_of({(c.weissenberg, c.deborah): None for c in cells})
+    return deborah.index(de), weissenberg.index(wi)
+
+
+def _mark_training(panel, comparison: Comparison, cells: Cells) -> None:
+    """Mark the flows of training above the numbers, between cells where they lie on none."""
+    weissenberg, deborah = (np.asarray(v) for v in _axes_of(cells))
+    for flow in comparison.flows_of("training"):
+        if flow.oscillatory and flow.frequency:
+            x = np.interp(np.log(flow.frequency), np.log(deborah), np.arange(deborah.size))
+            y = np.interp(np.log(flow.amplitude), np.log(weissenberg), np.arange(weissenberg.size))
+            panel.plot(
+                x, y + 0.28, "o", ms=4.5, mfc="none", mew=1.0, color=TRUTH,
+                label="trained on (σ₁₂)",
+            )  # fmt: skip
+
+
+def _label(axes) -> None:
+    for panel in axes[-1]:
+        panel.set_xlabel("De = λω")
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Wi = λγ̇₀")
+    for panel in axes.ravel():
+        panel.annotate(
+            "%", (1.0, 1.02), xycoords="axes fraction", ha="right", fontsize=8, color=INK
+        )

@@ -1,0 +1,146 @@
+"""Pictures of what a closed loop leaves: residuals, and on what they depend."""
+
+import numpy as np
+
+from discover.closed_loop import LoopResult
+from discover.closed_loop.results.reading import differences
+from discover.report.plots.loop.runs import (
+    FIT_COLOUR,
+    HELD_COLOUR,
+    along_in_common,
+    axis_label,
+    models_of,
+    symbol_of,
+    through_decades,
+)
+from discover.report.plots.style import (
+    BEFORE,
+    INK,
+    Picture,
+    figure,
+    legend_above,
+    literal,
+    make_logarithmic,
+    make_percentage,
+    picture,
+)
+
+_UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
+
+
+def residual_picture(result: LoopResult) -> Picture:
+    """Return the residual against time and strain, before and after."""
+    records = [record for record in result.records if record.is_transient]
+    only_states = not records
+    records = records or list(result.records)
+    start_ups = only_states or all(map(through_decades, records))
+    labels = (
+        (along_in_common(records), axis_label(records)) if only_states else ("time (s)", "strain")
+    )
+    models = models_of(records)
+    with figure(len(models), 2, height=2.4) as (drawing, axes):
+        for row, (stage, title) in enumerate(models):
+            limit = 0.0
+            for place, record in enumerate(records):
+                relative = 100.0 * record.relative_residual[stage]
+                style = {
+                    "color": HELD_COLOUR if record.held_out else FIT_COLOUR,
+                    "lw": 0.9,
+                    "alpha": 0.8,
+                    "label": "held out" if record.held_out else "fitted",
+                }
+                other = record.measured if only_states else record.strain
+                along = (record.along[1], other)
+                axes[row, 0].plot(along[0], relative, gid=f"run{place}-{row}0", **style)
+                # a logarithmic axis has no place for strains against the positive direction
+                along_1 = np.abs(along[1]) if start_ups else along[1]
+                axes[row, 1].plot(along_1, relative, gid=f"run{place}-{row}1", **style)
+                limit = max(limit, float(np.percentile(np.abs(relative), 98)))
+            for panel, label in zip(axes[row], labels, strict=True):
+                if start_ups:
+                    make_logarithmic(panel.xaxis)
+                panel.set_xlabel(label if row == len(models) - 1 else "")
+                panel.axhline(0.0, color=INK, lw=0.6)
+                panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
+            axes[row, 0].set_ylabel(f"residual (% of rms {symbol_of(records)})")
+            axes[row, 0].set_title(title, loc="left")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "residual",
+            "Prediction minus measurement, over each run's root-mean-square stress, against "
+            + ("what was varied and what was measured" if only_states else "time and strain")
+            + "."
+            + " Note the different scales above and below." * (len(models) > 1)
+            + " What is left should look like noise around zero; anything else is an effect still "
+            "missing.",
+            switched=tuple(record.name for record in records),
+        )
+
+
+def reading_picture(result: LoopResult) -> Picture | None:
+    """Return on what the residual depends, before and after."""
+    readings = [(result.readings[0], "declared", BEFORE)]
+    if result.stages:
+        readings.append((result.readings[1], "augmented", FIT_COLOUR))
+    if not readings[0][0].collapses:
+        return None
+    waves = any(reading.waves for reading, _, _ in readings)
+    with figure(1, 3 if waves else 2, width=10.0, height=2.8) as (drawing, axes):
+        names = [c.coordinate for c in readings[0][0].collapses]
+        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=False):
+            shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
+            places = np.arange(len(names)) + shift
+            axes[0, 0].barh(
+                places, [shares.get(n, 0.0) for n in names], 0.36, color=colour, label=label
+            )
+        axes[0, 0].set_yticks(range(len(names)), [f"along {name}" for name in names])
+        axes[0, 0].set_xlim(0.0, 100.0)
+        axes[0, 0].set_xlabel("squared residual in common (%)")
+        _draw_run_by_run(axes[0, 1], result)
+        if waves:
+            _draw_waves(axes[0, 2], readings)
+        legend_above(drawing, axes)
+        caption = (
+            "Left: how much of the squared residual the runs share when drawn against each "
+            "coordinate, judged run by run from the others. Right of it: the error of each run."
+        )
+        if waves:
+            caption += (
+                " Far right: parts of the residual of each oscillating run: fundamental in phase "
+                "with the strain and with the rate, higher harmonics, drift."
+            )
+        return picture(drawing, "reading", caption)
+
+
+def _draw_run_by_run(panel, result: LoopResult) -> None:
+    """Draw the error of each run against what its residual follows, or the largest shear rate."""
+    varied = differences(result.records)
+    followed = [trend.quantity for trend in result.readings[1].trends]
+    name = next(iter([*followed, *varied]), None)
+    if name is None:
+        panel.set_visible(False)
+        return
+    values = varied[name]
+    for (model, label), colour in zip(
+        models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
+    ):
+        label = label.removesuffix(" model")
+        errors = [100.0 * float(record.errors[model]) for record in result.records]
+        panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
+    if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
+        panel.set_xscale("log")
+    make_percentage(panel.yaxis)
+    unit = f" ({_UNITS[name]})" if name in _UNITS else ""
+    panel.set_xlabel(literal(name.replace("_", " ")) + unit)
+    panel.set_ylabel("relative error (%)")
+
+
+def _draw_waves(panel, readings) -> None:
+    parts = ("elastic", "viscous", "odd", "even", "drift")
+    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=False):
+        for place, part in enumerate(parts):
+            sizes = [100.0 * abs(getattr(wave, part)) for wave in reading.waves]
+            panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)
+    panel.set_xticks(range(len(parts)), parts, rotation=30)
+    panel.set_ylabel("residual (% of fundamental)")
