@@ -108,7 +108,8 @@ def run_compare(
     from discover.report.comparison.report import write_comparison
     from discover.report.comparison.verdict import comparison_verdict
     from discover.report.overlay import comparison_overlays, read_overlays
-    from discover.study.build import declared_model, load_study_data
+    from discover.study.data import load_study_data
+    from discover.study.declared_model import declared_model
 
     sources = read_overlays(study)
     comparison = compare(study, seed, progress, folder, fit_constants=fit_declared)
@@ -145,7 +146,8 @@ def run_close_loop(
     from discover.report.loop.report import write_loop
     from discover.report.loop.verdict import loop_verdict
     from discover.report.overlay import loop_overlays, read_overlays
-    from discover.study.build import declared_model, forward_model, load_study_data
+    from discover.study.data import load_study_data
+    from discover.study.declared_model import declared_model, forward_model
 
     progress("loading data", 0.0)
     sources = read_overlays(study)
@@ -224,7 +226,7 @@ def fit_declared(model, dataset):
     Parameters
     ----------
     model
-        From `discover.study.build.declared_model`.
+        From `discover.study.declared_model.declared_model`.
     dataset
         The runs to fit.
 
@@ -237,7 +239,7 @@ def fit_declared(model, dataset):
         return model
     from discover.closed_loop import run_loop
     from discover.laws import make_law
-    from discover.study.build import forward_model
+    from discover.study.declared_model import forward_model
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name
     fitted = run_loop(dataset, forward_model(model), effects=["stress_offset"], max_effects=0)

@@ -5,17 +5,15 @@ from discover.closed_loop.loop import run_loop
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.closed_loop.results.free_curve import FreeForm
-from discover.closed_loop.results.loop_result import (
+from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
+from discover.closed_loop.results.next_test import NextTest, NextTests
+from discover.closed_loop.results.stages import (
     ConstantByMode,
-    ErrorPair,
     Fold,
-    LoopResult,
     ModeConstant,
-    RunRecord,
     Stage,
     StageParameter,
 )
-from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.closed_loop.search.attribution import Attribution
 from discover.forward import DeclaredModel
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.results.loop_result import ConstantByMode, ModeConstant
+from discover.closed_loop.results.stages import ConstantByMode, ModeConstant
 from discover.closed_loop.search.degrees import Degree
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope

@@ -8,7 +8,8 @@ import numpy as np
 from discover.closed_loop.explanations import BEAM_WIDTH
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.closed_loop.results.loop_result import Fold, LoopResult
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import Fold
 from discover.closed_loop.runs import MOST_SAMPLES
 from discover.closed_loop.search.checkpoint import Store
 from discover.dataset import Dataset

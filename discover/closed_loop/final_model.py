@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.closed_loop.results.loop_result import (
+from discover.closed_loop.results.stages import (
     ConstantByMode,
     DeclaredEffect,
     KnownParameter,

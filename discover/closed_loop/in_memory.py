@@ -14,8 +14,8 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
 from discover.progress import Progress, by_lines, checked
-from discover.study.build import DeclaredModel as DeclaredFluid
-from discover.study.build import forward_model
+from discover.study.declared_model import DeclaredModel as DeclaredFluid
+from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Loop
 from discover.validation import validated

@@ -43,9 +43,7 @@ from discover.closed_loop.law_choice import choose_law
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.law_fit import LawFit
-from discover.closed_loop.results.loop_result import (
-    LoopResult,
-)
+from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search

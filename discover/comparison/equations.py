@@ -9,7 +9,7 @@ from discover.equations import Equation, EquationTerm, Tested, combined, law_par
 from discover.equations.box import box_of, flow_numbers
 from discover.errors import InputError
 from discover.learners.registry import learner_title
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 
 _PROJECTION = (
     "This is the network put into words (its projection on the library). The network itself has no "

@@ -17,7 +17,8 @@ from discover.learners.result import LearnerResult
 from discover.learners.run_prediction import RunPrediction
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.build import DeclaredModel, StudyData
+from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel
 from discover.study.in_memory import (
     HeldOut,
     data_in_memory,

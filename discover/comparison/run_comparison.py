@@ -38,13 +38,8 @@ from discover.progress import Progress, silent
 from discover.protocols import settled
 from discover.protocols.kinematics import in_words
 from discover.statistics.residual import Expectation
-from discover.study.build import (
-    MODE_CONSTANTS,
-    DeclaredModel,
-    StudyData,
-    declared_model,
-    load_study_data,
-)
+from discover.study.data import StudyData, load_study_data
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, declared_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary

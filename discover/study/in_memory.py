@@ -15,7 +15,8 @@ from discover.laws.checking import check_law
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.build import MODE_CONSTANTS, DeclaredModel, StudyData
+from discover.study.data import StudyData
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only judges: a data set of its own, or names of runs of the data set."""

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from discover.cli import app
 from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
 from discover.closed_loop.augmented_law import AugmentedLaw
-from discover.closed_loop.results.loop_result import ConstantByMode, DeclaredEffect, ModeConstant
+from discover.closed_loop.results.stages import ConstantByMode, DeclaredEffect, ModeConstant
 from discover.effects import make_effect
 from discover.equations import Box, Equation, EquationTerm, equation_to_json
 from discover.equations import Tested as Where

@@ -7,7 +7,8 @@ import discover as dc
 from discover.closed_loop.each_run import judged_by
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanation, Explanations
-from discover.closed_loop.results.loop_result import Fold, LoopResult
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import Fold
 
 TIMES = np.linspace(0.05, 5.0, 40)
 

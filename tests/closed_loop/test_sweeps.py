@@ -8,7 +8,7 @@ from independent.sweeps import giesekus_modulus
 import discover as dc
 from discover.report.predictions import loop_predictions
 from discover.study import parse_study
-from discover.study.build import load_study_data
+from discover.study.data import load_study_data
 
 MODULUS, TIME, NOISE, FREQUENCY = 100.0, 1.0, 0.01, 2.0
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "stress_gain", "stress_offset"]

@@ -10,7 +10,7 @@ from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.outcomes.flows import Flow
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.protocols.protocol import oscillatory_shear, start_up
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 
 MODULUS, RELAXATION_TIME = 100.0, 2.0
 

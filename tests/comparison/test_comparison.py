@@ -18,7 +18,8 @@ from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study import RunFolder, parse_study
-from discover.study.build import declared_model, load_study_data
+from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model
 from tensor_library.library import build_library
 
 

@@ -10,7 +10,7 @@ from discover.comparison.instrument import FittedAlong, corrected
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tensor_sindy import TensorSINDy
-from discover.study.build import StudyData
+from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid
 from tensor_library.library import build_library
 

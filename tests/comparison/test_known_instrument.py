@@ -15,7 +15,7 @@ from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.simulate import simulate
 from discover.study import RunFolder, parse_study
-from discover.study.build import StudyData
+from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid, with_known
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": MOBILITY}))

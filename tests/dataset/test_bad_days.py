@@ -19,7 +19,8 @@ from discover.cli import app
 from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
 from discover.study import RunFolder, fingerprint, read_study
-from discover.study.build import declared_model, load_study_data
+from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model
 
 LAOS = "time_ms,strain,stress_kPa\n" + "".join(
     f"{i},{np.sin(0.3 * i):.6f},{np.cos(0.3 * i - 0.3):.6f}\n" for i in range(24)

@@ -266,7 +266,8 @@ def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measu
 def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(tmp_path):
     from discover.errors import InputError
     from discover.study import read_study
-    from discover.study.build import declared_model, load_study_data
+    from discover.study.data import load_study_data
+    from discover.study.declared_model import declared_model
 
     times = np.arange(1.0, 13.0)
 

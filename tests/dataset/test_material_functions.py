@@ -8,7 +8,7 @@ from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
 from discover.errors import InputError
 from discover.study import parse_study
-from discover.study.build import load_study_data
+from discover.study.data import load_study_data
 
 TABLES = {
     "flow_curve.csv": "shear_rate_1_s,stress_kPa,N1_Pa\n1,0.02,5\n0.1,0.003,0.1\n10,0.1,90\n",

@@ -17,7 +17,7 @@ from independent.noise import correlated, outliers, proportional, rms, white
 
 from discover.dataset import load_dataset
 from discover.study import read_study
-from discover.study.build import load_study_data
+from discover.study.data import load_study_data
 
 TIMES = np.linspace(0.0, 6.0, 121)
 MAXWELL = UpperConvectedMaxwell(50.0, 1.0)

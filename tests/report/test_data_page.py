@@ -13,7 +13,8 @@ from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
 from discover.report.data.page import data_page, first_study
 from discover.study import parse_study
-from discover.study.build import declared_model, load_study_data
+from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model
 
 OMEGA = np.geomspace(0.1, 100.0, 12)
 

@@ -10,13 +10,11 @@ from standing_alone import stands_alone
 
 from discover.closed_loop import CandidateScore
 from discover.closed_loop.results.explanation import Explanation, Explanations
-from discover.closed_loop.results.loop_result import (
+from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
+from discover.closed_loop.results.stages import (
     ConstantByMode,
-    ErrorPair,
     Fold,
-    LoopResult,
     ModeConstant,
-    RunRecord,
     Stage,
     StageParameter,
 )

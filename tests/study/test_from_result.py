@@ -9,7 +9,7 @@ from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.protocols import start_up
 from discover.study import fingerprint, read_study
-from discover.study.build import declared_model, forward_model
+from discover.study.declared_model import declared_model, forward_model
 
 LAW = {
     "format": "discover law 1",

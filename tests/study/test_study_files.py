@@ -9,7 +9,8 @@ import pytest
 from discover.errors import InputError
 from discover.study import RunFolder, fingerprint, parse_study, read_study
 from discover.study.atomic import write_text
-from discover.study.build import declared_model, load_study_data
+from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model
 
 SYNTHETIC = {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 20}}
 

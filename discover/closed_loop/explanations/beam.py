@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.augment import criterion, taken_out
+from discover.closed_loop.search.augment import taken_out
+from discover.closed_loop.search.evidence import criterion
 from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise

@@ -16,12 +16,8 @@ import numpy as np
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.augment import (
-    BARE_MENTION,
-    INDISTINGUISHABLE,
-    criterion,
-    taken_out,
-)
+from discover.closed_loop.search.augment import taken_out
+from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE, criterion
 from discover.forward.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.results.loop_result import Verdict
 from discover.closed_loop.results.run_record import RunRecord
+from discover.closed_loop.results.stages import Verdict
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import (

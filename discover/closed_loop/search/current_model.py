@@ -6,14 +6,10 @@ import numpy as np
 
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.search.attribution import Attribution, attribute
-from discover.closed_loop.search.augment import (
-    BARE_MENTION,
-    Choice,
-    refit,
-    taken_out,
-)
+from discover.closed_loop.search.augment import Choice, refit, taken_out
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.degrees import choose_degrees, positions_of
+from discover.closed_loop.search.evidence import BARE_MENTION
 from discover.closed_loop.search.first_starts import first_starts
 from discover.closed_loop.search.left_out import left_out_errors
 from discover.closed_loop.search.physical_range import at_an_end

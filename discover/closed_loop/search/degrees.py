@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discover.closed_loop.search.augment import BARE_MENTION, evidence
+from discover.closed_loop.search.evidence import BARE_MENTION, evidence
 from discover.forward import AugmentedModel, Batch
 from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
@@ -28,7 +28,7 @@ class Degree:
     degree
         0 for one constant of all modes.
     evidence
-        For each degree over one constant, by `discover.closed_loop.search.augment.evidence`.
+        For each degree over one constant, by `discover.closed_loop.search.evidence.evidence`.
     """
 
     degree: int = 0

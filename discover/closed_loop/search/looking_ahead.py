@@ -2,13 +2,9 @@
 
 import numpy as np
 
-from discover.closed_loop.search.augment import (
-    BARE_MENTION,
-    IMPROVEMENT,
-    evidence,
-    prune,
-)
+from discover.closed_loop.search.augment import IMPROVEMENT, prune
 from discover.closed_loop.search.current_model import CurrentModel
+from discover.closed_loop.search.evidence import BARE_MENTION, evidence
 from discover.closed_loop.search.exchanging import exchange
 from discover.closed_loop.search.left_out import left_out_errors
 from discover.statistics.residual import summarise

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.augment import INDISTINGUISHABLE, evidence
+from discover.closed_loop.search.evidence import INDISTINGUISHABLE, evidence
 from discover.effects import ModeDependence
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch

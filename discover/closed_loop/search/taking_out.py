@@ -2,9 +2,7 @@
 
 from collections.abc import Callable
 
-from discover.closed_loop.search.augment import (
-    drop_undecided,
-)
+from discover.closed_loop.search.augment import drop_undecided
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.closed_loop.search.mode_dependence import names_not_needed
 from discover.closed_loop.search.physical_range import at_an_end, undetermined

@@ -20,7 +20,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
 from discover.learners.tensor_sindy.selection import extended_bic
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 
 CLASSICAL = ("ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential")
 """Named laws with one constant at the most, as `discover.laws.registry.LAWS` spells them."""

@@ -11,7 +11,7 @@ from discover.laws.multimode import Fluid
 from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
 from discover.progress import Progress, silent
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
 

@@ -9,7 +9,7 @@ from discover.effects import ConstitutiveEffect, KnownEffect, ModeEffect, Series
 from discover.errors import InputError
 from discover.laws.expansion import law_of_terms
 from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 
 ONLY_LOOP = (
     "Leave it out of [model] effects, or, where it comes from an earlier result, give it an "

@@ -19,7 +19,7 @@ from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Recor
 from discover.errors import InputError
 from discover.forward import RunBatch, make_batch
 from discover.protocols.protocol import FlowProtocol
-from discover.study.build import StudyData
+from discover.study.data import StudyData
 
 _FOLLOWED = 1e-4
 """Error of a felt rate, over its largest, up to which its table leaves points out."""

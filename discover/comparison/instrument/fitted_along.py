@@ -27,7 +27,8 @@ from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
 from discover.protocols import strains
 from discover.statistics import least_squares_covariance
-from discover.study.build import MODE_CONSTANTS, DeclaredModel, StudyData, forward_model
+from discover.study.data import StudyData
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from tensor_library.library import TermLibrary
 
 CLASSICAL_EFFECTS: Mapping[str, str] = {

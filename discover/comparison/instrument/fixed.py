@@ -10,7 +10,7 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
 from discover.laws.registry import make_law
-from discover.study.build import MODE_CONSTANTS, DeclaredModel, forward_model
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 
 _MOST_SAMPLES = 400
 

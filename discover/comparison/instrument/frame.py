@@ -9,7 +9,8 @@ from discover.comparison.instrument.corrected import InRecord
 from discover.comparison.outcomes.flows import Flow, Stresses
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.study.build import DeclaredModel, StudyData
+from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel
 
 _RUNS = ("training", "held_out")
 

@@ -15,7 +15,8 @@ from discover.comparison.outcomes.flows import Flow, Stresses, comparison_flows,
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Dataset
 from discover.effects import KnownEffect
-from discover.study.build import MODE_CONSTANTS, DeclaredModel, StudyData
+from discover.study.data import StudyData
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 from tensor_library.library import TermLibrary
 
 

@@ -29,7 +29,7 @@ from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import stack_protocols
 from discover.simulate.grid import make_grids
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 

@@ -14,7 +14,7 @@ from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_tes
 from discover.protocols.protocol import FlowProtocol, oscillatory_shear, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, SimulationError, simulate
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.build import StudyData
+from discover.study.data import StudyData
 
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""

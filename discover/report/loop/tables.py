@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.results.loop_result import ConstantByMode, Fold, LoopResult, Stage
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import ConstantByMode, Fold, Stage
 from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError

@@ -5,12 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.closed_loop.results.law_fit import LawFit
-from discover.closed_loop.results.loop_result import (
-    ConstantByMode,
-    LoopResult,
-    Stage,
-    StageParameter,
-)
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import ConstantByMode, Stage, StageParameter
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (

@@ -1,0 +1,182 @@
+"""From a study to its data and their split."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from discover.dataset import Dataset
+from discover.dataset.load import load_dataset
+from discover.dataset.material_functions import TABLES
+from discover.dataset.run import require_signal
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.protocols.kinematics import MODULI
+from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
+from discover.study.schema import Study
+
+
+@dataclass(frozen=True)
+class StudyData:
+    """The data of a study, split.
+
+    Attributes
+    ----------
+    dataset
+        All runs.
+    fit, held_out
+        Runs that fits may see, and runs that only judge.
+    each
+        Whether every fitted run is also to be held out in turn.
+    """
+
+    dataset: Dataset
+    fit: Dataset
+    held_out: Dataset
+    each: bool = False
+
+    @property
+    def truth(self) -> Fluid | None:
+        """The fluid that made synthetic data, or None."""
+        return self.dataset.truth if isinstance(self.dataset, SyntheticDataset) else None
+
+
+def load_study_data(study: Study, seed: int | None = None) -> StudyData:
+    """Return the data of a study, split into runs to fit and runs held out.
+
+    Parameters
+    ----------
+    study
+        The study.
+    seed
+        Overrides the seed of synthetic noise.
+
+    Raises
+    ------
+    InputError
+        If a file is wrong, a named run does not exist, or the runs to fit hold no signal.
+    """
+    data = study.data
+    if data.synthetic is not None:
+        made = data.synthetic
+        dataset: Dataset = synthetic_dataset(
+            made.law,
+            made.parameters,
+            made.protocol,
+            made.noise,
+            made.seed if seed is None else seed,
+            made.samples,
+        )
+    else:
+        base = None if study.path is None else study.path.parent
+        dataset = load_dataset(
+            str(data.folder),
+            data.clock_factor,
+            base,
+            rate_is_measured=data.rate == "measured",
+            rate_before=data.rate_before,
+            sequence=data.sequence,
+            amplitude_sweep_rad_s=data.amplitude_sweep_rad_s,
+        )
+    each = data.held_out == "each"
+    named = () if data.held_out == "each" else data.held_out
+    dataset, named, fit = _with_tables(dataset, study, named)
+    if data.observe is not None:
+        dataset, named, fit_names = _observed(dataset, data.observe, named, fit)
+    else:
+        fit_names = tuple(fit or (name for name in dataset.names if name not in named))
+    held_out = dataset.select(named)
+    if not len(dataset):
+        raise InputError(
+            f"The data set {dataset.name!r} has no run, and no table that could be fitted in place "
+            "of one. Add runs.csv with one line a run, or one of "
+            f"{', '.join(f'{kind}.csv' for kind in TABLES)} or lve.csv."
+        )
+    if not fit_names:
+        raise InputError("Every run is held out; leave at least one run to fit.")
+    if each and len(fit_names) < 2:
+        raise InputError(
+            f'held_out = "each" needs at least 2 runs, one to leave out and one to fit; got '
+            f"{len(fit_names)}. Leave held_out out."
+        )
+    fit = dataset.select(fit_names)
+    require_signal(fit.runs)
+    return StudyData(dataset, fit, held_out, each)
+
+
+def _with_tables(
+    dataset: Dataset, study: Study, held_out: tuple[str, ...]
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...] | None]:
+    """Return the data with the tables beside the runs among them, those held out, and those fitted.
+
+    A table judges, unless the study says that it is fitted or there is nothing else to fit.
+    """
+    data = study.data
+    kinds = (*TABLES, "lve")
+    asked = {kind: getattr(data, kind) for kind in kinds if getattr(data, kind) is not None}
+    dataset.with_material_functions(list(asked))  # those that are not there are refused
+    there = list(dataset.material_functions)
+    # the linear sweep gives the modes, and is no judge unless it is asked for
+    if "lve" in asked or (dataset.linear_sweep is not None and not there and not len(dataset)):
+        there.append("lve")
+    roles = {kind: asked.get(kind, "judge" if len(dataset) else "fit") for kind in there}
+    if data.held_out == "each":
+        # each run judges in turn, and nothing beside them
+        roles = {kind: role for kind, role in roles.items() if role == "fit" or kind in asked}
+    if not roles:
+        return dataset, held_out, data.fit
+    fitted, judging = (
+        tuple(
+            run.name
+            for kind, role in roles.items()
+            if role == wanted
+            for run in replace(dataset, runs=()).with_material_functions([kind])
+        )
+        for wanted in ("fit", "judge")
+    )
+    fit = None if data.fit is None else (*data.fit, *(n for n in fitted if n not in data.fit))
+    return dataset.with_material_functions(list(roles)), (*held_out, *judging), fit
+
+
+def _observed(
+    dataset: Dataset,
+    observe: Sequence[str],
+    held_out: Sequence[str],
+    fit: Sequence[str] | None,
+) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
+    """Return the data with every quantity as a record, those held out, and those fitted.
+
+    What is recorded and not observed only judges.
+    """
+    dataset.select([*held_out, *(fit or ())])  # names that do not exist are refused
+    whole = dataset.quantity_by_quantity()
+    missing = set(observe) - {run.quantity for run in whole}
+    if missing:
+        raise InputError(
+            f"[data] observe names {sorted(missing)[0]}, which no run of {dataset.name!r} has. "
+            f"Write some of {', '.join(sorted({run.quantity for run in whole}))}."
+        )
+    wanted = dataset.names if fit is None else fit
+    by_name = {run.name: [] for run in dataset}
+    for run in whole:
+        by_name[run.name if run.quantity in MODULI else run.source].append(run)
+    # both moduli of a sweep are fitted, unless one of them is named
+    observed = set(observe) if set(observe) & set(MODULI) else {*observe, *MODULI}
+    for name in fit or ():
+        if not any(run.quantity in observed for run in by_name[name]):
+            raise InputError(
+                f"[data] fit names {name!r}, which recorded nothing that is in observe = "
+                f"{list(observe)}. Leave the run out of fit, or add what it recorded to observe."
+            )
+    fitted = [
+        run.name
+        for name in wanted
+        if name not in held_out
+        for run in by_name[name]
+        if run.quantity in observed
+    ]
+    judging = [
+        run.name
+        for name in (*held_out, *(name for name in wanted if name not in held_out))
+        for run in by_name[name]
+        if run.name not in fitted
+    ]
+    return whole, tuple(judging), tuple(fitted)
