@@ -81,6 +81,7 @@ def test_help_imports_nothing_heavy():
         assert command in done.stdout
 
 
+@pytest.mark.slow
 def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, monkeypatch):
     study, out = tmp_path / "s.toml", tmp_path / "out"
     study.write_text(STUDY)

@@ -36,6 +36,7 @@ def test_near_equals_are_aliases_and_what_is_worse_everywhere_is_none(evidence, 
     assert (aliases_of(best, [best, other]) == ("relaxation_mode",)) == alias
 
 
+@pytest.mark.slow
 def test_one_start_up_cannot_tell_a_gain_of_the_rate_from_one_of_the_stress():
     # a linear fluid at one rate: the two multiply the same record
     time = np.linspace(0.1, 5.0, 60)

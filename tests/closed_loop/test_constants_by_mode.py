@@ -202,6 +202,7 @@ def test_an_interrupted_loop_keeps_the_degrees():
     assert again.by_mode["giesekus_mobility"].degree == 1
 
 
+@pytest.mark.slow
 def test_the_picture_says_what_is_determined_and_what_is_not():
     drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)))
     assert drawn is not None

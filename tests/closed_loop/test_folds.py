@@ -35,6 +35,7 @@ def folds(*verdicts):
     return [Fold(f"run {i}", verdict, (), 0.1, 0.01) for i, verdict in enumerate(verdicts)]
 
 
+@pytest.mark.slow
 def test_what_most_loops_without_a_run_do_not_explain_is_unexplained(explained):
     assert explained.verdict == "no_effect_needed"
     judged = judged_by(

@@ -30,6 +30,7 @@ def loop(held_mobility):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mobility", "verdict"), [(0.3, "effects_added"), (0.315, "unexplained")])
 def test_a_pattern_in_what_no_fit_saw_refutes_what_explains_the_fitted_runs(mobility, verdict):
     result = loop(mobility)

@@ -80,6 +80,7 @@ def test_laws_that_slow_shear_cannot_tell_apart_are_said_to_be_alike():
     assert "do not tell it from" in loop_verdict(found)[0]
 
 
+@pytest.mark.slow
 def test_a_law_that_none_of_them_is_stays_unexplained():
     """Two modes with constants of their own, told to be one."""
     slow = Giesekus(0.8, 1.0, 4.0)

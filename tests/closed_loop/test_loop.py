@@ -87,6 +87,7 @@ def test_a_planted_mobility_is_found_named_and_predicts_the_held_out_run(planted
     assert result.error_after.held_out < 0.015 < 0.1 < result.error_before.held_out
 
 
+@pytest.mark.slow
 def test_a_planted_rise_time_is_found_or_its_declared_alias():
     result = loop(make_dataset(UpperConvectedMaxwell(), rise=0.3))
     first = result.stages[0]

@@ -45,6 +45,7 @@ def test_strain_that_was_there_before_the_first_sample_is_doubted():
     assert not list(doubts_of_start(step(0.03, times=early)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [True, False])
 def test_an_effect_that_may_be_what_came_before_is_not_believed(told):
     result = loop(step(0.03, told), step(0.06, told))

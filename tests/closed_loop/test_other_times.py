@@ -42,6 +42,7 @@ def loop_of(folder, material, declared_time, instrument=None):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("declared", "slip"),
     [(2.0 * TIME, 0.0), (TIME, 0.005)],

@@ -128,6 +128,7 @@ def test_two_flaws_that_only_together_explain_the_data_are_both_named(planter):
         assert any(effect in stage for stage in names(result))
 
 
+@pytest.mark.slow
 def test_an_effect_without_which_the_law_runs_away_is_kept(planter, monkeypatch):
     whole = CurrentModel.without
 

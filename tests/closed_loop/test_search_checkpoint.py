@@ -56,6 +56,7 @@ def loop(dataset, store=None, say=None):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_interrupted_loop_ends_where_an_undisturbed_one_does(dataset):
     store = Store()
     undisturbed = loop(dataset, store)

@@ -65,6 +65,7 @@ def test_a_mobility_is_found_in_an_amplitude_sweep_alone_and_holds_in_the_linear
     assert "time (s)" not in page
 
 
+@pytest.mark.slow
 def test_nothing_is_found_in_the_amplitude_sweep_of_the_declared_fluid(tmp_path):
     data = dc.load_dataset(sweep_folder(tmp_path, 0.0)).with_material_functions()
     loop = dc.close_loop(data, BASE, effects=EFFECTS)

@@ -110,6 +110,7 @@ def test_an_outcome_comes_back_from_its_state_unchanged(comparison):
         assert np.array_equal(again.predictions[key]["N1"], prediction["N1"])
 
 
+@pytest.mark.slow
 def test_a_finished_learner_is_not_trained_again(tmp_path, monkeypatch):
     calls = []
 

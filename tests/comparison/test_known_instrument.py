@@ -159,11 +159,13 @@ def test_the_constants_stand_in_the_results_with_what_is_known_of_them(with_gain
     assert "fitted along with each learner" in with_gain.known_part
 
 
+@pytest.mark.slow
 def test_what_was_kept_gives_the_same_results(weak, with_gain, folder):
     again = compared(weak, RunFolder(folder / "out", "print"), effects={"stress_gain": "fit"})
     assert again.to_json()["learners"] == with_gain.to_json()["learners"]
 
 
+@pytest.mark.slow
 def test_the_classical_laws_have_the_gain_too(with_gain):
     giesekus = next(fit for fit in with_gain.classical if fit.law == "giesekus")
     assert giesekus.parameters["alpha"] == pytest.approx(MOBILITY, abs=0.01)

@@ -154,6 +154,7 @@ def test_draws_of_a_law_have_its_terms_and_its_intervals(sindy):
         dc.TensorSINDy().to_xarray()
 
 
+@pytest.mark.slow
 def test_members_of_a_network_are_told_apart(network, data):
     pytest.importorskip("xarray")
     slow = data[["slow.csv"]]

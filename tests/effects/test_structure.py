@@ -141,6 +141,7 @@ def alternating(law, cycles=40):
     return within, law.respond(oscillation(*SWING), times).sigma12[1:]
 
 
+@pytest.mark.slow
 def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     name = "thixotropic_relaxation_two_times"
     times, truth = alternating(independent_of(name))
@@ -152,6 +153,7 @@ def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     np.testing.assert_allclose(found, truth, atol=5e-3 * np.max(truth))
 
 
+@pytest.mark.slow
 def test_moduli_of_two_structures_are_those_that_scipy_ends_at():
     name = "thixotropic_relaxation_two_times"
     law, (amplitude, frequency) = independent_of(name), SWING

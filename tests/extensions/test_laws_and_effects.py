@@ -46,6 +46,7 @@ print(np.abs(law.stress_rate(stress, np.asarray(rate))).max())
     assert float(workplace.run(script=script).stdout) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_effect_of_the_page_is_listed_found_and_reported(workplace):
     workplace.follow(EFFECT)
     listed = json.loads(workplace.run("effects", "--json").stdout)

@@ -64,6 +64,7 @@ def test_slip_without_solvent_bands_from_the_rate_of_its_maximum(slip):
     assert "within the rates of training" in slip[FLOW_CURVE].text
 
 
+@pytest.mark.slow
 def test_slip_stretches_without_bound_beyond_its_own_rate(slip):
     # 2(1 − ξ)ε̇ = 1
     assert slip[EXTENSION].value == pytest.approx(1 / 1.2, rel=1e-3)
@@ -109,6 +110,7 @@ def test_a_linear_term_is_seen_in_the_small_strain_limit():
     assert changed.value == pytest.approx(0.1 / 1.1, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_law_that_feeds_itself_is_caught():
     # h = −1.5 σ: stress grows by itself
     checks = report(expansion(linear=-1.5))
@@ -133,6 +135,7 @@ def test_a_law_that_runs_away_beyond_training_has_an_end_of_its_box():
     assert "runs away" in reach.text
 
 
+@pytest.mark.slow
 def test_the_report_is_plain_json(maxwell):
     content = json.loads(json.dumps(maxwell.to_json(), allow_nan=False))
     assert {c["name"] for c in content["checks"]} >= {FLOW_CURVE, EXTENSION}

@@ -65,6 +65,7 @@ def test_with_slip_n2_follows_from_neither_shear_stress_nor_n1(structure):
     assert curved.at_any_size is False  # c = ξ(1 − ξ/2) is a curve
 
 
+@pytest.mark.slow
 def test_the_tangent_of_the_twins_has_the_slope_of_their_formula(runs):
     structure = analyse_structure(
         runs, LIBRARY, nominal={"twin": LawTerms({"tr(sigma)*gammadot": 0.32})}

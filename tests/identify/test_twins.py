@@ -111,6 +111,7 @@ def test_random_histories_span_weak_to_strong_flows_and_repeat():
     assert np.array_equal(flows.protocols.phases, again.protocols.phases)
 
 
+@pytest.mark.slow
 def test_laws_side_by_side_extend_as_one_alone():
     times = np.linspace(0, 4, 81)
     laws = [LawTerms({"sigma.sigma": 0.2}), LawTerms({})]

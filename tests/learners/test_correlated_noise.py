@@ -50,6 +50,7 @@ def test_every_sample_counts_in_white_noise(seed):
     assert model.terms_ == ()
 
 
+@pytest.mark.slow
 def test_a_law_that_fits_exactly_is_judged_on_every_sample():
     noisy = runs(0.0, 0)
     exact = [replace(run, stress=-run.rate * np.expm1(-TIMES)) for run in noisy]

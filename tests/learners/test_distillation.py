@@ -37,6 +37,7 @@ def test_maxwell_learns_what_the_paper_says(teacher, paper, debiased):
     assert f"{result.debiased['g2']:.4g}" in result.latex
 
 
+@pytest.mark.slow
 def test_the_penalised_minimum_is_one():
     # no neighbour of the reported parameters has a smaller objective, computed independently
     kappa, times = 0.01, np.linspace(0.0, 20.0, 201)
@@ -79,6 +80,7 @@ def test_a_law_taught_to_itself_is_recovered(teacher, student, truth):
     json.dumps(result.as_dict())
 
 
+@pytest.mark.slow
 def test_another_law_leaves_an_error_and_a_false_second_normal_stress():
     # negative control of the test above: PTT has N2 = 0, Giesekus has not
     result = distil(

@@ -67,6 +67,7 @@ def test_every_member_learns(problem, first, others):
     assert np.all(misfits[1:] < 0.2 * misfits[0])
 
 
+@pytest.mark.slow
 def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, others):
     predicted = member_predictions([Fluid.dimensionless(m.law) for m in others], TEST, TIMES)
     low, high = predicted.band("N1")
@@ -138,6 +139,7 @@ def test_a_run_that_is_not_seen_has_no_residual(problem):
     np.testing.assert_array_equal(seen.grids.sample_mask.sum(axis=1), [41, 0])
 
 
+@pytest.mark.slow
 def test_a_member_that_runs_away_is_counted_and_left_out_of_the_band(others):
     good = others[0].law
     lost = eqx.tree_at(lambda law: law.constants, good, jnp.zeros(8).at[3].set(-8.0))

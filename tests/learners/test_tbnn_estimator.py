@@ -103,6 +103,7 @@ def test_modes_of_a_spectrum_share_the_law_that_their_sum_teaches():
     assert model.set_params(modulus=100.0, relaxation_time=1.0).score(runs) < 0.99
 
 
+@pytest.mark.slow
 def test_it_is_a_scikit_learn_estimator(data):
     model = TBNNUDE(recipe=SMALL, random_state=3, n_members=1)
     copy = clone(model)

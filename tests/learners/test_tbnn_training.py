@@ -160,6 +160,7 @@ def test_whiteness_tells_noise_from_structure(seed, kind):
         assert not is_white(noise.cumsum(axis=1), mask)
 
 
+@pytest.mark.slow
 def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
     law = make_network(jax.random.key(3), 5, True)
     active = jnp.array([True, False, True])
@@ -205,6 +206,7 @@ def test_an_absurd_learning_rate_is_survived(giesekus_problem):
     )
 
 
+@pytest.mark.slow
 def test_the_network_stands_on_a_known_base_law():
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
     problem = make_problem(data.runs, np.ones(1), np.ones(1))
@@ -224,6 +226,7 @@ def test_a_descent_far_behind_its_rival_is_given_up_and_one_close_behind_is_not(
     assert steps_until_given_up(2.0) == len(pace)
 
 
+@pytest.mark.slow
 def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     fluid = GiesekusFluid((1.0,), (1.0,), 0.3)
     times = np.linspace(0.1, 3.0, 20)

@@ -91,6 +91,7 @@ def mobilities(exact):
     return [Fitted(exact[giesekus], seed, "sigma.sigma", 0.2) for seed in range(16)]
 
 
+@pytest.mark.slow
 def test_the_linearised_interval_of_a_mobility_is_left_alone(mobilities):
     for found in mobilities:
         assert found.draws.method == "linear"

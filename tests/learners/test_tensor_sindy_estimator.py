@@ -67,6 +67,7 @@ def test_noise_alone_brings_in_no_term():
     assert model.result_.details["chosen"] == 0
 
 
+@pytest.mark.slow
 def test_twins_in_shear_stress_are_listed_and_the_simplest_is_chosen():
     dataset = small_dataset("johnson_segalman", {"xi": 0.4})
     model = TensorSINDy(LIBRARY, **ALONE).fit(dataset)

@@ -30,6 +30,7 @@ def stability(model, seed=0, n_pairs=5):
     )
 
 
+@pytest.mark.slow
 def test_the_true_term_is_stable_and_its_twins_take_its_place(fitted):
     found = stability(fitted)
     slip = LIBRARY.names.index("sigma.gammadot+gammadot.sigma")

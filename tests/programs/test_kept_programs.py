@@ -214,6 +214,7 @@ def test_it_is_pickled_by_its_name_as_a_function_is():
     assert pickle.loads(pickle.dumps(solve_batch)) is solve_batch
 
 
+@pytest.mark.slow
 def test_shapes_and_types_have_programs_of_their_own(folder):
     double = compiled(_double, made_from="this test")
     for x in (np.arange(2.0), np.arange(3.0), np.arange(3), np.float64(1.0)):

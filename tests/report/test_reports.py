@@ -383,6 +383,7 @@ def test_words_with_terms_in_them_keep_their_full_stops_and_decimal_points():
     assert said == "0.5 tr(σ·γ̇) I + σ·σ, whatever the law."
 
 
+@pytest.mark.slow
 def test_reports_leave_a_notebook_its_pictures():
     """Reports once changed matplotlib's backend, and a notebook showed no picture from then on."""
     code = "import matplotlib; matplotlib.use('agg'); import discover.report.comparison.report; "

@@ -70,6 +70,7 @@ def test_stiff_spectrum_matches_the_analytic_start_up():
     np.testing.assert_allclose(stress.shear_stress, expected, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
     modulus, relaxation_time = SPECTRUM
     fluid = Fluid(Giesekus(0.3), modulus, relaxation_time)
@@ -155,6 +156,7 @@ def test_a_cessation_is_not_smeared_over_a_step():
         np.testing.assert_allclose(stress, expected, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_forward_and_reverse_gradients_agree_with_finite_differences():
     flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0, 4, 9)
     grid = first(make_grids([flow], [times]))
