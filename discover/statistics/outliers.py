@@ -88,8 +88,7 @@ def _missed_alone(
     """Return which samples are missed more than those around, and are off them in the record."""
     missed = residual - median_filter(residual, _SMOOTH, mode="nearest")
     halfway = np.abs(np.convolve(residual, [-0.5, 1.0, -0.5], "valid")) / np.sqrt(1.5)
-    size = min(_NEIGHBOURHOOD, len(halfway))
-    spread = np.pad(1.4826 * median_filter(halfway, size, mode="nearest"), 1, mode="edge")
+    spread = _local_spread(halfway, len(residual), 1)
     far = np.abs(missed) > _ABOVE_SPREAD * spread
     off = np.zeros(len(record), dtype=bool)
     for width in range(1, _WIDEST + 1):
@@ -140,8 +139,25 @@ def _excess(values: Float[np.ndarray, " n"], width: int):
 
 def _local_noise(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return the standard deviation of what changes from sample to sample, around each sample."""
-    fast = np.abs(np.diff(values, 3)) / np.sqrt(20.0)
-    size = min(_NEIGHBOURHOOD, len(fast))
-    middle = np.clip(np.arange(len(values)) - 1 - size // 2, 0, len(fast) - size)
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(fast, size), axis=1)
+    return _local_spread(np.abs(np.diff(values, 3)) / np.sqrt(20.0), len(values), 1)
+
+
+def _local_spread(sizes: Float[np.ndarray, " m"], n: int, first: int) -> Float[np.ndarray, " _"]:
+    """Return the robust standard deviation around each of n samples.
+
+    Near an end of the record it is that of the samples next to the end: a window that repeats the
+    last one would take its size for that of all.
+
+    Parameters
+    ----------
+    sizes
+        Of what has that deviation, without its sign.
+    n
+        Number of samples.
+    first
+        The sample that the first size is of.
+    """
+    width = min(_NEIGHBOURHOOD, len(sizes))
+    middle = np.clip(np.arange(n) - first - width // 2, 0, len(sizes) - width)
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(sizes, width), axis=1)
     return 1.4826 * medians[middle]
