@@ -250,7 +250,7 @@ def test_errors_inside_and_beyond_the_range_are_told_apart_and_so_is_a_runaway()
     }
     comparison = replace(comparison, outcomes=outcomes)
     sure = comparison_verdict(comparison)[1].lower()
-    assert "σ12 by 0 % inside the fitted range and σ12 by 50 % beyond the fitted range" in sure
+    assert "σ12 by up to 0 % inside the fitted range, and σ12 by up to 50 % beyond the fit" in sure
     assert "sparse regression's stress runs away in γ̇ = cos(t), beyond the fitted range" in sure
     assert "neural network's stress runs away" not in sure
     cells = error_rows(comparison)[1]["cells"]

@@ -11,6 +11,7 @@ from discover.report.wording import (
     estimate,
     interval,
     learner_as_subject,
+    listed,
     percent,
     readable,
     sentence,
@@ -166,7 +167,7 @@ def _how_sure(comparison: Comparison) -> str:
                 f"{_within(name)}'s law fails {len(failed)} of the checks of physical "
                 f"soundness ({', '.join(failed)})"
             )
-    return sentence(parts)
+    return " ".join(sentence([part]) for part in parts)
 
 
 def _unseen(comparison: Comparison, name: str) -> list[str]:
@@ -181,14 +182,14 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
         shear = all(flow.records_shear_stress for flow in flows)
         recorded = "σ12" if shear else "the recorded stress"
         said = [
-            f"{symbol} by {percent(value)}"
+            f"{symbol} by up to {percent(value)}"
             for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
             if (value := worst(errors, quantity.split()[0])) is not None
         ]
         if said:
-            parts.append(f"{', '.join(said)} {where}")
+            parts.append(f"{listed(said)} {where}")
     law = _within(name)
-    told = [f"{law} misses, in flows that no fit saw, at most {' and '.join(parts)}"]
+    told = [f"in flows that no fit saw, {law} misses {', and '.join(parts)}"]
     return (told if parts else []) + (
         [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
     )
