@@ -3,12 +3,14 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.path import Path
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
 from discover.report.plots.comparison.flows import _draw_band
+from discover.report.plots.cycles import shade_between
 
 TIMES = np.arange(5.0)
 FLOW = Flow("startup", "test", start_up(2.0), TIMES, np.full(5, 2.0), {})
@@ -29,4 +31,25 @@ def test_the_band_of_a_learner_is_shaded_under_its_name(learner, label):
     drawing, panel = plt.subplots()
     _draw_band(panel, comparison, FLOW, "N1", TIMES >= 0)
     assert [shade.get_label() for shade in panel.collections] == [label]
+    plt.close(drawing)
+
+
+def test_a_band_along_a_closed_curve_is_shaded_where_it_goes_and_nowhere_else():
+    # x = sin t, y = cos t: a ring. A fill between its two edges as a whole shades the middle too.
+    angle = np.linspace(0.0, 2.0 * np.pi * 1.02, 200)
+    along, middle = np.sin(angle), np.cos(angle)
+    drawing, panel = plt.subplots()
+    shade_between(panel, along, middle - 0.1, middle + 0.1, alpha=0.2)
+    (shade,) = panel.patches
+    drawing.canvas.draw()
+    shaded = np.zeros((40, 40), dtype=bool)
+    grid = np.linspace(-0.95, 0.95, 40)
+    path = shade.get_path()
+    for piece in path.to_polygons(closed_only=True):
+        for i, x in enumerate(grid):
+            shaded[i] |= Path(piece).contains_points(np.stack([np.full(40, x), grid], axis=-1))
+    edge = np.sqrt(1.0 - grid**2)[:, None]
+    distance = np.minimum(np.abs(grid - edge), np.abs(grid + edge))
+    assert np.all(shaded[distance < 0.09])
+    assert not np.any(shaded[distance > 0.11])
     plt.close(drawing)

@@ -26,7 +26,7 @@ CORRELATED = 0.3
 
 
 def comparison_verdict(comparison: Comparison) -> list[str]:
-    """Return the verdict on a comparison: three sentences, in the order of `QUESTIONS`."""
+    """Return the verdict on a comparison: an answer to each of `QUESTIONS`, in order."""
     return [_found(comparison), _how_sure(comparison), _next(comparison)]
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 from jaxtyping import Bool, Float
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 
 
 def in_last_cycle(times: Float[np.ndarray, " n"], frequency: float) -> Bool[np.ndarray, " n"]:
@@ -22,3 +24,38 @@ def about_middle(
 ) -> Float[np.ndarray, " n"]:
     """Return the strain about the middle of the range that it has in a cycle."""
     return strain - 0.5 * (strain[cycle].max() + strain[cycle].min())
+
+
+def shade_between(
+    panel,
+    along: Float[np.ndarray, " n"],
+    low: Float[np.ndarray, " n"],
+    high: Float[np.ndarray, " n"],
+    **style,
+) -> None:
+    """Shade what lies between two curves, also where `along` goes back and forth.
+
+    There a fill between the curves as a whole would shade the inside of a loop and a bar where it
+    begins and ends, and not what the band sweeps.
+
+    Parameters
+    ----------
+    panel
+        Axes of matplotlib.
+    along, low, high
+        Where the curves stand, and the curves, shape (n,).
+    style
+        Of the shade, as for `matplotlib.axes.Axes.fill_between`.
+    """
+    if np.all(np.diff(along) >= 0.0):
+        panel.fill_between(along, low, high, **style)
+        return
+    before, after = np.stack([along, low], axis=-1), np.stack([along, high], axis=-1)
+    forth = np.stack([before[:-1], before[1:], after[1:], after[:-1], before[:-1]], axis=1)
+    forth = forth[np.all(np.isfinite(forth), axis=(1, 2))]
+    # all in one sense, for pieces of opposite senses that overlap would take each other out
+    back = forth[:, 1, 0] < forth[:, 0, 0]
+    forth[back] = forth[back, ::-1]
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    path = Path(forth.reshape(-1, 2), codes * len(forth))
+    panel.add_patch(PathPatch(path, **style))

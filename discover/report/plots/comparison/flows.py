@@ -8,7 +8,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
-from discover.report.plots.cycles import about_middle, in_last_cycle
+from discover.report.plots.cycles import about_middle, in_last_cycle, shade_between
 from discover.report.plots.style import (
     BEFORE_STYLE,
     MEASURED,
@@ -185,7 +185,8 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
         limits = None if outcome is None else outcome.bands.get(flow.key)
         if limits is not None:
             low, high = limits[quantity]
-            panel.fill_between(
+            shade_between(
+                panel,
                 along,
                 low[shown],
                 high[shown],
@@ -198,7 +199,8 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     if band is None:
         return
     column = QUANTITIES.index(quantity)
-    panel.fill_between(
+    shade_between(
+        panel,
         along,
         band.rivals_low[shown, column],
         band.rivals_high[shown, column],

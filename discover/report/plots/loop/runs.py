@@ -8,6 +8,7 @@ from matplotlib.ticker import EngFormatter
 from discover.closed_loop import LoopResult, RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.report.overlay import Overlay
+from discover.report.plots.cycles import shade_between
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,
@@ -137,8 +138,8 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     """
     if record.band is not None and record.is_transient:
         low, high = record.band[:, shown]
-        panel.fill_between(
-            along[shown], low, high, alpha=0.18, lw=0,
+        shade_between(
+            panel, along[shown], low, high, alpha=0.18, lw=0,
             color=HELD_COLOUR if record.held_out else FIT_COLOUR,
             label="95 % of measurements, all explanations",
         )  # fmt: skip
