@@ -148,6 +148,11 @@ class Fluid(eqx.Module):
         """Number of relaxation modes."""
         return self.relaxation_time.shape[0]
 
+    @property
+    def settling_time(self) -> float | None:
+        """Longest relaxation time in s; None where the law itself has no linear relaxation."""
+        return float(np.max(self.relaxation_time)) if self.law.linear_relaxation else None
+
     def rest(self) -> Float[Array, "k 4"]:
         """Return the state at rest."""
         return jnp.zeros((self.n_modes, 4))

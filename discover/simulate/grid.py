@@ -26,6 +26,12 @@ _JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.08, 2
 # A rate is constant while it changes by less than this fraction from sample to sample
 _CHANGE = 0.05
 
+# Of steps that grow as the fluid settles: the fraction up to which a rate stays what it was first,
+# for a change sets off a disturbance of its size; the most of the time since such a change, for a
+# structure of the fluid may settle ever more slowly; the share of relaxation that is counted on,
+# for a law that is tried may take some of it off; the order of the method
+_DISTURBANCE, _GROWTH_AS_IT_SETTLES, _SURE, _ORDER = 0.01, 0.05, 0.5, 4
+
 
 class IntegrationGrid(eqx.Module):
     """Where to step and where to sample, for one run or, with a leading axis, a batch of runs.
@@ -53,6 +59,7 @@ def make_grid(
     phase_step: float = 0.15,
     max_step: float = np.inf,
     growth: float = 0.0,
+    relaxation_time: float | None = None,
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Return step times and the position of each sample among them.
 
@@ -75,6 +82,13 @@ def make_grid(
     growth
         While the rate of a table does not change, steps may grow to this fraction of the time since
         it last did, up to `COARSEST_STRAIN`: what follows a change happens ever more slowly.
+        An oscillation of the fluid's own is not resolved in the steps that grow.
+    relaxation_time
+        Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
+        `COARSEST_STRAIN`, without adding to the largest error: what a change of the rate set off,
+        an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as exp(t/4λ) from
+        t = λ on add as much to the error of a fourth-order method as has died out of it. Half of
+        this relaxation is counted on. None leaves steps as they are.
 
     Raises
     ------
@@ -108,6 +122,9 @@ def make_grid(
     limits = np.full(gaps.shape, limit)
     if growth > 0.0 and not np.any(np.asarray(protocol.amplitudes)) and np.isfinite(limit):
         limits = np.maximum(limit, _grown(anchors, knots, rates, growth))
+    elif relaxation_time is not None and not np.any(np.asarray(protocol.amplitudes)):
+        at = intensity * _table_rate(anchors, knots, rates)
+        limits = np.minimum(max_step, _settled(anchors, at, limit, relaxation_time / _SURE))
     if steady.size:
         limits[anchors[:-1] < 0.0] = np.inf
     pieces = np.maximum(1, np.ceil(gaps / limits - 1e-9)) if gaps.size else np.zeros(0)
@@ -205,14 +222,7 @@ def _grown(
     anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray, growth: float
 ) -> Float[np.ndarray, " gaps"]:
     """Return the step that each gap between anchors allows, for the time since a change of rate."""
-    # at a jump, the rate after it
-    right = np.clip(np.searchsorted(knots, anchors, side="right"), 1, max(len(knots) - 1, 1))
-    if len(knots) == 1:
-        at = np.full(anchors.shape, rates[0])
-    else:
-        width = knots[right] - knots[right - 1]
-        share = (anchors - knots[right - 1]) / np.where(width > 0.0, width, 1.0)
-        at = rates[right - 1] + np.clip(share, 0.0, 1.0) * (rates[right] - rates[right - 1])
+    at = _table_rate(anchors, knots, rates)
     size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
     changes = np.abs(np.diff(at)) > _CHANGE * size
     ends = np.where(changes, anchors[1:], 0.0)
@@ -221,9 +231,37 @@ def _grown(
     return np.where(changes, 0.0, np.minimum(growth * since, coarsest))
 
 
+def _settled(
+    anchors: np.ndarray, at: np.ndarray, limit: float, settling_time: float
+) -> Float[np.ndarray, " gaps"]:
+    """Return the step of each gap between anchors as what a change of the rate set off dies out."""
+    first, last, since = at[0], anchors[0], np.zeros(len(anchors) - 1)
+    for i, rate in enumerate(at[1:]):
+        if abs(rate - first) > _DISTURBANCE * max(abs(rate), abs(first)):
+            first, last = rate, anchors[i + 1]
+        else:
+            since[i] = anchors[i] - last
+    size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
+    steady = np.minimum(COARSEST_STRAIN / np.maximum(size, 1e-300), _GROWTH_AS_IT_SETTLES * since)
+    # what is more than it takes to reach them changes nothing
+    died_out = np.clip(since / settling_time - 1.0, 0.0, 100.0)
+    return np.maximum(limit, np.minimum(steady, limit * np.exp(died_out / _ORDER)))
+
+
+def _table_rate(anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Return the rate of a table at anchors; at a jump, the rate after it."""
+    if len(knots) == 1:
+        return np.full(anchors.shape, rates[0])
+    right = np.clip(np.searchsorted(knots, anchors, side="right"), 1, len(knots) - 1)
+    width = knots[right] - knots[right - 1]
+    share = (anchors - knots[right - 1]) / np.where(width > 0.0, width, 1.0)
+    return rates[right - 1] + np.clip(share, 0.0, 1.0) * (rates[right] - rates[right - 1])
+
+
 def make_grids(
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
+    relaxation_time: float | None = None,
     **limits: float,
 ) -> IntegrationGrid:
     """Return the grids of several runs, padded to one shape with a leading batch axis.
@@ -232,10 +270,13 @@ def make_grids(
     ----------
     protocols, times
         One flow and its sampling times for each run; see `make_grid`.
-    **limits
+    relaxation_time, **limits
         Step limits of `make_grid`.
     """
-    grids = [make_grid(p, t, **limits) for p, t in zip(protocols, times, strict=True)]
+    grids = [
+        make_grid(p, t, relaxation_time=relaxation_time, **limits)
+        for p, t in zip(protocols, times, strict=True)
+    ]
     n_steps = max(max(len(g) for g, _ in grids), 2)
     n_samples = max(len(i) for _, i in grids)
     stacked = [], [], []

@@ -280,7 +280,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     return check_physics(
         fluid,
         stack_protocols(protocols),
-        make_grids(protocols, times, strain_step=0.2),
+        make_grids(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
         [flow.title for flow in along],
         weissenberg,
         # a start-up has no frequency; no oscillation tried is larger than a strain of fifty

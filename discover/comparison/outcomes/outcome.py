@@ -201,7 +201,7 @@ def _weighted_bands(
     found = weighted.bands(
         (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
         stack_protocols(protocols),
-        make_grids(protocols, times, strain_step=_STRAIN_STEP),
+        make_grids(protocols, times, strain_step=_STRAIN_STEP, relaxation_time=fluid.settling_time),
         [len(t) for t in times],
     )
     middle, bands = {}, {}

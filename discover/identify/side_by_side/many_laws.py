@@ -125,7 +125,7 @@ def predict_laws(
     protocols, times
         The flows and their sampling times.
     """
-    grids = make_grids(protocols, times)
+    grids = make_grids(protocols, times, relaxation_time=fluids.settling_time)
     return np.asarray(_predict(fluids, stack_protocols(protocols), grids))
 
 

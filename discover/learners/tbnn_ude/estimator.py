@@ -258,7 +258,12 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
         fluid = self.fluid_
-        problem = make_problem(runs, np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
+        problem = make_problem(
+            runs,
+            np.asarray(fluid.modulus),
+            np.asarray(fluid.relaxation_time),
+            known_relaxation=fluid.law.linear_relaxation,
+        )
         stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
@@ -310,7 +315,11 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
 
 def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
     return make_problem(
-        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity
+        runs,
+        known.modulus,
+        known.relaxation_time,
+        solvent_viscosity=known.solvent_viscosity,
+        known_relaxation=known.linear_relaxation,
     )
 
 

@@ -87,6 +87,7 @@ def make_problem(
     strain_step: float = 0.2,
     phase_step: float = 0.15,
     solvent_viscosity: float = 0.0,
+    known_relaxation: bool = True,
 ) -> TrainingProblem:
     """Return the training problem of some runs.
 
@@ -103,11 +104,17 @@ def make_problem(
         Step limits of `discover.simulate.make_grid`.
     solvent_viscosity
         In Pa s. The solvent's stress follows from the rate alone, so it is taken off the record.
+    known_relaxation
+        Whether the fluid relaxes in these times, and not only in what is learned.
     """
     total = float(np.sum(modulus))
     protocols = [run.protocol for run in runs]
     grids = make_grids(
-        protocols, [run.time for run in runs], strain_step=strain_step, phase_step=phase_step
+        protocols,
+        [run.time for run in runs],
+        strain_step=strain_step,
+        phase_step=phase_step,
+        relaxation_time=float(np.max(relaxation_time)) if known_relaxation else None,
     )
     n = grids.sample_index.shape[1]
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]

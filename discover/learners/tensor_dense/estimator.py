@@ -245,7 +245,10 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
             (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
             stack_protocols([run.protocol for run in runs]),
             make_grids(
-                [r.protocol for r in runs], [r.time for r in runs], strain_step=self.strain_step
+                [r.protocol for r in runs],
+                [r.time for r in runs],
+                strain_step=self.strain_step,
+                relaxation_time=fluid.settling_time,
             ),
             [len(run) for run in runs],
         )
@@ -275,8 +278,16 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        problem = make_problem(runs, self.library_, strain_step=self.strain_step)
-        stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
+        fluid = self.fluid_
+        problem = make_problem(
+            runs,
+            self.library_,
+            fluid.modulus,
+            fluid.relaxation_time,
+            base=fluid.law,
+            strain_step=self.strain_step,
+        )
+        stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
     def _check_parameters(self) -> None:

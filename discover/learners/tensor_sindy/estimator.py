@@ -346,8 +346,16 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
         # the same padded layout as in the fit, so that folds share a compilation
-        problem = make_problem(runs, self.library_, strain_step=self.strain_step)
-        stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
+        fluid = self.fluid_
+        problem = make_problem(
+            runs,
+            self.library_,
+            fluid.modulus,
+            fluid.relaxation_time,
+            base=fluid.law,
+            strain_step=self.strain_step,
+        )
+        stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
     def _frequencies(self, library: TermLibrary) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, Int
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.multimode import Fluid
 from discover.learners.runs import as_runs
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
@@ -147,10 +148,16 @@ def make_problem(
                 continue  # a normal stress difference may vanish in truth, but sets no scale
             target[i, : len(run), kind] = values
             weight[i, : len(run), kind] = 1.0 / scale
-    grids = make_grids([r.protocol for r in runs], [r.time for r in runs], strain_step=strain_step)
+    base = UpperConvectedMaxwell(known_relaxation) if base is None else base
+    grids = make_grids(
+        [r.protocol for r in runs],
+        [r.time for r in runs],
+        strain_step=strain_step,
+        relaxation_time=Fluid(base, modulus, relaxation_time).settling_time,
+    )
     return TrajectoryProblem(
         library=library,
-        base=UpperConvectedMaxwell(known_relaxation) if base is None else base,
+        base=base,
         modulus=jnp.asarray(modulus),
         relaxation_time=jnp.asarray(relaxation_time),
         solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
