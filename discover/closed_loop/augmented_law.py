@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 from discover.effects import ConstitutiveEffect
 from discover.equations import effect_terms
 from discover.laws import AbstractConstitutiveLaw
+from discover.laws.base import State, as_state, stress_in
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
 
@@ -32,11 +33,16 @@ class AugmentedLaw(AbstractConstitutiveLaw):
     effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    @property
+    def variables(self) -> int:
+        """Those of the declared law."""
+        return self.base.variables
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h of the declared law plus the terms of the effects."""
-        extra = self.base.extra_term(stress, rate)
+        extra, own = self.base.extra_term(stress, rate), stress_in(stress)
         for effect, values in zip(self.effects, self.values, strict=True):
-            extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
+            extra = extra + as_state(effect.extra_term(jnp.asarray(values), own, rate), stress)
         return extra
 
     def as_terms(self) -> tuple[TermShare, ...] | None:
