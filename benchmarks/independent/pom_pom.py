@@ -12,14 +12,16 @@ class PomPom(RateLaw):
     """A▽ = −(A − I/3)/τ_b, S = A/tr A, Λ' = Λ (L:S) − (Λ − 1) e^{2(Λ−1)/q}/τ_s.
 
     σ = 3 G Λ² S − G I   [McLeish & Larson 1998, J. Rheol. 42, 81, differential approximation; the
-    exponential of Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121]. Λ grows no further than q;
-    growth fades over the last 2 % on the way there, so that an integrator can follow.
+    exponential of Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, which the first have not].
+    Λ grows no further than q; growth fades on the way there, so that an integrator can follow.
     """
 
     arms: float = 5.0  # q
     stretch_time: float = 0.4  # τ_s, s
     modulus: float = 1.0
     relaxation_time: float = 1.0  # τ_b, s
+    drag_strain: bool = True  # whether there is the exponential
+    fade: float = 0.02  # share of q over which growth fades
 
     def rest(self) -> np.ndarray:
         """Return A = I/3 and Λ = 1."""
@@ -31,10 +33,10 @@ class PomPom(RateLaw):
         turned = stretched(a, rate) - (a - np.eye(3) / 3) / self.relaxation_time
         drawn = stretch * np.sum(velocity_gradient(rate) * a) / np.trace(a)
         # far outside (0, q) only in trial steps of the integrator
-        fast = np.exp(min(2 / self.arms * (stretch - 1), 50.0))
+        fast = np.exp(min(2 / self.arms * (stretch - 1), 50.0)) if self.drag_strain else 1.0
         grown = drawn - (stretch - 1) * fast / self.stretch_time
         if grown > 0.0:
-            grown *= min(max((self.arms - stretch) / (0.02 * self.arms), 0.0), 1.0)
+            grown *= min(max((self.arms - stretch) / (self.fade * self.arms), 0.0), 1.0)
         return np.append(turned.ravel(), grown)
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:

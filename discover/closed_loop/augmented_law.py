@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect
-from discover.equations import effect_terms
-from discover.laws import AbstractConstitutiveLaw
+from discover.equations import effect_terms, law_terms
+from discover.laws import LAWS, AbstractConstitutiveLaw
+from discover.laws.base import State, as_state, stress_in
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
 
@@ -32,11 +33,16 @@ class AugmentedLaw(AbstractConstitutiveLaw):
     effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    @property
+    def variables(self) -> int:
+        """Those of the declared law."""
+        return self.base.variables
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h of the declared law plus the terms of the effects."""
-        extra = self.base.extra_term(stress, rate)
+        extra, own = self.base.extra_term(stress, rate), stress_in(stress)
         for effect, values in zip(self.effects, self.values, strict=True):
-            extra = extra + effect.extra_term(jnp.asarray(values), stress, rate)
+            extra = extra + as_state(effect.extra_term(jnp.asarray(values), own, rate), stress)
         return extra
 
     def as_terms(self) -> tuple[TermShare, ...] | None:
@@ -62,6 +68,39 @@ class AugmentedLaw(AbstractConstitutiveLaw):
         """
         core, terms = self.base.split()
         return core, terms + self._added_terms()
+
+    def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
+        """Return the law with an effect made part of the declared one, and that one's constant.
+
+        None where no law with a name has the term of the effect alone, with its amplitude for the
+        only constant, as Giesekus's law has its mobility; or where the declared law has terms.
+
+        Parameters
+        ----------
+        name
+            Of the effect.
+        """
+        effects = [effect.name for effect in self.effects]
+        if name not in effects or self.base.as_terms() != ():
+            return None
+        at = effects.index(name)
+        value = self.values[at][0]
+        alone = effect_terms(self.effects[at], np.asarray(self.values[at]))
+        for law in LAWS.values():
+            if len(law.parameters) != 1 or len(self.values[at]) != 1:
+                continue
+            built = law.build(value)
+            if (built.as_terms() or ()) and law_terms(built) == alone:
+                values = self.values[:at] + self.values[at + 1 :]
+                others = self.effects[:at] + self.effects[at + 1 :]
+                whole = AugmentedLaw(
+                    base=built,
+                    values=values,
+                    effects=others,
+                    linear_relaxation=self.linear_relaxation,
+                )
+                return whole, next(iter(law.parameters))
+        return None
 
     def _added_terms(self) -> tuple[TermShare, ...]:
         return tuple(

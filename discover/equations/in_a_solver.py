@@ -90,7 +90,7 @@ def in_a_solver(equation: Equation) -> InASolver | None:
 
 
 @jax.jit
-def _rate(law: AbstractConstitutiveLaw, stress: Float[Array, "4"], shear_rate: Float[Array, ""]):
+def _rate(law: AbstractConstitutiveLaw, stress: Float[Array, " s"], shear_rate: Float[Array, ""]):
     return law.stress_rate(stress, shear_rate)
 
 
@@ -108,11 +108,11 @@ def _extremes(
 
     found = solve_ivp(
         lambda t, y: np.asarray(_rate(law, jnp.asarray(y), rate_at(t))),
-        (0.0, end), np.zeros(4), "LSODA", times, rtol=1e-6, atol=1e-9,
+        (0.0, end), np.asarray(law.rest()), "LSODA", times, rtol=1e-6, atol=1e-9,
     )  # fmt: skip
     if not found.success or not np.all(np.isfinite(found.y)):
         return np.nan, np.inf
-    s11, s22, s33, s12 = found.y
+    s11, s22, s33, s12 = found.y[:4]
     in_plane = 1.0 + 0.5 * (s11 + s22) - np.hypot(0.5 * (s11 - s22), s12)
     rates = rate_at(times)
     mu = np.linalg.eigvals(np.asarray(_jacobians(law, jnp.asarray(found.y.T), rates)))

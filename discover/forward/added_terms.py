@@ -21,7 +21,7 @@ from discover.forward.library_matrix import LibraryMatrix
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
 
-ModesRate = Callable[[Float[Array, "4 k"], Float[Array, "*c k"]], Float[Array, "4 k"]]
+ModesRate = Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "s k"]]
 """From σ_k/G_k of all modes and their λ_k L: shear rates, (k,), or four components, (4, k)."""
 
 
@@ -116,8 +116,11 @@ class AddedTerms:
         library = self._library_rate(theta, used) if self._library.tensors else _nothing
         others = self._others_rate(theta, used, amplitudes or {}) if self._others else _nothing
 
-        def total(stress, gradient):
-            return library(stress, gradient) + others(stress, gradient)
+        def total(state, gradient):
+            stress = state[:4]
+            found = library(stress, gradient) + others(stress, gradient)
+            # what structure variables of the law do is not changed
+            return found if len(state) == 4 else jnp.zeros_like(state).at[:4].set(found)
 
         return total
 

@@ -41,7 +41,8 @@ class Dynamics(NamedTuple):
     ----------
     slope
         Dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
-        shape (k,), in simple shear, else four components, shape (4, k).
+        shape (k,), in simple shear, else four components, shape (4, k). Where the law has structure
+        variables, σ stands for σ with these behind it, here and below.
     linear_relaxation
         Whether −σ is part of it; it is then integrated exactly.
     declared, extra
@@ -61,6 +62,8 @@ class Dynamics(NamedTuple):
     states_in_use
         0 for none, i + 1 for the i-th alone, one past the last for several; None computes all. One
         that is not in use stays at rest.
+    variables
+        Structure variables of each mode that the law has.
     """
 
     slope: Callable
@@ -73,6 +76,7 @@ class Dynamics(NamedTuple):
     trace_relaxation: Float[Array, " k"] | None = None
     times_change: Int[Array, ""] | int = 0
     states_in_use: Int[Array, ""] | None = None
+    variables: int = 0
 
     @property
     def modes(self) -> Modes:
@@ -137,14 +141,14 @@ class Dynamics(NamedTuple):
             return StressWeights(whole)
         return StressWeights(whole, KrogstadWeights(*joined[1]), self.trace_relaxation)
 
-    def rest(self) -> tuple[Float[Array, "4 k"], Levels]:
+    def rest(self) -> tuple[Float[Array, "s k"], Levels]:
         """Return modes and states at rest."""
         modulus = self.modes.modulus
         levels = (
             jnp.full((effect.levels,) if effect.levels > 1 else (), effect.rest, modulus.dtype)
             for effect in self.states
         )
-        return jnp.zeros((4, len(modulus))), tuple(levels)
+        return jnp.zeros((4 + self.variables, len(modulus))), tuple(levels)
 
     def later(
         self,
@@ -195,7 +199,7 @@ class Dynamics(NamedTuple):
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""
-        return (stress[3] if flow is None else flow.stress(stress)) @ self.modes.modulus
+        return (stress[3] if flow is None else flow.stress(stress[:4])) @ self.modes.modulus
 
     def sheared(self, stress, rate, flow: Kinematics | None):
         """Return the stress and the rate that a state feels.
@@ -204,4 +208,4 @@ class Dynamics(NamedTuple):
         """
         if flow is None:
             return stress[3] @ self.modes.modulus, rate
-        return flow.equivalent_shear_stress(stress) @ self.modes.modulus, flow.intensity * rate
+        return flow.equivalent_shear_stress(stress[:4]) @ self.modes.modulus, flow.intensity * rate

@@ -185,4 +185,6 @@ def _compliance_rate(
     change = (now - earlier) * own_time
     # the upper convected derivative is linear in the rate
     zero = jnp.zeros_like(stress[0])
-    return n1 + change * jnp.stack([2.0 * stress[3], zero, zero, 1.0 + stress[1]]), now
+    still = [zero] * (len(stress) - 4)  # of structure variables a step later is soon enough
+    convected = [2.0 * stress[3], zero, zero, 1.0 + stress[1], *still]
+    return n1 + change * jnp.stack(convected), now

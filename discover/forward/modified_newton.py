@@ -21,7 +21,7 @@ class Approximation(NamedTuple):
     Attributes
     ----------
     stress, best
-        Dimensionless, shape (4, k).
+        Dimensionless, shape (s, k): four components of σ, and structure variables.
     best_misfit, best_step
         What a cycle changes in the best one, relative, and Newton's step from it.
     share
@@ -30,15 +30,15 @@ class Approximation(NamedTuple):
         Of cycles gone through.
     """
 
-    stress: Float[Array, "4 k"]
-    best: Float[Array, "4 k"]
+    stress: Float[Array, "s k"]
+    best: Float[Array, "s k"]
     best_misfit: Float[Array, " k"]
-    best_step: Float[Array, "4 k"]
+    best_step: Float[Array, "s k"]
     share: Float[Array, " k"]
     number: Float[Array, ""]
 
 
-def first_approximation(stress: Float[Array, "4 k"]) -> Approximation:
+def first_approximation(stress: Float[Array, "s k"]) -> Approximation:
     """Return where the iteration begins, of which no cycle has been gone through."""
     free = jnp.full(stress.shape[1], jnp.inf)
     return Approximation(
@@ -53,8 +53,8 @@ def first_approximation(stress: Float[Array, "4 k"]) -> Approximation:
 
 def next_approximation(
     now: Approximation,
-    after: Float[Array, "4 k"],
-    jacobian: Float[Array, "k 4 4"],
+    after: Float[Array, "s k"],
+    jacobian: Float[Array, "k s s"],
     lenience: Float[Array, ""] | float = 0.0,
 ) -> tuple[Approximation, Bool[Array, " k"]]:
     """Return the next approximation, and of which modes this one was better than all before.
@@ -78,7 +78,7 @@ def next_approximation(
     # never where it is not a number
     better = (misfit <= now.best_misfit + lenience) | (misfit < _EXACT)
     better = better | (begins & jnp.isfinite(misfit))
-    matrix = jnp.eye(4) - jnp.swapaxes(jacobian, 1, 2)
+    matrix = jnp.eye(len(after)) - jnp.swapaxes(jacobian, 1, 2)
     step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
     step = jnp.where(now.number < FROM_REST, difference, step)
     step = jnp.where(better, step, now.best_step)
@@ -114,5 +114,5 @@ def relative_change(
     return jnp.max(moved / told)
 
 
-def _size(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
+def _size(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
     return jnp.max(jnp.abs(stress), axis=0)

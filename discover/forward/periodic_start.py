@@ -48,21 +48,21 @@ class _Iterate(NamedTuple):
 
 def periodic_start(
     after_cycle: Callable,
-    rest: tuple[Float[Array, "4 k"], Levels],
+    rest: tuple[Float[Array, "s k"], Levels],
     slowness: Float[Array, " k"],
     is_periodic: Bool[Array, ""],
-) -> tuple[Float[Array, "4 k"], Levels]:
+) -> tuple[Float[Array, "s k"], Levels]:
     """Return modes and states that a cycle brings back; not a number where none is found.
 
     It is solved for and not waited for: a mode that relaxes over a thousand cycles takes no more
-    steps than another. Newton's steps take the derivative of the cycle along the four components of
+    steps than another. Newton's steps take the derivative of the cycle along the components of
     each mode, and along each state, which change nearly by themselves   [shooting: Stoer & Bulirsch
     2002, Introduction to Numerical Analysis, section 7.3; `next_approximation`].
 
     Parameters
     ----------
     after_cycle
-        From modes, shape (4, k), and states to what they are a cycle later.
+        From modes, shape (s, k), and states to what they are a cycle later.
     rest
         Modes and states at rest, from which the iteration begins.
     slowness
@@ -78,17 +78,17 @@ def periodic_start(
             )
             return stress_end, levels_end, stress_slope, level_slopes
 
-        count = 4 + len(levels)
-        unit = jnp.eye(count)
-        directions = unit[:, :4, None] * jnp.ones((1, *stress.shape))
+        own = len(stress)
+        unit = jnp.eye(own + len(levels))
+        directions = unit[:, :own, None] * jnp.ones((1, *stress.shape))
         of_levels = tuple(
-            jnp.multiply.outer(unit[:, 4 + i], jnp.ones_like(level))
+            jnp.multiply.outer(unit[:, own + i], jnp.ones_like(level))
             for i, level in enumerate(levels)
         )
         ends, levels_ends, slopes, level_slopes = jax.vmap(along)(directions, of_levels)
-        jacobian = jnp.moveaxis(slopes[:4], 2, 0)  # mode, direction, component
-        own = tuple(slope[4 + i] for i, slope in enumerate(level_slopes))
-        return ends[0], tuple(level[0] for level in levels_ends), jacobian, own
+        jacobian = jnp.moveaxis(slopes[:own], 2, 0)  # mode, direction, component
+        of_own = tuple(slope[own + i] for i, slope in enumerate(level_slopes))
+        return ends[0], tuple(level[0] for level in levels_ends), jacobian, of_own
 
     def improved(now: _Iterate) -> _Iterate:
         after, levels_after, jacobian, own = with_derivative(now.modes.stress, now.levels)

@@ -25,13 +25,13 @@ _MOST, _TOLERANCE = 60, 1e-8
 _SHARE, _SECANT = 10.0, (0.2, 5.0)
 
 # Half a period later the flow is its own mirror image in the plane across it
-_MIRROR = jnp.array([1.0, 1.0, 1.0, -1.0])[:, None]
+_MIRROR = (1.0, 1.0, 1.0, -1.0)
 
 
 class _Half(NamedTuple):
     """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends."""
 
-    stress: Float[Array, "4 k"]
+    stress: Float[Array, "s k"]
     levels: tuple[Float[Array, "..."], ...]
     left: tuple[Float[Array, "..."], ...]
     wave: Float[Array, " s"]
@@ -60,7 +60,7 @@ def complex_modulus(
 
     The periodic state is solved for and not waited for: it is the fixed point of half a cycle
     followed by the mirror image that half a period is in simple shear. Newton's steps take the
-    derivative of that map along the four components of each mode, which change by themselves; a
+    derivative of that map along the components of each mode, which change by themselves; a
     step that leads astray is shortened   [shooting and the modified Newton method: Stoer & Bulirsch
     2002, Introduction to Numerical Analysis, sections 7.3 and 5.4]. Not finite where this does not
     converge.
@@ -172,7 +172,7 @@ def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Com
     return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
 
-def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]:
+def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k s s"]]:
     """Return half a cycle, and of each mode the derivative of its end: direction, component."""
 
     def along(unit):
@@ -182,7 +182,7 @@ def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k 4 4"]]
         )
         return of_stress[0], of_stress[1].stress
 
-    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(4))
+    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(now.modes.stress)))
     return found, jnp.moveaxis(tangents, 2, 0)
 
 
@@ -201,6 +201,8 @@ def _half_cycle(dynamics: Dynamics, wave, width):
 
     def sheared(stress, rate):
         return dynamics.sheared(stress, rate, None)[0]
+
+    mirror = jnp.ones(4 + dynamics.variables).at[:4].set(jnp.array(_MIRROR))[:, None]
 
     def half(stress, levels, amplitude) -> _Half:
         rate = amplitude * wave
@@ -236,6 +238,6 @@ def _half_cycle(dynamics: Dynamics, wave, width):
             step, start, (rate[:-2:2], rate[1::2], rate[2::2])
         )
         recorded = jnp.concatenate([begun[None], recorded])
-        return _Half(_MIRROR * stress, tuple(levels), tuple(left), recorded)
+        return _Half(mirror * stress, tuple(levels), tuple(left), recorded)
 
     return half

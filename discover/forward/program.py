@@ -303,7 +303,8 @@ class Program:
         def differing(stress, gradient):
             # a mode that an effect adds stands after the declared ones, and is as they are in mean
             declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
-            return (declared - 1.0) * (of_law(law, stress, gradient) + added(stress, gradient))
+            extra = of_law(law, stress, gradient) + added(stress, gradient)
+            return (declared - 1.0) * extra.at[4:].set(0.0)
 
         return differing
 
@@ -364,11 +365,13 @@ class Program:
             self._trace_relaxation(law, modulus, extra) if law.retracts else None,
             used.times,
             used.states,
+            law.variables,
         )
 
     def _trace_relaxation(self, law: AbstractConstitutiveLaw, modulus, extra: Modes | None):
         """Return that of each mode; a choice of method, through which no gradient passes."""
-        rest = jnp.zeros((4, len(modulus) + (0 if extra is None else len(extra.modulus))))
+        count = len(modulus) + (0 if extra is None else len(extra.modulus))
+        rest = jnp.zeros((4 + law.variables, count))
         of_law = self._over_modes(lambda law, stress, _: law.trace_relaxation(stress))
         return jax.lax.stop_gradient(of_law(law, rest, rest))
 

@@ -53,11 +53,11 @@ def _approach(dynamics: Dynamics, rate, flow):
             return dynamics.change(state, felt, slow, flow)
 
         now, tangent = jax.linearize(change, stress)
-        # each mode changes by itself: four directions give the tangent of all of them
-        unit = jnp.eye(4)[:, :, None] * jnp.ones(stress.shape)
+        # each mode changes by itself: as many directions as it has numbers give every tangent
+        unit = jnp.eye(len(stress))[:, :, None] * jnp.ones(stress.shape)
         jacobian = jnp.moveaxis(jax.vmap(tangent)(unit), 2, 0)  # mode, direction, component
         width = first * growth**number
-        matrix = jnp.eye(4) / width[:, None, None] - jnp.swapaxes(jacobian, 1, 2)
+        matrix = jnp.eye(len(stress)) / width[:, None, None] - jnp.swapaxes(jacobian, 1, 2)
         stress = stress + jnp.linalg.solve(matrix, now.T[:, :, None])[:, :, 0].T
         sheared, sheared_rate = dynamics.sheared(stress, felt, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared

@@ -16,6 +16,9 @@ from tensor_library.kinematics import (
 )
 from tensor_library.terms import TermShare
 
+State = Symmetric | Float[Array, " s"]
+"""σ, (3, 3) or four components; of a law with structure variables these behind the components."""
+
 
 class AbstractConstitutiveLaw(eqx.Module):
     """A Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), dimensionless.
@@ -42,13 +45,26 @@ class AbstractConstitutiveLaw(eqx.Module):
     linear_relaxation: eqx.AbstractVar[bool]
 
     @property
+    def variables(self) -> int:
+        """How many structure variables the law needs beside σ, each zero at rest.
+
+        They stand behind the four components of σ in its state, relax by −1 as σ does, and `h` says
+        what they do beside. A law with some is no function of (3, 3) tensors.
+        """
+        return 0
+
+    def rest(self) -> Float[Array, " s"]:
+        """Return the state at rest: the four components of σ, and the variables."""
+        return jnp.zeros(4 + self.variables)
+
+    @property
     def retracts(self) -> bool:
         """Whether chains retract faster than they turn, so that h relaxes the trace of σ first."""
         return False
 
     @abstractmethod
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
-        """Return h(σ, γ̇), in the storage of `stress`."""
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h(σ, γ̇), in the storage of `stress`, with the variables where there are some."""
 
     def as_terms(self) -> tuple[TermShare, ...] | None:
         """Return h as a sum of library terms, so that the law can be written out.
@@ -66,33 +82,46 @@ class AbstractConstitutiveLaw(eqx.Module):
         """Return the law below, and the library terms that are added to its h."""
         return self, ()
 
-    def trace_relaxation(self, stress: Symmetric) -> Float[Array, ""]:
+    def trace_relaxation(self, stress: State) -> Float[Array, ""]:
         """Return the rate, over 1/λ, at which h lets the trace of this stress relax beside −σ.
 
         The derivative of tr h along I, over 3, without flow. Where `retracts`, integrators treat
         that at rest as they do −σ, so that fast modes need no small steps. It decides how they
         step, and not what law they solve.
         """
-        still = jnp.zeros_like(stress)
-        along = jax.jvp(lambda s: self.extra_term(s, still), (stress,), (identity_like(stress),))[1]
-        return trace(along) / 3.0
+        still = jnp.zeros_like(stress_in(stress))
+        unit = as_state(identity_like(still), stress)
+        along = jax.jvp(lambda s: self.extra_term(s, still), (stress,), (unit,))[1]
+        return trace(stress_in(along)) / 3.0
 
-    def stress_rate(self, stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
-        """Return dσ/dt.
+    def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
+        """Return dσ/dt, and that of the variables.
 
         Parameters
         ----------
         stress
-            Dimensionless extra stress, (3, 3), or its components 11, 22, 33, 12.
+            Dimensionless extra stress, (3, 3), or its components 11, 22, 33, 12, and behind them
+            the variables.
         velocity_gradient
             Dimensionless L: (3, 3) for a full stress; for four components those of L, or the scalar
             shear rate in simple shear. See `tensor_library.kinematics`.
         """
         rate = rate_of_deformation(velocity_gradient)
-        change = rate + upper_convected_production(stress, velocity_gradient)
+        own = stress_in(stress)
+        change = as_state(rate + upper_convected_production(own, velocity_gradient), stress)
         if self.linear_relaxation:
             change = change - stress
         return change - self.extra_term(stress, rate)
+
+
+def stress_in(state: State) -> Symmetric:
+    """Return σ of a state, which has variables behind its four components where a law has some."""
+    return state[:4] if state.ndim == 1 and len(state) > 4 else state
+
+
+def as_state(stress: Symmetric, like: State) -> State:
+    """Return four components with zeros behind them, as many numbers as another state has."""
+    return stress if stress.shape == like.shape else jnp.pad(stress, (0, len(like) - 4))
 
 
 def as_parameter(value: ArrayLike) -> Float[Array, ""]:

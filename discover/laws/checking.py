@@ -18,11 +18,11 @@ def check_law(law: AbstractConstitutiveLaw) -> None:
         If it does not, or cannot be computed.
     """
     name = type(law).__name__
-    stress, rate = jnp.zeros(4), jnp.zeros(())
+    stress, rate = law.rest(), jnp.zeros(())
     try:
         made = [jax.eval_shape(law.stress_rate, stress, rate)]
         if type(law).stress_rate is AbstractConstitutiveLaw.stress_rate:
-            made.append(jax.eval_shape(law.extra_term, stress, stress))
+            made.append(jax.eval_shape(law.extra_term, stress, stress[:4]))
     except Exception as error:  # whatever a user's own code raises
         text = str(error).partition("\n")[0] or "no reason given"
         raise InputError(
@@ -31,7 +31,7 @@ def check_law(law: AbstractConstitutiveLaw) -> None:
         ) from error
     for part in made:
         shape = getattr(part, "shape", None)
-        if shape != (4,):
+        if shape != stress.shape:
             raise InputError(
                 f"The law {name} must return the four components 11, 22, 33, 12; got "
                 f"{'no array' if shape is None else f'the shape {shape}'}."

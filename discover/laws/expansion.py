@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
 from tensor_library.algebra import Symmetric
 from tensor_library.library import TermLibrary
 from tensor_library.terms import TermShare, parse_term
@@ -38,10 +38,15 @@ class LibraryExpansion(AbstractConstitutiveLaw):
         """Whether the chains of the base law retract."""
         return self.base is not None and self.base.retracts
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    @property
+    def variables(self) -> int:
+        """Those of the base law."""
+        return 0 if self.base is None else self.base.variables
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""
-        terms = self.library.evaluate(stress, rate, self.inner)
-        extra = jnp.tensordot(self.coefficients, terms, axes=1)
+        terms = self.library.evaluate(stress_in(stress), rate, self.inner)
+        extra = as_state(jnp.tensordot(self.coefficients, terms, axes=1), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
     def as_terms(self) -> tuple[TermShare, ...] | None:

@@ -153,31 +153,33 @@ class Fluid(eqx.Module):
         """Longest relaxation time in s; None where the law itself has no linear relaxation."""
         return float(np.max(self.relaxation_time)) if self.law.linear_relaxation else None
 
-    def rest(self) -> Float[Array, "k 4"]:
+    def rest(self) -> Float[Array, "k s"]:
         """Return the state at rest."""
-        return jnp.zeros((self.n_modes, 4))
+        return jnp.tile(self.law.rest(), (self.n_modes, 1))
 
     def decay_rate(self) -> Float[Array, "k _"]:
         """Return the rate of linear relaxation of each mode in 1/s, (k, 1).
 
-        Where chains retract that of each component, (k, 4): of normal stresses the mean of those of
+        Where chains retract that of each component, (k, s): of normal stresses the mean of those of
         deviator and trace, from which neither is so far off that fast modes run away.
         """
         rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
         if not self.law.retracts:
             return rate
-        faster = 0.5 * self.law.trace_relaxation(jnp.zeros(4)) * jnp.array([1.0, 1.0, 1.0, 0.0])
-        return rate + faster / self.relaxation_time[:, None]
+        rest = self.law.rest()
+        normal = jnp.zeros_like(rest).at[:3].set(0.5 * self.law.trace_relaxation(rest))
+        return rate + normal / self.relaxation_time[:, None]
 
     def state_rate(
-        self, state: Float[Array, "k 4"], velocity_gradient: VelocityGradient
-    ) -> Float[Array, "k 4"]:
+        self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
+    ) -> Float[Array, "k s"]:
         """Return d(state)/dt, in 1/s.
 
         Parameters
         ----------
         state
-            σ_k/G_k, dimensionless, in the four components, shape (k, 4).
+            σ_k/G_k, dimensionless, in the four components, and behind them the law's structure
+            variables, shape (k, s); s is 4 for most laws.
         velocity_gradient
             The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
         """
@@ -185,8 +187,8 @@ class Fluid(eqx.Module):
         return jax.vmap(self.law.stress_rate)(state, scaled) / self.relaxation_time[:, None]
 
     def stress(
-        self, state: Float[Array, "k 4"], velocity_gradient: VelocityGradient
+        self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
     ) -> Float[Array, "4"]:
         """Return the total extra stress (11, 22, 33, 12) in Pa."""
-        polymer = jnp.tensordot(self.modulus, state, axes=1)
+        polymer = jnp.tensordot(self.modulus, state[:, :4], axes=1)
         return polymer + self.solvent_viscosity * rate_of_deformation(velocity_gradient)

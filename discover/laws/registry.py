@@ -171,8 +171,9 @@ def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) ->
             f"The law {name!r} must be an AbstractConstitutiveLaw; {build!r} makes a "
             f"{type(law).__name__}. See docs/adding-a-law.md."
         )
-    for shape in ((3, 3), (4,)):
-        extra = law.extra_term(jnp.zeros(shape), jnp.zeros(shape))
+    for shape in ((3, 3), (4,)) if not law.variables else (law.rest().shape,):
+        rate = jnp.zeros(4 if law.variables else shape)
+        extra = law.extra_term(jnp.zeros(shape), rate)
         if jnp.shape(extra) != shape:
             raise InputError(
                 f"The extra term of the law {name!r} must have the shape {shape} of the stress; "

@@ -125,7 +125,7 @@ class StressWeights(NamedTuple):
         return found.at[:3].add(apart)
 
 
-def _mean_normal(stress: Float[Array, "4 k"]) -> Float[Array, " k"]:
+def _mean_normal(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
     return jnp.sum(stress[:3], axis=0) / 3.0
 
 

@@ -17,7 +17,9 @@ from discover.closed_loop.results.stages import ConstantByMode, DeclaredEffect, 
 from discover.effects import make_effect
 from discover.equations import Box, Equation, EquationTerm, equation_to_json
 from discover.equations import Tested as Where
-from discover.laws import Fluid, make_law
+from discover.equations.read import read_result_laws
+from discover.equations.rheotool_reader import read_rheotool
+from discover.laws import LAWS, Fluid, make_law
 
 
 def invoke(*arguments):
@@ -193,7 +195,39 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
         assert [one["alpha"] for one in content["named"]["constants"]] == [0.1, 0.3]
 
 
-def test_what_an_effect_adds_by_mode_is_refused_with_its_name(tmp_path):
+@pytest.mark.parametrize(
+    ("effect", "entry", "law"),
+    [
+        ("giesekus_mobility", "alpha", "giesekus"),
+        ("ptt_exponential", "epsilon", "ptt_exponential"),
+        ("non_affine_motion", "zeta", "johnson_segalman"),
+    ],
+)
+def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_read_back_from_rheotool(
+    tmp_path, effect, entry, law
+):
+    found = DeclaredEffect(effect, "constitutive", {"amplitude": by_mode((0.1, 0.3))})
+    result = loop_result((effect, 0.1), base=("ucm", {}), declared_effects=(found,))
+    result.write_json(tmp_path / "loop.json")
+    text = invoke("export", tmp_path, "--format", "rheotool").stdout
+    values = re.findall(rf"{entry} \[0 0 0 0 0 0 0\] (\S+);", text)
+    assert [float(v) for v in values] == pytest.approx([0.1, 0.3])
+    constant = next(iter(LAWS[law].parameters))
+    for k, value in enumerate((0.1, 0.3)):
+        # rheoTool's own names: what comes back is the law of each mode
+        mode = read_rheotool(text).mode(k)
+        wanted = make_law(law, {constant: value})
+        stress, rate = jnp.array([0.4, -0.1, 0.2, 0.3]), jnp.asarray(0.7)
+        np.testing.assert_allclose(
+            mode.law().stress_rate(stress, rate), wanted.stress_rate(stress, rate), rtol=1e-12
+        )
+    ufl = invoke("export", tmp_path, "--format", "ufl").stdout
+    assert "0.1" in ufl
+    assert "0.3" in ufl
+    assert read_result_laws(tmp_path)["augmented"].named.law == law
+
+
+def test_an_effect_by_mode_beside_a_law_with_terms_is_refused_with_its_name(tmp_path):
     effect = DeclaredEffect("giesekus_mobility", "constitutive", {"alpha": by_mode((0.1, 0.3))})
     loop_result(declared_effects=(effect,)).write_json(tmp_path / "loop.json")
     assert "giesekus_mobility differs" in invoke("export", tmp_path).stderr

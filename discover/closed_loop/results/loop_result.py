@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
@@ -192,7 +193,13 @@ class LoopResult(PageView, HasEquation, NotebookView):
         differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
         if not differing:
             return law_parts(fluid.law)
-        core, added = fluid.law.split()
+        law = fluid.law
+        for name in [*differing]:
+            moved = law.with_named(name) if isinstance(law, AugmentedLaw) else None
+            if moved is not None:
+                law, constant = moved
+                differing[constant] = differing.pop(name)
+        core, added = law.split()
         named = name_of(core)
         known = {} if named is None else named[1]
         # what an effect adds is the same sum in all modes; of a mode beside the declared ones

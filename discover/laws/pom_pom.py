@@ -1,0 +1,90 @@
+"""Pom-pom law of branched melts, differential: a backbone that turns, stretches and ends."""
+
+from functools import partial
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, State, as_parameter, as_state, stress_in
+from discover.laws.extended_pom_pom import NAMED as EXTENDED
+from discover.laws.named import NamedLaw
+from discover.laws.rolie_poly import stretch_of
+from tensor_library.algebra import Symmetric, identity_like, inner, trace
+
+_FADES = 0.05
+"""Share of q over which growth fades on the way to it, so that steps of fixed length can follow."""
+
+
+class PomPom(AbstractConstitutiveLaw):
+    """Differential pom-pom law   [McLeish & Larson 1998, J. Rheol. 42, 81].
+
+    A backbone of orientation S and stretch Λ, with q arms at each end, of which S follows an
+    auxiliary tensor A that is turned and relaxes by itself:
+
+        A▽ = −(A − I),    S = A/tr A,    dΛ/dt = Λ L:S − (λ/λ_s) e^{ν(Λ−1)} (Λ − 1),    Λ ≤ q,
+        σ = 3 Λ² S − I.
+
+    ν = 0, or 2/q where the drag of the arms couples to the strain at the branch points
+    [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121]. Written for σ, of which Λ² = 1 + tr σ/3,
+    and with the structure variable y = ln(tr A/3),
+
+        h = e^{−y} (σ − tr σ/3 I) − σ + r (σ + I),    r = 2 (λ/λ_s) e^{ν(Λ−1)} (1 − 1/Λ),
+        dy/dt = S:γ̇ − 1 + e^{−y}.
+
+    At Λ = q arms are drawn in and the stretch grows no further; its growth fades over the last 5 %.
+    A is positive definite in every flow, and with it σ + I.
+    """
+
+    arms: Float[Array, ""] = eqx.field(converter=as_parameter)  # q
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # λ_s/λ
+    drag_strain: bool = eqx.field(static=True, default=False)
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    @property
+    def variables(self) -> int:
+        """One, y."""
+        return 1
+
+    @property
+    def retracts(self) -> bool:
+        """Whether chains retract."""
+        return True
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h(σ, y, γ̇) as above, and of y what its change is short of −y."""
+        sigma, y = stress_in(stress), stress[4]
+        one = identity_like(sigma)
+        stretch = stretch_of(sigma)
+        growth = inner(sigma + one, rate) / (3.0 * stretch**2)  # S:γ̇
+        retraction = 2.0 / self.stretch_time_ratio * (1.0 - 1.0 / stretch)
+        if self.drag_strain:
+            # far beyond q only in trial steps of an integrator
+            retraction *= jnp.exp(jnp.minimum(2.0 / self.arms * (stretch - 1.0), 50.0))
+        left = jnp.clip((self.arms - stretch) / (_FADES * self.arms), 0.0, 1.0)
+        halted = (1.0 - left) * jnp.maximum(growth - retraction, 0.0)
+        turning = jnp.exp(-jnp.maximum(y, -50.0))
+        deviator = sigma - trace(sigma) / 3.0 * one
+        extra = turning * deviator - sigma + (retraction + halted) * (sigma + one)
+        return as_state(extra, stress).at[4].set(1.0 - turning - y - growth)
+
+
+_RANGES = {name: ends for name, ends in EXTENDED["xpp"].parameters.items() if name != "alpha"}
+_RANGE_SOURCES = {name: EXTENDED["xpp"].range_sources[name] for name in _RANGES}
+
+NAMED = {
+    "pom_pom": NamedLaw(
+        "pom-pom",
+        PomPom,
+        _RANGES,
+        _RANGE_SOURCES,
+        source="McLeish & Larson 1998, J. Rheol. 42, 81",
+    ),
+    "pom_pom_drag_strain": NamedLaw(
+        "pom-pom with drag-strain coupling",
+        partial(PomPom, drag_strain=True),
+        _RANGES,
+        _RANGE_SOURCES,
+        source="Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121",
+    ),
+}
