@@ -5,6 +5,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.constant import in_words as in_words_of
+from discover.comparison.declared_constants import (
+    OtherConstant,
+    other_constants,
+    with_other_constants,
+    with_other_gain,
+)
+from discover.comparison.dense_library import open_where_dense_is_wide
+from discover.comparison.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.equations import known_equation
 from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
@@ -27,6 +36,16 @@ from discover.comparison.outcomes.constant import in_words as in_words_of
 from discover.comparison.outcomes.flows import comparison_flows
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.outcomes.truth import TrueTerm, true_terms
+from discover.comparison.instrument import Frame, Learned, classical_along
+from discover.comparison.known import Known
+from discover.comparison.known import known_part as _known
+from discover.comparison.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.sampled_rates import left_by_sampled_rates
+from discover.comparison.statements import claimed, make_statements
+from discover.comparison.training import study_library, train
+from discover.comparison.truth import TrueTerm, true_terms
+from discover.comparison.unseen_runs import hold_against_unseen
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.dataset.material_functions import at_measured_rate
@@ -164,10 +183,14 @@ def compare(
             chosen, rivals, frame.model.fluid, banded, following_options, learner_seed
         )
     own_bands = following.bands
+    others: list[OtherConstant] = []
+    if chosen is not None and explanation.in_library:
+        others = other_constants(chosen.terms, frame.model)
+        own_bands = own_bands if normal else with_other_gain(own_bands, others)
     following = replace(following, bands=frame.bands(own_bands))
     explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
     if not explanation.in_library:
-        following, own_bands = NextMeasurement(), {}
+        following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     classical = []
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
@@ -185,8 +208,11 @@ def compare(
                 for law in CLASSICAL
             ]
             classical = classical_along(known.along, each, flows)
+    if chosen is not None:
+        statements = with_other_constants(statements, chosen.terms, others, frame.model)
     if known.along is not None and known.along.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
+    following = replace(following, bands=claimed(bands, statements, flows))
     distillations = _distil(study, data, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -270,7 +296,7 @@ def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:
         tested = int(outcome.details.get("tested") or 0)
         text = f"{tested} other laws were tried. " if tested else ""
         text += (
-            "No law in the library explains these data, so ruling out others says nothing; the "
+            "No law that was tried explains these data, so ruling out others says nothing; the "
             "laws below are those that describe the data about as well as the best."
         )
         return replace(outcome, details={**outcome.details, "rivals_text": text})
@@ -411,11 +437,13 @@ _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 def _summary(data: StudyData, study: Study) -> str:
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
-    runs = f"{recorded} of {len(data.fit)} runs ({samples} samples)"
+    # what is recorded beside σ12 is data of its own, and no other run
+    fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
+    runs = f"{recorded} of {fitted} runs ({samples} samples)"
     made = study.data.synthetic
     if made is None:
         kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
-        text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        text = f"{runs} of {data.dataset.name}; {held_out} runs held out"
         return f"{text}. {kept}" if kept else text
     law = LAWS[made.law].described(made.parameters)
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"

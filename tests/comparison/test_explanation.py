@@ -13,11 +13,17 @@ from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.judging.statements import IN_LIBRARY, check_band, make_statements
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.explanation import Explanation, explain
+from discover.comparison.flows import Flow, predict
+from discover.comparison.identifiability import FOUND
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.sampled_rates import left_by_sampled_rates
+from discover.comparison.statements import IN_LIBRARY, check_band, claimed, make_statements
 from discover.identify import HiddenStresses, LawTerms
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
-from discover.protocols.protocol import measured_rate, oscillatory_shear
+from discover.protocols.protocol import in_flow, measured_rate, oscillatory_shear, start_up
 from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.0, 20.0, 201)
@@ -149,7 +155,7 @@ def test_one_learner_is_enough_to_explain_but_not_to_determine(responses):
     assert found.by == ("tbnn_ude",)
     statements = make_statements(found, flows, [], STRUCTURE, bands(flows))
     assert [s.determined for s in statements] == ["no", "no"]
-    assert "The neural network explains σ12, but" in statements[0].text
+    assert "The neural network explains them, but" in statements[0].text
 
 
 HIDDEN = HiddenStresses(np.zeros((0, 3)), {"N1": True, "N2": True})
@@ -237,3 +243,31 @@ def test_a_learner_that_fits_nearly_any_data_explains_them_to_nobody(responses):
     assert found.verdict == "unexplained"
     assert set(found.lack_of_fit) == {"tensor_sindy"}
     assert explain({"tensor_dense": dense}, flows, Expectation()).verdict == "explained"
+
+
+def test_extension_alone_determines_nothing_in_shear(good):
+    explanation, flows = good
+    stretched = [replace(f, protocol=in_flow(start_up(1.0), "uniaxial")) for f in flows]
+    found = make_statements(explanation, stretched, [], STRUCTURE, bands(flows))
+    assert [(s.quantity, s.determined) for s in found] == [
+        ("sigma12", "no"), ("N1", "no"), ("N2", "no")
+    ]  # fmt: skip
+    assert "σ12" not in found[1].text
+    # one run in shear is enough for it to be asked
+    some = make_statements(explanation, [*stretched, flows[0]], [], STRUCTURE, bands(flows))
+    assert [s.quantity for s in some] == ["N1", "N2"]
+
+
+def test_what_is_not_determined_has_no_band(good):
+    explanation, flows = good
+    wide = bands(flows)
+    statements = make_statements(explanation, flows, [], STRUCTURE, wide)
+    for key, band in claimed(wide, statements, flows).items():
+        assert np.all(np.isnan(band.rivals_low[:, 2]))
+        np.testing.assert_array_equal(band.rivals_high[:, :2], wide[key].rivals_high[:, :2])
+    # the tensile stress that was fitted keeps its band
+    stretched = [replace(f, protocol=in_flow(start_up(1.0), "uniaxial")) for f in flows]
+    open_ = make_statements(explanation, stretched, [], STRUCTURE, wide)
+    for band in claimed(wide, open_, stretched).values():
+        assert np.all(np.isfinite(band.rivals_low[:, 0]))
+        assert np.all(np.isnan(band.rivals_low[:, 1:]))

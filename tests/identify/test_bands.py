@@ -57,3 +57,23 @@ def test_weighed_draws_are_taken_for_those_of_the_covariance():
     assert all(1.0 <= other.terms["sigma"] <= 2.0 for other in others)
     unknown = Contender("law", {"sigma": 1.5}, {}, 1e6 * np.eye(1), without_band="no band")
     assert draws(unknown, 40, np.random.default_rng(0)) == (unknown,)
+
+
+def test_forty_draws_of_one_constant_are_as_wide_as_its_interval_whatever_the_seed():
+    law = Contender("law", {"sigma": 1.0}, covariance=np.array([[0.04]]))
+    ratios = []
+    for seed in range(20):
+        values = [one.terms["sigma"] for one in draws(law, N_DRAWS, np.random.default_rng(seed))]
+        low, high = np.percentile(values, [2.5, 97.5], method="median_unbiased")
+        ratios.append((high - low) / (3.92 * 0.2))
+    # as of numbers evenly spaced in probability, above; at random they differ by a sixth
+    np.testing.assert_allclose(ratios, 1.0, rtol=0.07)
+
+
+def test_draws_have_the_covariance_of_constants_that_exchange_each_other():
+    covariance = np.array([[1.0, 0.95], [0.95, 1.0]])
+    law = Contender("law", {"sigma": 0.0, "gammadot": 0.0}, covariance=covariance)
+    others = draws(law, 400, np.random.default_rng(0))[1:]
+    values = np.array([list(other.terms.values()) for other in others])
+    # an axis is drawn evenly, so its variance is nearly exact; how axes combine is left to chance
+    np.testing.assert_allclose(np.cov(values.T), covariance, atol=0.1)

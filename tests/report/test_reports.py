@@ -284,7 +284,9 @@ def test_every_table_of_numbers_links_to_the_run_that_made_it(page):
 def test_errors_of_the_sparse_law_have_the_band_of_its_parameters(comparison, page):
     table = page[page.index('<table id="error-table"') :]
     table = table[: table.index("</table>")]
-    assert table.count("± ") == 9  # three flows, three quantities, one learner
+    # three flows, one learner; σ12 and N1, for N2 is not determined
+    assert [s.quantity for s in comparison.statements if s.undetermined] == ["N2"]
+    assert table.count("± ") == 6
     flow = comparison.judged[0]
     chosen = np.ones((flow.times.size, 3))
     band = PredictionBand(flow.times, chosen, 0.9 * chosen, 1.1 * chosen, chosen, chosen, 0.0)

@@ -7,6 +7,13 @@ import numpy as np
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.augment import choose, prune
+from discover.closed_loop.search.augment import (
+    INDISTINGUISHABLE,
+    Choice,
+    choose,
+    evidence,
+    prune,
+)
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
@@ -22,6 +29,7 @@ from discover.forward import make_batch
 from discover.forward.least_squares import (
     intervals,
 )
+from discover.statistics.residual import STRUCTURE, summarise
 
 _ROUNDS = 3
 
@@ -124,8 +132,10 @@ class Search(CurrentModel):
         attribution, choices = self.choices_beside(self.fit, self.active)
         chosen = choose(self.model, choices, self.left_out)
         self.rankings.append(_ordered([*attribution.leading, *attribution.rest]))
+        if chosen is None:
+            return None
         # what cannot be told from noise gives no reason to add anything
-        if chosen is None or self.tolerated.random(self.fit, self.active):
+        if self.tolerated.random(self.fit, self.active) and not self._was_no_noise(chosen):
             return None
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
@@ -147,6 +157,21 @@ class Search(CurrentModel):
             self.path.append(self.fit.theta)
         self.leave_out()
         return name
+
+    def _was_no_noise(self, choice: Choice) -> bool:
+        """Return whether an effect leaves so little that what passed for noise was a misfit.
+
+        A smooth misfit looks like noise of a high correlation. But the noise is no larger than what
+        the effect leaves, if that is noise. The evidence counts as few samples as noise so
+        correlated is worth.
+        """
+        error, left = (float(np.mean(fit.run_errors)) for fit in (self.fit, choice.fit))
+        if error <= STRUCTURE * left:
+            return False
+        weight = np.asarray(self.batch.weight)
+        effective = summarise(self.fit.residual, weight).effective_samples
+        found = evidence(self.fit, choice.fit, weight, effective, self.n_candidates)
+        return found > INDISTINGUISHABLE
 
     def adopt(self, other: "Search") -> None:
         """Take over the effects that another search established, refitted to these runs."""

@@ -1,7 +1,7 @@
 """After a comparison: bands on the test flows, and what to measure next."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,9 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.design.experiments import OBSERVED, candidate_experiments
 from discover.identify.design.next_experiment import Proposal, propose_experiments
 from discover.identify.rivals.bands import PredictionBand, prediction_bands
-from discover.identify.side_by_side.many_laws import Contender
+from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
+from discover.protocols import smooth_between_samples
 from discover.study.schema import NextExperiment
 
 LEAST_NOISE = 0.01
@@ -21,6 +22,7 @@ LEAST_NOISE = 0.01
 _MOST_RIVALS = 6
 _MOST_DRAWS = 40
 _SHOWN = 5
+_GUESSED = 2.0  # a curve through samples is a guess, which falls short at the crests
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,7 @@ def next_measurement(
             n_draws=_MOST_DRAWS,
             seed=seed,
         )
+        found = _with_sampled_rates(found, chosen, declared, flows)
         bands = {flow.key: band for flow, band in zip(flows, found, strict=True)}
     proposals = []
     if others:
@@ -169,6 +172,35 @@ def next_measurement(
     names = (chosen.name, *(law.name for law in others))
     oscillations = [p for p in proposals if p.experiment.pipkin is not None]
     return NextMeasurement(names, proposals[:_SHOWN], bands, noise, oscillations)
+
+
+def _with_sampled_rates(
+    bands: Sequence[PredictionBand], chosen: Contender, declared: Fluid, flows: Sequence[Flow]
+) -> list[PredictionBand]:
+    """Return bands that hold for rates that are known at the samples only, too.
+
+    Each limit gives way by twice the most that changes along the run where the rate is a smooth
+    curve through its samples and not straight lines: at which sample nobody knows.
+    """
+    made = ((i, smooth_between_samples(flow.protocol)) for i, flow in enumerate(flows))
+    smooth = {i: protocol for i, protocol in made if protocol is not None}
+    found = list(bands)
+    if not smooth:
+        return found
+    times = [flows[i].times for i in smooth]
+    other = predict_laws(fluid_of([chosen], declared), list(smooth.values()), times)[0]
+    for i, predicted in zip(smooth, other, strict=True):
+        band = bands[i]
+        change = np.max(np.abs(predicted[: len(band.times)] - band.chosen), axis=0)
+        change *= _GUESSED
+        found[i] = replace(
+            band,
+            low=band.low - change,
+            high=band.high + change,
+            rivals_low=band.rivals_low - change,
+            rivals_high=band.rivals_high + change,
+        )
+    return found
 
 
 def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contender, list[Contender]]:

@@ -5,7 +5,7 @@ not measured is conditional, and nothing is said where no law of the library exp
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -22,9 +22,18 @@ Determined = Literal["no", "if_the_law_is_in_the_library"]
 IN_LIBRARY: Determined = "if_the_law_is_in_the_library"
 
 _NORMAL_STRESSES = ("N1", "N2")
+_TITLES = {
+    "sigma12": "σ12",
+    "relaxation_time_s": "Declared relaxation time",
+    "modulus_Pa": "Declared modulus",
+}
 WIDEST = 1.0
 """Half of a band over the quantity, from which on it says nothing of it."""
 
+_ONLY_EXTENSION = (
+    "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
+    "the choice of the law that fits."
+)
 _IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -36,16 +45,29 @@ class Statement:
     Attributes
     ----------
     quantity
-        ``"N1"``, ``"N2"``.
+        ``"N1"``, ``"N2"``; or a declared constant as a study spells it, ``"relaxation_time_s"``.
     determined
         On which condition the data decide it.
     text
         The reason, for a reader.
+    brief
+        What the verdict says of it; empty where that needs no words of its own.
     """
 
     quantity: str
     determined: Determined
     text: str
+    brief: str = ""
+
+    @property
+    def title(self) -> str:
+        """The quantity as a reader knows it."""
+        return _TITLES.get(self.quantity, self.quantity)
+
+    @property
+    def of_law(self) -> bool:
+        """Whether it is a quantity that the law predicts, and no declared constant."""
+        return self.quantity in QUANTITIES
 
     @property
     def undetermined(self) -> bool:
@@ -158,6 +180,9 @@ def make_statements(
         return [Statement(q, "no", text.format(q)) for q in _NORMAL_STRESSES]
     if "tensor_sindy" in explanation.lack_of_fit and not explanation.in_library:
         return [Statement(q, "no", _unexplained(q, explanation)) for q in _NORMAL_STRESSES]
+    training = [flow for flow in flows if flow.kind == "training"]
+    if training and not any(flow.in_shear for flow in training):
+        return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
     at = law_structure(structure)
     if at is None:
         return _without_structure(explanation, flows, rivals, normal_stresses_used)
@@ -176,14 +201,42 @@ def make_statements(
     return found
 
 
+def claimed(
+    bands: Mapping[str, PredictionBand], statements: Sequence[Statement], flows: Sequence[Flow]
+) -> dict[str, PredictionBand]:
+    """Return the bands without limits of what is not determined: no claim is made there.
+
+    Parameters
+    ----------
+    bands
+        By the key of the flow.
+    statements
+        What the data say of each quantity.
+    flows
+        The flows; in extension the recorded stress is none of those that statements are about.
+    """
+    undetermined = {s.quantity for s in statements if s.undetermined}
+    open_ = np.array([quantity in undetermined for quantity in QUANTITIES])
+    in_shear = {flow.key: flow.in_shear for flow in flows}
+    found = {}
+    for key, band in bands.items():
+        column = open_ & np.array([in_shear[key], True, True])
+        limits = {
+            name: np.where(column, np.nan, getattr(band, name))
+            for name in ("low", "high", "rivals_low", "rivals_high")
+        }
+        found[key] = replace(band, **limits)
+    return found
+
+
 def _unexplained(quantity: str, explanation: Explanation) -> str:
     text = (
-        f"No law in the library explains σ12, so the {quantity} of the law shown is that of a law "
-        "which is known to be incomplete."
+        f"No law that was tried explains the data, so the {quantity} of the law shown is that of a "
+        "law which is known to be incomplete."
     )
     if explanation.by:
         text += (
-            " The neural network explains σ12, but many laws of its kind do, and they differ in "
+            " The neural network explains them, but many laws of its kind do, and they differ in "
             f"{quantity}."
         )
     return text

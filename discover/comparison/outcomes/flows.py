@@ -88,6 +88,11 @@ class Flow:
         return self.protocol.quantity == "sigma12"
 
     @property
+    def in_shear(self) -> bool:
+        """Whether it is a shear flow, and no extension."""
+        return self.protocol.flow == "shear"
+
+    @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
         amplitudes = np.asarray(self._imposed.amplitudes)

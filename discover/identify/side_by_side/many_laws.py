@@ -9,6 +9,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.stats import norm
+from scipy.stats.qmc import LatinHypercube
 
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
@@ -83,7 +85,10 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
 
 
 def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple[Contender, ...]:
-    """Return laws with parameters drawn from the contender's uncertainty; itself comes first."""
+    """Return laws with parameters drawn from the contender's uncertainty; itself comes first.
+
+    From a covariance by Latin hypercubes   [McKay, Beckman & Conover 1979, Technometrics 21, 239].
+    """
     if n_draws == 0 or contender.without_band:
         return (contender,)
     if contender.drawn is None and contender.covariance is None:
@@ -92,7 +97,10 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
     centre = np.array([*contender.terms.values(), *contender.inner.values()])
     if contender.drawn is None:
         assert contender.covariance is not None  # one of the two is there
-        drawn = rng.multivariate_normal(centre, contender.covariance, size=n_draws, method="eigh")
+        size, axes = np.linalg.eigh(contender.covariance)
+        # evenly along every axis, or the ends of a band of few draws would be a matter of luck
+        even = norm.ppf(LatinHypercube(len(size), scramble=False, rng=rng).random(n_draws))
+        drawn = centre + even @ (axes * np.sqrt(np.maximum(size, 0.0))).T
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]
     split = len(names)

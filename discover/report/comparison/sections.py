@@ -24,7 +24,7 @@ _STANDING = {
 }
 _CONDITION = {
     True: "The intervals hold if the law is in the library.",
-    False: "The intervals would hold if the law were in the library, and no law in the library "
+    False: "The intervals would hold if the law were in the library, and no law that was tried "
     "explains these data.",
 }
 _NO_TERM = {

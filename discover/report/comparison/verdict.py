@@ -20,6 +20,7 @@ from discover.report.wording import (
     worst,
 )
 from discover.statistics import LackOfFit
+from discover.statistics.residual import STRUCTURE
 
 CORRELATED = 0.3
 """A correlation of neighbours that is worth its number in a sentence."""
@@ -55,6 +56,8 @@ def _found(comparison: Comparison) -> str:
             parts.append(f"{_law_of(name)} leaves {_left(one)}")
     if sparse is not None and explanation.in_library:
         parts.append(_terms_found(comparison, sparse))
+        # a term that is a wrong declaration in other words is no finding beside the law
+        parts += [readable(s.brief) for s in comparison.statements if s.brief]
         parts += _constants_found(sparse)
     elif sparse is not None and not sparse.terms:
         parts.append("sparse regression found no term that helps")
@@ -122,6 +125,8 @@ def _left(one: LackOfFit) -> str:
     text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
     if one.lag_one_correlation > CORRELATED:
         text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
+    elif one.misfit <= STRUCTURE * one.noise and one.probability is not None:
+        text += f", with a pattern that noise has in {percent(one.probability)} of cases"
     return text
 
 
@@ -195,13 +200,18 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     )
 
 
+def _open(comparison: Comparison) -> str:
+    """Return the quantities that the data leave open, in words; empty if none."""
+    return " and ".join(s.title for s in comparison.statements if s.undetermined and s.of_law)
+
+
 def _determined(comparison: Comparison) -> list[str]:
     """Return what is said of N1, N2 and the coefficients."""
     parts = []
-    names = " and ".join(comparison.undetermined)
+    names = _open(comparison)
     if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
         parts.append(
-            f"since no law in the library explains the data, nothing is determined by them, "
+            f"since no law that was tried explains the data, nothing is determined by them, "
             f"neither {names.replace(' and ', ' nor ')} nor any coefficient"
         )
         return parts
@@ -209,7 +219,7 @@ def _determined(comparison: Comparison) -> list[str]:
         parts.append(
             f"not determined by these data: {names}, shown as the choice of the law that fits"
         )
-    if decided := [s.quantity for s in comparison.statements if not s.undetermined]:
+    if decided := [s.title for s in comparison.statements if not s.undetermined]:
         parts.append(
             f"{' and '.join(decided)} follow{'s' if len(decided) == 1 else ''} from σ12 only if "
             "the law is in the library"
@@ -234,8 +244,9 @@ def _next(comparison: Comparison) -> str:
     following = comparison.next_measurement
     if following.proposals:
         return _proposal(following)
-    if comparison.undetermined:
-        names = " and ".join(comparison.undetermined)
+    if not any(flow.in_shear for flow in comparison.flows_of("training")):
+        return "Measure in shear: extension alone does not say what the fluid does there."
+    if names := _open(comparison):
         return f"Measure {names}: nothing else decides between laws that give the same σ12."
     rates = [float(np.max(np.abs(f.rate))) for f in comparison.flows_of("training")]
     unit = "" if comparison.noise is not None else " 1/s"

@@ -1,0 +1,199 @@
+"""Linear terms of a law found that are a declared constant in other words.
+
+In dσ/dτ = γ̇ + L·σ + σ·Lᵀ − σ − h, made dimensionless by a modulus G and a time λ, a term c σ of h
+is a time of λ/(1 + c), and a term c γ̇ a modulus of (1 − c) G: with these the term is gone, and the
+others keep their form. It is one law, so no data in any flow tell the term from a wrong
+declaration.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discover.comparison.identifiability import SEPARATED
+from discover.comparison.statements import Statement
+from discover.identify.rivals.bands import PredictionBand
+from discover.learners import RecoveredTerm
+from discover.study.build import DeclaredModel
+from tensor_library.integrity_basis import TENSOR_NAMES
+from tensor_library.invariants import INVARIANT_NAMES
+from tensor_library.terms import parse_term
+
+_TIME, _MODULUS = "sigma", "gammadot"
+
+
+@dataclass(frozen=True)
+class OtherConstant:
+    """A declared constant that a linear term found amounts to.
+
+    Attributes
+    ----------
+    term, coefficient
+        The term.
+    declared
+        What was declared, in s or Pa; None where there are several modes.
+    factor, ci95
+        On what was declared, and its 95 % interval; None where the term has none.
+    """
+
+    term: str
+    coefficient: float
+    declared: float | None
+    factor: float
+    ci95: tuple[float, float] | None
+
+    @property
+    def name(self) -> str:
+        """The constant as a study spells it."""
+        return "relaxation_time_s" if self.term == _TIME else "modulus_Pa"
+
+    @property
+    def text(self) -> str:
+        """What the term is the same as, as part of a sentence."""
+        noun, unit = ("relaxation time", "s") if self.term == _TIME else ("modulus", "Pa")
+        plural = "relaxation times" if self.term == _TIME else "moduli"
+        size = self.declared or 1.0
+        span = ""
+        if self.ci95 is not None:
+            span = " (95 % interval {:.4g} to {:.4g})".format(*(size * edge for edge in self.ci95))
+        value = f"{size * self.factor:.4g}"
+        if self.declared is None:
+            same = f"{plural} that are all {value} times the declared ones{span}"
+        else:
+            same = f"a {noun} of {value} {unit}{span} in place of {self.declared:.4g} {unit}"
+        if self.term == _MODULUS:
+            same += f", or as a transducer that shows {self.factor:.4g} times the stress"
+        coefficient = f"{self.coefficient:.4g}".replace("-", "−")
+        return f"{coefficient} {self.term} is the same as {same}: these data cannot tell"
+
+
+def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> list[OtherConstant]:
+    """Return which declared constants the linear terms of a law amount to.
+
+    What differs by less than an experiment can be expected to see is none; nor is a term that
+    leaves no positive time or modulus.
+
+    Parameters
+    ----------
+    terms
+        What was found beside the known part.
+    model
+        The known part.
+    """
+    found = []
+    for term in terms:
+        if term.term not in (_TIME, _MODULUS):
+            continue
+        values = (term.coefficient, *(term.ci95 or ()))
+        if term.term == _TIME:
+            totals = [float(model.law.linear_relaxation) + value for value in values]
+            declared = model.relaxation_time
+        else:
+            totals = [1.0 - value for value in values]
+            declared = model.modulus
+        if totals[0] <= 0.0:
+            continue
+        factor = 1.0 / totals[0] if term.term == _TIME else totals[0]
+        limits = None
+        if term.ci95 is not None and min(totals) > 0.0:
+            low, high = sorted(1.0 / t if term.term == _TIME else t for t in totals[1:])
+            limits = low, high
+        if abs(factor - 1.0) > SEPARATED:
+            alone = float(declared[0]) if len(declared) == 1 else None
+            found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits))
+    return found
+
+
+def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> dict[str, float]:
+    """Return the coefficients of the other terms with the other constants in place.
+
+    A term of m stresses and n rates has f_G^(m − 1) f_λ^(1 − n) times its coefficient.
+    """
+    factors = {other.term: other.factor for other in others}
+    stress, time = factors.get(_MODULUS, 1.0), factors.get(_TIME, 1.0)
+    left = {}
+    for term in terms:
+        if term.term in factors:
+            continue
+        parsed = parse_term(term.term)
+        # every product in a sum has the same degree
+        names = [TENSOR_NAMES[parsed.tensor].split("+")[0]]
+        names += [n for n, p in zip(INVARIANT_NAMES, parsed.powers, strict=True) for _ in range(p)]
+        m, n = (sum(name.count(symbol) for name in names) for symbol in (_TIME, _MODULUS))
+        left[term.term] = term.coefficient * stress ** (m - 1) * time ** (1 - n)
+    return left
+
+
+def with_other_gain(
+    bands: Mapping[str, PredictionBand], others: Sequence[OtherConstant]
+) -> dict[str, PredictionBand]:
+    """Return bands of N1 and N2 that hold for a fluid behind a transducer of that gain as well.
+
+    Parameters
+    ----------
+    bands
+        By the key of the flow.
+    others
+        From `other_constants`.
+    """
+    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    if gain is None:
+        return dict(bands)
+    scale = np.array([1.0, 1.0 / gain, 1.0 / gain])  # σ12 is what is recorded
+    return {
+        key: replace(
+            band,
+            rivals_low=np.minimum(band.rivals_low, band.rivals_low * scale),
+            rivals_high=np.maximum(band.rivals_high, band.rivals_high * scale),
+        )
+        for key, band in bands.items()
+    }
+
+
+def with_other_constants(
+    statements: Sequence[Statement],
+    terms: Sequence[RecoveredTerm],
+    others: Sequence[OtherConstant],
+    known: DeclaredModel,
+) -> list[Statement]:
+    """Return the statements with what linear terms say of the declared constants.
+
+    Parameters
+    ----------
+    statements
+        On N1 and N2.
+    terms
+        What was found beside the known part.
+    others
+        From `other_constants`.
+    known
+        The known part.
+    """
+    rest = ""
+    if not known.effects and known.law_name in ("", "ucm"):
+        named = [
+            f"{value:.4g} {name}".replace("-", "−") for name, value in beside(terms, others).items()
+        ]
+        rest = f" Beside it the law is {' + '.join(named)}." if named else ""
+    said = [
+        Statement(
+            other.name,
+            "no",
+            f"{other.text}, for it is one and the same law.{rest} A constant that was measured on "
+            f"another sample or at another temperature does that; [model] {other.name} = "
+            '"fit" fits it along.',
+            other.text,
+        )
+        for other in others
+    ]
+    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    if gain is not None:
+        text = (
+            f"The band holds {{0}} as shown and, should it be the transducer, {{0}} / {gain:.4g}."
+        )
+        statements = [
+            s if s.undetermined else replace(s, text=f"{s.text} {text.format(s.quantity)}")
+            for s in statements
+        ]
+    return [*statements, *said]
