@@ -58,7 +58,7 @@ def stopped_at_the_first_computation() -> Iterator[None]:
     """Let commands go on until they begin to compute, and no further."""
     import discover.batch.tasks as tasks
     import discover.cli.study_commands as commands
-    import discover.comparison.run_comparison as comparison
+    import discover.comparison.instrument.known as comparison
 
     def report(label: str, fraction: float) -> None:
         if "declared model on" in label or "starting" in label:

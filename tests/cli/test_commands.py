@@ -41,7 +41,7 @@ def trained(monkeypatch):
         result = LearnerResult(learner, law, (RecoveredTerm("sigma.sigma", 0.2),), 1.0, history)
         return result, Fluid.dimensionless(law)
 
-    monkeypatch.setattr("discover.comparison.run_comparison.train", train)
+    monkeypatch.setattr("discover.comparison.learning.train", train)
     return calls
 
 
@@ -115,7 +115,7 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
 def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
     tmp_path, monkeypatch, trained, undrawn
 ):
-    from discover.comparison import run_comparison as module
+    from discover.comparison import learning as module
 
     known = module.train
 
@@ -139,7 +139,7 @@ def test_a_fault_of_the_software_is_one_line_and_exit_code_1(tmp_path, monkeypat
     def broken(*args, **kwargs):
         raise RuntimeError("it broke\nin two lines")
 
-    monkeypatch.setattr("discover.comparison.run_comparison.train", broken)
+    monkeypatch.setattr("discover.comparison.learning.train", broken)
     (tmp_path / "s.toml").write_text(STUDY)
     result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
     assert result.exit_code == 1

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from independent import Giesekus, oscillation
 
-from discover.comparison.flows import Flow
-from discover.comparison.next_measurement import next_measurement
-from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.judging.next_measurement import next_measurement
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import measured_rate, oscillatory_shear

@@ -52,7 +52,7 @@ def trained(learner, study, model, runs, seed=0, progress=None):
 @pytest.fixture(scope="module")
 def comparison() -> Comparison:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("discover.comparison.run_comparison.train", trained)
+        patch.setattr("discover.comparison.learning.train", trained)
         return compare(fake_study())
 
 
@@ -120,7 +120,7 @@ def test_a_finished_learner_is_not_trained_again(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return trained(learner, *args, **kwargs)
 
-    monkeypatch.setattr("discover.comparison.run_comparison.train", counting)
+    monkeypatch.setattr("discover.comparison.learning.train", counting)
     study = fake_study()
     with pytest.raises(KeyboardInterrupt):
         compare(study, store=RunFolder(tmp_path, "x"))

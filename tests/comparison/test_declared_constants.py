@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from independent import Giesekus, start_up
 
-from discover.comparison.declared_constants import (
+from discover.comparison.judging.declared_constants import (
     beside,
     other_constants,
     with_other_constants,
     with_other_gain,
 )
-from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.identify.rivals.bands import PredictionBand
 from discover.laws import make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners import RecoveredTerm
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 
 MODULUS, TIME, MOBILITY = 110.0, 1.0, 0.3
 DECLARED_MODULUS, DECLARED_TIME = 100.0, 0.7

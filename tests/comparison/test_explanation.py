@@ -10,15 +10,9 @@ from independent.noise import correlated, white
 from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import FOUND
-from discover.comparison.judging.statements import IN_LIBRARY, check_band, make_statements
+from discover.comparison.judging.statements import IN_LIBRARY, check_band, claimed, make_statements
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.comparison.explanation import Explanation, explain
-from discover.comparison.flows import Flow, predict
-from discover.comparison.identifiability import FOUND
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.sampled_rates import left_by_sampled_rates
-from discover.comparison.statements import IN_LIBRARY, check_band, claimed, make_statements
 from discover.identify import HiddenStresses, LawTerms
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure

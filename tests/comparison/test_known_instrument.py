@@ -100,7 +100,7 @@ def trained(learner, study, model, runs, seed=0, progress=None, library=None):
 
 def compared(data, store=None, **model):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("discover.comparison.run_comparison.train", trained)
+        patch.setattr("discover.comparison.learning.train", trained)
         study = parse_study(
             {"data": {"folder": "f"}, "compare": {"library": {"degree": 0}}, "model": model}
         )
@@ -179,7 +179,7 @@ def test_the_classical_laws_have_the_gain_too(with_gain):
 def test_python_takes_what_a_study_does(weak):
     options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, "held_out": weak.names[:1]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("discover.comparison.run_comparison.train", trained)
+        patch.setattr("discover.comparison.learning.train", trained)
         found = compare_in_memory(weak, known_effects={"stress_gain": "fit"}, **options)
         factor = compare_in_memory(weak, free=["modulus_Pa"], **options)
     gain = found.outcomes["tensor_sindy"].constants["stress_gain.gain_error"]

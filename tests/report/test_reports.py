@@ -70,7 +70,7 @@ def comparison():
         }
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("discover.comparison.run_comparison.train", trained)
+        patch.setattr("discover.comparison.learning.train", trained)
         return replace(compare(study), name="<script>alert(1)</script>")
 
 

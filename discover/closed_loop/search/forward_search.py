@@ -6,16 +6,10 @@ import numpy as np
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.augment import choose, prune
-from discover.closed_loop.search.augment import (
-    INDISTINGUISHABLE,
-    Choice,
-    choose,
-    evidence,
-    prune,
-)
+from discover.closed_loop.search.augment import Choice, choose, prune
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
+from discover.closed_loop.search.evidence import INDISTINGUISHABLE, evidence
 from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
 from discover.closed_loop.search.looking_ahead import look_ahead
 from discover.closed_loop.search.taking_out import (

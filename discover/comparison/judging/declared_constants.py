@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.comparison.identifiability import SEPARATED
-from discover.comparison.statements import Statement
+from discover.comparison.judging.identifiability import SEPARATED
+from discover.comparison.judging.statements import Statement
 from discover.identify.rivals.bands import PredictionBand
 from discover.learners import RecoveredTerm
-from discover.study.build import DeclaredModel
+from discover.study.declared_model import DeclaredModel
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.invariants import INVARIANT_NAMES
 from tensor_library.terms import parse_term

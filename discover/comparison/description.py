@@ -1,0 +1,66 @@
+"""A comparison's data and known part in words."""
+
+from discover.comparison.instrument.known import Known
+from discover.comparison.outcomes.constant import in_words as in_words_of
+from discover.laws.registry import LAWS
+from discover.protocols.kinematics import in_words
+from discover.study.data import StudyData
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from discover.study.schema import Study
+
+
+def data_in_words(data: StudyData, study: Study) -> str:
+    """Return what is fitted of which data.
+
+    Parameters
+    ----------
+    data, study
+        Of the comparison.
+    """
+    samples = sum(len(run) for run in data.fit)
+    recorded = in_words(run.quantity for run in data.fit)
+    # what is recorded beside σ12 is data of its own, and no other run
+    fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
+    runs = f"{recorded} of {fitted} runs ({samples} samples)"
+    made = study.data.synthetic
+    if made is None:
+        kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
+        text = f"{runs} of {data.dataset.name}; {held_out} runs held out"
+        return f"{text}. {kept}" if kept else text
+    law = LAWS[made.law].described(made.parameters)
+    noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
+    return f"{runs} computed from the {law} law, {noise}"
+
+
+def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:
+    """Return what was known before, and what was fitted along.
+
+    Parameters
+    ----------
+    declared
+        The model as the study declares it.
+    known, study
+        Of the comparison.
+    """
+    model = known.before.model
+    text = _law_and_modes(model, study)
+    of_law = [name for name in declared.free if name not in MODE_CONSTANTS]
+    if of_law:
+        text += f" ({', '.join(of_law)} fitted with this law alone, then held)"
+    fixed = [effect.text for effect in known.effects if not effect.free]
+    if fixed:
+        text += f", {', '.join(fixed)}"
+    if known.along is not None:
+        names = ", ".join(map(in_words_of, known.along.positions))
+        text += f"; fitted along with each learner: {names}"
+    return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
+
+
+def _law_and_modes(model: DeclaredModel, study: Study) -> str:
+    if not study.model.known_relaxation:
+        return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
+    named = LAWS.get(model.law_name)
+    title = model.law_name if named is None else named.described(model.parameters)
+    modes = len(model.modulus)
+    source = " from the linear sweep" if study.model.from_ is None else ""
+    return title if modes == 1 else f"{title}, {modes} relaxation modes{source}"

@@ -1,0 +1,95 @@
+"""The data of a comparison as learners take them, and what a comparison refuses."""
+
+from dataclasses import replace
+
+from discover.dataset.material_functions import at_measured_rate
+from discover.errors import InputError
+from discover.protocols import settled
+from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel
+
+
+def at_rates(data: StudyData) -> StudyData:
+    """Return data in which every run follows a rate in time, which is what the learners fit.
+
+    What has none is refused among the runs to fit, and set aside among those that only judge.
+
+    Parameters
+    ----------
+    data
+        Of a study, split.
+
+    Raises
+    ------
+    InputError
+        If a run to fit has no rate, or if every run is to be held out in turn.
+    """
+    if data.each:
+        raise InputError(
+            'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
+            'such as held_out = ["fast.csv"].'
+        )
+    if all(run.protocol.control == "rate" for run in (*data.fit, *data.held_out)):
+        return data
+    fit = replace(data.fit, runs=tuple(at_measured_rate(run) for run in data.fit))
+    held, aside = [], dict(data.dataset.set_aside)
+    for run in data.held_out:
+        try:
+            held.append(at_measured_rate(run))
+        except InputError as error:
+            aside[run.name] = str(error).removesuffix(".")
+    held_out = replace(data.held_out, runs=tuple(held))
+    return replace(
+        data,
+        dataset=replace(data.dataset, runs=(*fit.runs, *held), set_aside=aside),
+        fit=fit,
+        held_out=held_out,
+    )
+
+
+def settled_by(data: StudyData, relaxation_time: float) -> StudyData:
+    """Return data in which what starts periodic has the cycles before it that learners wait for.
+
+    Parameters
+    ----------
+    data
+        Of a study, split.
+    relaxation_time
+        The longest, in s.
+    """
+    parts = {
+        name: replace(
+            part,
+            runs=tuple(
+                replace(run, protocol=settled(run.protocol, relaxation_time)) for run in part.runs
+            ),
+        )
+        for name in ("dataset", "fit", "held_out")
+        for part in [getattr(data, name)]
+    }
+    return replace(data, **parts)
+
+
+def require_one_known_law(declared: DeclaredModel) -> None:
+    """Refuse a known part that only a closed loop can have.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+
+    Raises
+    ------
+    InputError
+        If its law is to be chosen, or has constants by mode.
+    """
+    if declared.choice:
+        raise InputError(
+            "[model] law names several laws to choose from, which is for close-loop: a comparison "
+            "learns what one known law lacks. Name one law, or ucm."
+        )
+    if declared.by_mode:
+        raise InputError(
+            "[model] by_mode is for close-loop: a comparison has one set of constants for all "
+            "relaxation modes, in the known part and in each learner. Leave it out here."
+        )

@@ -1,0 +1,178 @@
+"""What is to be believed of what the learners found: one judgement from all checks."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
+from discover.comparison.instrument import classical_along
+from discover.comparison.instrument.known import Known
+from discover.comparison.judging.declared_constants import (
+    OtherConstant,
+    other_constants,
+    with_other_constants,
+    with_other_gain,
+)
+from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
+from discover.comparison.judging.explanation import Explanation, explain
+from discover.comparison.judging.identifiability import (
+    Rival,
+    find_rivals,
+    structure_of,
+)
+from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.judging.statements import Statement, claimed, make_statements
+from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify import Structure
+from discover.identify.rivals.bands import PredictionBand
+from discover.statistics.residual import Expectation
+from discover.study.declared_model import DeclaredModel
+from discover.study.schema import Study
+from tensor_library.library import TermLibrary
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What is to be believed, and what stays open.
+
+    Attributes
+    ----------
+    explanation
+        Whether the laws found explain the data.
+    outcomes
+        What the learners found, without the claims that the data do not bear.
+    rivals, structure
+        Laws that the data do not rule out, and what the sparse law's terms leave open.
+    statements
+        What is determined, quantity by quantity.
+    next_measurement
+        What to measure next, and the bands of what is determined.
+    classical
+        The classical laws fitted to the same runs.
+    warnings
+        Where predictions of laws that fit disagree.
+    """
+
+    explanation: Explanation
+    outcomes: dict[str, LearnerOutcome]
+    rivals: Sequence[Rival]
+    structure: Structure | None
+    statements: Sequence[Statement]
+    next_measurement: NextMeasurement
+    classical: Sequence[ClassicalFit]
+    warnings: tuple[str, ...]
+
+
+def judge(
+    study: Study,
+    known: Known,
+    library: TermLibrary,
+    own: Mapping[str, LearnerOutcome],
+    seed: int,
+    say: Callable[[str], None],
+) -> Judgement:
+    """Return what is to be believed of what each learner found.
+
+    Parameters
+    ----------
+    study, known, library
+        The study, the known part with the flows of the page, and the terms that were searched.
+    own
+        What each learner found, in the frame in which it works.
+    seed
+        Of the draws.
+    say
+        Called with what is going on.
+    """
+    flows, normal = known.flows, study.compare.use_normal_stresses
+    frames = {name: known.frame(outcome) for name, outcome in own.items()}
+    outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
+    expectation = expectation_of(study, known.before.model)
+    explanation = explain(outcomes, flows, expectation, normal)
+    say("rivals: simulating laws that the data do not rule out")
+    chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
+    fitted = [flow for flow in flows if flow.kind == "training"]
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out")] or fitted
+    rivals, structure, following = [], None, NextMeasurement()
+    others: list[OtherConstant] = []
+    own_bands: Mapping[str, PredictionBand] = {}
+    if chosen is not None and explanation.verdict != "no_signal":
+        met = chosen.details.get("rivals", ())
+        rivals = find_rivals(
+            chosen.terms, met, frame.model, frame.flows, library, chosen.predictions
+        )
+        runs = frame.data.fit.runs
+        structure = structure_of(chosen.terms, runs, library, frame.model, normal)
+    if chosen is not None and explanation.in_library:
+        # where a quantity is said to be determined, its band says how well
+        keys = {flow.key for flow in (*judged, *fitted)}
+        banded = [flow for flow in frame.flows if flow.key in keys]
+        # bands and experiments take it that the law, or a rival, is the fluid's
+        following = next_measurement(
+            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed
+        )
+        others = other_constants(chosen.terms, frame.model)
+        own_bands = following.bands if normal else with_other_gain(following.bands, others)
+        following = replace(following, bands=frame.bands(own_bands))
+    explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
+    if not explanation.in_library:
+        following, own_bands, others = NextMeasurement(), {}, []
+    outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
+    bands, silent_records = following.bands, explanation.verdict == "no_signal"
+    statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
+    classical: Sequence[ClassicalFit] = ()
+    if not silent_records:
+        statements = open_where_contested(statements, contested(outcomes, judged, bands))
+        statements = open_where_dense_is_wide(statements, outcomes, judged)
+        say("the classical laws on the same runs")
+        classical = _classical(study, known)
+    if chosen is not None:
+        statements = with_other_constants(statements, chosen.terms, others, frame.model)
+    if known.along is not None and known.along.moves_modes:
+        statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
+    return Judgement(
+        explanation,
+        outcomes,
+        rivals,
+        structure,
+        statements,
+        replace(following, bands=claimed(bands, statements, flows)),
+        classical,
+        () if silent_records else tuple(disagreements(outcomes, judged, bands)),
+    )
+
+
+_MODES_NOT_IN_BANDS = (
+    "A factor on the modes was fitted along, and its interval is in no band of N1 or N2."
+)
+
+
+def _classical(study: Study, known: Known) -> Sequence[ClassicalFit]:
+    """Return the classical laws, with the same constants fitted along as the learners have."""
+    if known.along is None:
+        return fit_classical_laws(known.before.model, known.flows, study.model.known_relaxation)
+    each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
+    return classical_along(known.along, each, known.flows)
+
+
+def expectation_of(study: Study, model: DeclaredModel) -> Expectation:
+    """Return what a complete law may leave of a study's runs, as the closed loop has it."""
+    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
+    return Expectation(study.loop.noise, linear_error)
+
+
+def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:
+    """Return an outcome without the claims that its data do not bear."""
+    if explanation.verdict == "no_signal":
+        message = "The records hold no signal, so what was fitted to them is no law"
+        return replace(outcome, terms=(), message=message, details={})
+    if outcome.learner == "tensor_sindy" and not explanation.in_library:
+        tested = int(outcome.details.get("tested") or 0)
+        text = f"{tested} other laws were tried. " if tested else ""
+        text += (
+            "No law that was tried explains these data, so ruling out others says nothing; the "
+            "laws below are those that describe the data about as well as the best."
+        )
+        return replace(outcome, details={**outcome.details, "rivals_text": text})
+    return outcome

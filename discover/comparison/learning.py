@@ -1,0 +1,195 @@
+"""What each learner finds, kept as it is found, so that a run that was stopped can go on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
+from discover.comparison.fitting.training import train
+from discover.comparison.instrument import Learned
+from discover.comparison.instrument.known import Known
+from discover.comparison.judging.identifiability import (
+    physics_of,
+)
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.laws.registry import LAWS, make_law
+from discover.learners.result import LearnerResult
+from discover.progress import Progress
+from discover.study.run_folder import RunFolder
+from discover.study.schema import Study
+
+
+@dataclass(frozen=True)
+class Learning:
+    """Where learners are trained, or found again.
+
+    Attributes
+    ----------
+    study
+        Which learners, and with what options.
+    seed
+        Of the learners.
+    store
+        Where finished learners are kept and found again.
+    made
+        Learners that are fitted already: what they found, by learner.
+    """
+
+    study: Study
+    seed: int
+    store: RunFolder | None = None
+    made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
+
+    def outcome(
+        self, learner: str, known: Known, progress: Progress, part: str = ""
+    ) -> LearnerOutcome:
+        """Return what a learner finds, in the frame in which it works.
+
+        Parameters
+        ----------
+        learner
+            Its name.
+        known
+            The known part, and the flows of the page.
+        progress
+            Called with what is going on and the fraction done.
+        part
+            Of a sweep, the name under which it is kept; its outcomes are looked at in one flow.
+        """
+        store, made = self.store, self.made
+        kept = None if store is None else store.load(part or learner)
+        if kept is not None and all(flow.key in kept["predictions"] for flow in known.flows):
+            return LearnerOutcome.from_state(kept)
+        progress("starting", 0.0)
+        frame, constants = known.before, {}
+        if made is not None:
+            result, fluid = made[learner]
+        elif known.along is not None:
+            found = known.along.learn(
+                lambda model, data, library: train(
+                    learner, self.study, model, data.fit.runs, self.seed, progress, library
+                )
+            )
+            result, fluid, constants = _told_of_constants(found), found.fluid, found.constants
+            frame = known.frame_of({one.name: one.raw for one in constants.values()})
+        else:
+            result, fluid = train(
+                learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
+            )
+        flows = frame.flows
+        outcome = replace(LearnerOutcome.of(result, fluid, flows), constants=constants)
+        if not part:
+            outcome = replace(
+                outcome,
+                physics=physics_of(fluid, flows),
+                resolution=left_by_sampled_rates(fluid, flows, outcome.predictions),
+            )
+        if store is not None:
+            store.save(part or learner, outcome.to_state())
+            # the same route as after an interruption, so that both give the same files
+            return LearnerOutcome.from_state(outcome.to_state())
+        return outcome
+
+
+def _told_of_constants(found: Learned) -> LearnerResult:
+    """Return a result that says how constants were fitted along with it."""
+    times = "once" if found.rounds == 1 else f"{found.rounds} times"
+    ended = "had settled" if found.settled else "had not settled, so they may still be off"
+    message = found.result.message.rstrip(".")
+    return replace(
+        found.result,
+        message=f"{message}; it learned {times} with constants fitted along, which {ended}.",
+        details={**found.result.details, "rounds": found.rounds, "settled": found.settled},
+    )
+
+
+def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
+    """Return the law, the value and the study of each point of a sweep.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be swept so.
+    """
+    sweep, synthetic = study.compare.sweep, study.data.synthetic
+    if sweep is None:
+        return []
+    if synthetic is None:
+        raise InputError(
+            "compare.sweep makes synthetic data, so [data] must say synthetic = {...} too."
+        )
+    studies = []
+    for law in sweep.laws:
+        if sweep.parameter not in LAWS[law].parameters:
+            wanted = ", ".join(LAWS[law].parameters) or "none"
+            raise InputError(
+                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}. "
+                f"Write one of its parameters: {wanted}."
+            )
+        for value in sweep.values:
+            make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
+            made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
+            data = study.data.model_copy(update={"synthetic": made})
+            studies.append((law, value, study.model_copy(update={"data": data})))
+    return studies
+
+
+def require_teacher(study: Study) -> None:
+    """Refuse a distillation where no law made the data.
+
+    Parameters
+    ----------
+    study
+        The study.
+
+    Raises
+    ------
+    InputError
+        If it asks for one.
+    """
+    if study.compare.distillation and study.data.synthetic is None:
+        raise InputError(
+            "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
+            "{...}. Use discover distil for laws by name."
+        )
+
+
+def distilled(
+    study: Study, truth: Fluid | None, store: RunFolder | None, progress: Progress
+) -> list[dict[str, Any]]:
+    """Return what the law that made the data teaches each other law, where that is asked for.
+
+    Parameters
+    ----------
+    study, truth
+        The study, and the fluid that made its data.
+    store
+        Where the answer is kept and found again.
+    progress
+        Called with what is going on and the fraction done.
+    """
+    if not study.compare.distillation:
+        return []
+    assert truth is not None
+    assert study.data.synthetic is not None
+    kept = None if store is None else store.load("distillation")
+    if kept is not None:
+        return kept["rows"]
+    from discover.learners.distillation import STUDENTS, distil
+
+    teacher = study.data.synthetic.law
+    students = [name for name in STUDENTS if name != teacher]
+    rows = []
+    for i, student in enumerate(students):
+        progress(f"{teacher} teaches {student}", i / len(students))
+        rows.append({"teacher": teacher, **distil(truth, student).as_dict()})
+    if store is not None:
+        store.save("distillation", {"rows": rows})
+    return rows
