@@ -4,9 +4,10 @@ A law and an instrument are drawn, half of the laws and some of the flaws from o
 dictionary, and recorded by `independent` (scipy alone). The loop is told a Maxwell fluid. Two
 faster flows are held out. Results are appended to a file of JSON lines, so a stopped run goes on.
 
-Seed 0 served for development. The seed that judges, written down before it was run: 20261124.
+Seed 0 served for development. The seeds that judge, written down before they were run: 20261124,
+and 20261125 after the bands were widened.
 
-    python benchmarks/explanations.py --seed 20261124 --cases 24 --out explanations.jsonl
+    python benchmarks/explanations.py --seed 20261125 --cases 16 --out explanations.jsonl
 """
 
 import argparse

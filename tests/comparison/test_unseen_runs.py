@@ -57,6 +57,15 @@ def judged(drawn, held=None, exact=False):
     return hold_against_unseen(found, outcomes, flows, bands, Expectation())
 
 
+def test_knocks_in_a_run_held_out_refute_no_law(drawn):
+    knocked = drawn["held"][0].copy()
+    size = np.sqrt(np.mean(knocked**2))
+    knocked[[20, 45, 60]] += size * np.array([1.0, -1.0, 0.8])
+    assert judged(drawn, held=knocked).verdict == "explained"
+    # and excuse none that misses the rest
+    assert judged(drawn, held=1.1 * knocked).verdict == "unexplained"
+
+
 def test_a_law_that_holds_in_a_run_held_out_explains(drawn):
     assert judged(drawn).verdict == "explained"
 

@@ -10,6 +10,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import LackOfFit, noise_model
+from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import STRUCTURE, Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 
@@ -72,6 +73,12 @@ def _refuted(
             return f"the law runs away in {flow.name}, a run held out"
         residuals.append(residual)
         records.append(np.asarray(flow.reference["sigma12"], dtype=float))
+    # knocks in a run held out refute no law, as they do not where it was fitted
+    outliers = what_is_left(residuals, records, expectation).outlier_samples
+    residuals, records, columns = (
+        [np.delete(row, list(out), axis=-1) for row, out in zip(part, outliers, strict=True)]
+        for part in (residuals, records, columns)
+    )
     pairs = zip(residuals, records, strict=True)
     missed = float(np.mean([_size(row) / (_size(record) or 1.0) for row, record in pairs]))
     if missed <= max(ARITHMETIC, STRUCTURE * outcome.resolution):

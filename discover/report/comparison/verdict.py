@@ -125,8 +125,9 @@ def _left(one: LackOfFit) -> str:
     text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
     if one.lag_one_correlation > CORRELATED:
         text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
-    elif one.misfit <= STRUCTURE * one.noise and one.probability is not None:
-        text += f", with a pattern that noise has in {percent(one.probability)} of cases"
+    elif one.misfit <= STRUCTURE * one.noise:
+        # else it would seem that nothing is missing
+        text += f", but {one.reason}"
     return text
 
 
