@@ -227,6 +227,12 @@ def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_read_back_from_rheoto
     assert read_result_laws(tmp_path)["augmented"].named.law == law
 
 
+def test_a_constant_by_mode_that_a_rounding_takes_beyond_its_range_is_written_at_its_end():
+    differing = {"alpha": by_mode((0.1, np.nextafter(1.0, 2.0)))}
+    named = loop_result(declared_parameters=differing).equation().named
+    assert [one["alpha"] for one in named.constants] == [0.1, 1.0]
+
+
 def test_an_effect_by_mode_beside_a_law_with_terms_is_refused_with_its_name(tmp_path):
     effect = DeclaredEffect("giesekus_mobility", "constitutive", {"alpha": by_mode((0.1, 0.3))})
     loop_result(declared_effects=(effect,)).write_json(tmp_path / "loop.json")

@@ -40,7 +40,7 @@ from discover.equations import (
 from discover.equations.box import box_of, flow_numbers
 from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
-from discover.laws import Fluid
+from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
@@ -214,8 +214,10 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 "with it cannot be written out: only constants of a law with a name can, without "
                 "an added mode. loop.json has the constants of each mode."
             )
+        ranges = LAWS[named[0]].parameters
         constants = tuple(
-            known | {name: modes[k].value for name, modes in differing.items()}
+            # at an end of its range a constant may be beyond it by a rounding
+            known | {n: float(np.clip(m[k].value, *ranges[n])) for n, m in differing.items()}
             for k in range(fluid.n_modes)
         )
         return NamedPart(named[0], constants), tuple(EquationTerm(*one) for one in added)
