@@ -242,7 +242,10 @@ def _settled(
         else:
             since[i] = anchors[i] - last
     size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
-    steady = np.minimum(COARSEST_STRAIN / np.maximum(size, 1e-300), _GROWTH_AS_IT_SETTLES * since)
+    # no step turns the fluid through more than it does in a relaxation time
+    slow = size * settling_time <= COARSEST_STRAIN
+    coarsest = np.where(slow, np.inf, COARSEST_STRAIN / np.maximum(size, 1e-300))
+    steady = np.minimum(coarsest, _GROWTH_AS_IT_SETTLES * since)
     # what is more than it takes to reach them changes nothing
     died_out = np.clip(since / settling_time - 1.0, 0.0, 100.0)
     return np.maximum(limit, np.minimum(steady, limit * np.exp(died_out / _ORDER)))
