@@ -182,14 +182,17 @@ def compare(
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         statements = open_where_dense_is_wide(statements, outcomes, judged)
         progress("the classical laws on the same runs", done / n_parts)
+        # the criterion of the sparse law counts these, and both stand in one column
+        independent = None if chosen is None else chosen.details.get("n_independent")
         if known.along is None:
-            classical = fit_classical_laws(model, flows, study.model.known_relaxation)
+            relaxes = study.model.known_relaxation
+            classical = fit_classical_laws(model, flows, relaxes, independent)
         else:
             each = [
                 known.frame_of(known.along.raw(known.along.classical[law].theta))
                 for law in CLASSICAL
             ]
-            classical = classical_along(known.along, each, flows)
+            classical = classical_along(known.along, each, flows, independent)
     if known.along is not None and known.along.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     distillations = _distil(study, data, store, step("distillation"))
