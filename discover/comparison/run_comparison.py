@@ -419,11 +419,13 @@ _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 def _summary(data: StudyData, study: Study) -> str:
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
-    runs = f"{recorded} of {len(data.fit)} runs ({samples} samples)"
+    fitted = len(data.fit)
+    runs = f"{recorded} of {fitted} run{'' if fitted == 1 else 's'} ({samples} samples)"
     made = study.data.synthetic
     if made is None:
         kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
-        text = f"{runs} of {data.dataset.name}; {len(data.held_out)} runs held out"
+        held = len(data.held_out)
+        text = f"{runs} of {data.dataset.name}; {held} run{'' if held == 1 else 's'} held out"
         return f"{text}. {kept}" if kept else text
     law = LAWS[made.law].described(made.parameters)
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
