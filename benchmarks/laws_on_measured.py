@@ -31,8 +31,8 @@ from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_ba
 from discover.laws import LAWS
 from discover.precision import enable_x64
 from discover.study.atomic import write_text
-from discover.study.declared_model import declared_model, forward_model
 from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model, forward_model
 from discover.study.read import read_study
 
 STUDIES = Path(__file__).parents[1] / "studies"

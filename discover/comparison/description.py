@@ -21,15 +21,19 @@ def data_in_words(data: StudyData, study: Study) -> str:
     recorded = in_words(run.quantity for run in data.fit)
     # what is recorded beside σ12 is data of its own, and no other run
     fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
-    runs = f"{recorded} of {fitted} runs ({samples} samples)"
+    runs = f"{recorded} of {_runs(fitted)} ({samples} samples)"
     made = study.data.synthetic
     if made is None:
         kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
-        text = f"{runs} of {data.dataset.name}; {held_out} runs held out"
+        text = f"{runs} of {data.dataset.name}; {_runs(held_out)} held out"
         return f"{text}. {kept}" if kept else text
     law = LAWS[made.law].described(made.parameters)
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
     return f"{runs} computed from the {law} law, {noise}"
+
+
+def _runs(number: int) -> str:
+    return f"{number} run{'' if number == 1 else 's'}"
 
 
 def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:

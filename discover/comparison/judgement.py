@@ -126,7 +126,9 @@ def judge(
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         statements = open_where_dense_is_wide(statements, outcomes, judged)
         say("the classical laws on the same runs")
-        classical = _classical(study, known)
+        # the criterion of the sparse law counts these, and both stand in one column
+        independent = None if chosen is None else chosen.details.get("n_independent")
+        classical = _classical(study, known, independent)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
     if known.along is not None and known.along.moves_modes:
@@ -148,12 +150,13 @@ _MODES_NOT_IN_BANDS = (
 )
 
 
-def _classical(study: Study, known: Known) -> Sequence[ClassicalFit]:
+def _classical(study: Study, known: Known, independent: float | None) -> Sequence[ClassicalFit]:
     """Return the classical laws, with the same constants fitted along as the learners have."""
     if known.along is None:
-        return fit_classical_laws(known.before.model, known.flows, study.model.known_relaxation)
+        relaxes = study.model.known_relaxation
+        return fit_classical_laws(known.before.model, known.flows, relaxes, independent)
     each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
-    return classical_along(known.along, each, known.flows)
+    return classical_along(known.along, each, known.flows, independent)
 
 
 def expectation_of(study: Study, model: DeclaredModel) -> Expectation:

@@ -85,10 +85,10 @@ def make_grid(
         An oscillation of the fluid's own is not resolved in the steps that grow.
     relaxation_time
         Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
-        `COARSEST_STRAIN`, without adding to the largest error: what a change of the rate set off,
-        an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as exp(t/4λ) from
-        t = λ on add as much to the error of a fourth-order method as has died out of it. Half of
-        this relaxation is counted on. None leaves steps as they are.
+        `COARSEST_STRAIN` and this time, without adding to the largest error: what a change of the
+        rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as
+        exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out
+        of it. Half of this relaxation is counted on. None leaves steps as they are.
 
     Raises
     ------
@@ -242,7 +242,10 @@ def _settled(
         else:
             since[i] = anchors[i] - last
     size = np.maximum(np.abs(at[1:]), np.abs(at[:-1]))
-    steady = np.minimum(COARSEST_STRAIN / np.maximum(size, 1e-300), _GROWTH_AS_IT_SETTLES * since)
+    # in steps of many relaxation times the method iterates N/decay, which runs away, or comes to
+    # rest elsewhere, where a law adds two thirds of the known relaxation or more
+    coarsest = np.minimum(COARSEST_STRAIN / np.maximum(size, 1e-300), _SURE * settling_time)
+    steady = np.minimum(coarsest, _GROWTH_AS_IT_SETTLES * since)
     # what is more than it takes to reach them changes nothing
     died_out = np.clip(since / settling_time - 1.0, 0.0, 100.0)
     return np.maximum(limit, np.minimum(steady, limit * np.exp(died_out / _ORDER)))

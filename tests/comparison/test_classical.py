@@ -53,15 +53,16 @@ def fits():
     )
     slow, fast = oscillatory_shear(0.5, 0.25), oscillatory_shear(1.0, 0.5)
 
-    def found(noise):
+    def found(noise, independent=None):
         flows = [
             flow("slow", "training", slow, lambda t: 0.5 * np.cos(0.25 * t), 0.3, noise),
             flow("fast", "training", fast, lambda t: np.cos(0.5 * t), 0.3, noise),
             flow("start-up", "held_out", start_up(1.5), lambda t: 1.5, 0.3),
         ]
-        return {fit.law: fit for fit in fit_classical_laws(model, flows)}
+        fits = fit_classical_laws(model, flows, independent=independent)
+        return {fit.law: fit for fit in fits}
 
-    return {"noisy": found(0.01), "exact": found(0.0)}
+    return {"noisy": found(0.01), "exact": found(0.0), "few": found(0.01, 16.0)}
 
 
 def test_the_law_that_made_the_data_is_found_with_its_constant(fits):
@@ -79,6 +80,14 @@ def test_every_other_law_fits_worse_and_says_so(fits):
     others = [fit for fit in fits.values() if fit.law != "giesekus"]
     assert all(fit.misfit > 3.0 * fits["giesekus"].misfit for fit in others)
     assert all(fit.criterion > fits["giesekus"].criterion + 10.0 for fit in others)
+
+
+def test_the_criterion_counts_the_independent_samples_that_it_is_told(fits):
+    few, all_of_them = fits["few"]["ucm"], fits["noisy"]["ucm"]
+    assert few.misfit == all_of_them.misfit
+    # a law without a constant pays for nothing but its choice, 0 of 5
+    assert few.criterion == pytest.approx(2.0 * 16.0 * np.log(few.misfit))
+    assert all_of_them.criterion == pytest.approx(2.0 * 162.0 * np.log(few.misfit))
 
 
 def test_a_constant_lies_where_the_misfit_is_least_and_not_at_a_trial(fits):

@@ -90,11 +90,14 @@ def test_an_effect_of_no_size_is_none_and_refused_by_nobody():
     assert absorbed(declared).effects == ()
 
 
+DETAILS = {"rivals": [], "n_independent": 50.0}
+
+
 def trained(learner, study, model, runs, seed=0, progress=None, library=None):
     law = make_law("giesekus", {"alpha": MOBILITY})
     term = RecoveredTerm("sigma.sigma", MOBILITY, MOBILITY, (0.29, 0.31))
     history = (np.arange(1, 3), np.array([1.0, 0.1]))
-    result = LearnerResult(learner, law, (term,), 1.5, history, {"rivals": []}, "fake")
+    result = LearnerResult(learner, law, (term,), 1.5, history, DETAILS, "fake")
     return result, Fluid(law, model.modulus, model.relaxation_time)
 
 
@@ -173,6 +176,10 @@ def test_the_classical_laws_have_the_gain_too(with_gain):
     assert giesekus.misfit == pytest.approx(0.01, rel=0.2)
     others = [fit for fit in with_gain.classical if fit.law != "giesekus"]
     assert all(fit.criterion > giesekus.criterion for fit in others)
+    # of as many independent samples as the sparse law's beside it: one constant, one law of five
+    n = DETAILS["n_independent"]
+    price = np.log(n) + 2.0 * np.log(5.0)
+    assert giesekus.criterion == pytest.approx(2.0 * n * np.log(giesekus.misfit) + price)
 
 
 @pytest.mark.slow

@@ -89,7 +89,10 @@ class ClassicalFit:
 
 
 def fit_classical_laws(
-    model: DeclaredModel, flows: Sequence[Flow], known_relaxation: bool = True
+    model: DeclaredModel,
+    flows: Sequence[Flow],
+    known_relaxation: bool = True,
+    independent: float | None = None,
 ) -> list[ClassicalFit]:
     """Fit the classical laws to σ12 of the training flows and judge them in the others.
 
@@ -105,6 +108,9 @@ def fit_classical_laws(
         Training flows, with what was measured, and flows to judge in.
     known_relaxation
         Whether −σ is part of the declared law; where it is not, it is added to each law.
+    independent
+        How many independent samples the criterion counts, as that of the law to compare with does;
+        by default all.
     """
     training = [flow for flow in flows if flow.measured is not None]
     judged = [flow for flow in flows if flow.kind in ("held_out", "test")]
@@ -124,7 +130,7 @@ def fit_classical_laws(
                 name: _narrowed(values, misfits[name], last=left == 1)
                 for name, values in trials.items()
             }
-    samples = sum(flow.times.size for flow in training)
+    samples = independent or sum(flow.times.size for flow in training)
     fits = []
     for name, values in trials.items():
         at = int(np.argmin(misfits[name]))

@@ -22,7 +22,10 @@ from discover.learners.tensor_sindy.selection import extended_bic
 
 
 def classical_along(
-    along: FittedAlong, frames: Sequence[Frame], flows: Sequence[Flow]
+    along: FittedAlong,
+    frames: Sequence[Frame],
+    flows: Sequence[Flow],
+    independent: float | None = None,
 ) -> list[ClassicalFit]:
     """Return the classical laws, each with the constants that fit it best.
 
@@ -36,6 +39,8 @@ def classical_along(
         For each law of `CLASSICAL` what it is simulated in, as its constants have it.
     flows
         Those of the page; errors are told where no fit saw them.
+    independent
+        As in `fit_classical_laws`.
     """
     laws = []
     for name in CLASSICAL:
@@ -71,7 +76,8 @@ def classical_along(
                 continue
             seen = frame.recorded(flow, predict(fluid, own_flows[flow.key]))
             errors[flow.name] = of_recorded(relative_errors(seen, flow.reference), flow)
-        criterion = extended_bic(max(misfit, FLOOR), samples, len(parameters), 0, len(CLASSICAL))
+        counted = independent or samples
+        criterion = extended_bic(max(misfit, FLOOR), counted, len(parameters), 0, len(CLASSICAL))
         constants = {c: along.value_of(c, raw) for c, raw in along.raw(fit.theta).items()}
         fits.append(ClassicalFit(name, parameters, misfit, criterion, errors, constants))
     return fits

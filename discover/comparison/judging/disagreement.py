@@ -77,9 +77,9 @@ def contested(
                 found[quantity] = _Gap(flow, gap)
     return {
         quantity: (
-            f"The two learners fit the same σ12 and disagree on {_SHOWN[quantity]} beyond their "
-            f"bands, by {_percent(gap.size)} {_of(quantity)} in {gap.flow.title}: at least one of "
-            "them is wrong there, and these data do not say which."
+            f"The two learners, trained on the same σ12, disagree on {_SHOWN[quantity]} beyond "
+            f"their bands, by {_percent(gap.size)} {_of(quantity)} in {gap.flow.title}: at least "
+            "one of them is wrong there, and these data do not say which."
         )
         for quantity, gap in found.items()
     }
@@ -112,15 +112,15 @@ def _members(network: LearnerOutcome | None, flows: Sequence[Flow]) -> list[str]
     said = []
     if lost:
         said.append(
-            f"Of the networks that fit the same σ12, one runs away in {lost[0]}: there the network "
-            "says nothing."
+            f"Of the networks trained on the same σ12, one runs away in {lost[0]}: there the "
+            "network says nothing."
         )
     for quantity in QUANTITIES:
         widths = [(network.half_widths(flow).get(quantity, 0.0), flow) for flow in flows]
         width, flow = max(widths, key=lambda pair: pair[0], default=(0.0, None))
         if flow is not None and width > SEPARATED:
             said.append(
-                f"Networks that fit the same σ12 disagree on {_SHOWN[quantity]} by "
+                f"Networks trained on the same σ12 disagree on {_SHOWN[quantity]} by "
                 f"±{_percent(width)} {_of(quantity)} in {flow.title}."
             )
     return said

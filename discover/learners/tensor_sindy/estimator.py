@@ -335,6 +335,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 "misfit": fit.misfit,
                 "noise": self._noise(),
                 "n_observations": problem.n_observations,
+                "n_independent": search.n_independent,
             },
             message=(
                 f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
