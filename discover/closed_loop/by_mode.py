@@ -25,6 +25,11 @@ _OPEN = float(np.log(0.95 / 0.05))
 middle of a range it holds nine tenths of it, about a small constant a factor of 19 either way."""
 
 _FARTHEST = 50.0  # e^50 of a constant is any
+_ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began
+
+_AT_THE_END = 1e-3
+"""Share of the range from its upper end within which a constant stands at that end: no finding, for
+beyond it nothing was tried. At the lower end there is no effect, which is one."""
 
 _SMALL = 0.1
 """Share of the range within which an interval determines that a constant is small, or large."""
@@ -73,8 +78,10 @@ def constants_by_mode(
                 half = np.maximum(half, more[2])
         own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)
+        values = constant.of_modes(fit)
         known = _says(low, high, half, constant.law) & _says(*alone, own, constant.law)
-        each = zip(times, constant.of_modes(fit), low, high, known, strict=True)
+        known &= ~_at_upper_end(values, constant.law)
+        each = zip(times, values, low, high, known, strict=True)
         found[name] = ConstantByMode(
             float(fit.theta[constant.at]),
             bounds[constant.at],
@@ -101,7 +108,9 @@ class _Constant:
 
     def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
         """Return the constant of each mode, moved on the link's scale."""
-        moved = np.clip(np.broadcast_to(shift, self.places.shape), -_FARTHEST, _FARTHEST)
+        # one that stands far beyond an end must come back from there too
+        farthest = _ACROSS if np.isfinite(self.law.high - self.law.low) else _FARTHEST
+        moved = np.clip(np.broadcast_to(shift, self.places.shape), -farthest, farthest)
         coefficients = fit.theta[self.start : self.start + DEGREE]
         given = map(jnp.asarray, (coefficients, moved, self.places))
         mean = jnp.asarray(fit.theta[self.at])
@@ -147,3 +156,9 @@ def _says(low, high, half, law: FreeParameter):
     """Return where an interval tells a constant."""
     width = law.high - law.low
     return (half < _OPEN) | (np.isfinite(width) & (high - low < _SMALL * width))
+
+
+def _at_upper_end(values: Float[np.ndarray, " k"], law: FreeParameter) -> np.ndarray:
+    """Return which constants stand at the upper end of their range."""
+    width = law.high - law.low
+    return np.isfinite(width) & (values > law.high - _AT_THE_END * width)

@@ -2,6 +2,7 @@
 
 import json
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from independent.homogeneous import GiesekusFluid
 
 import discover as dc
 from discover.closed_loop import DeclaredModel, run_loop
+from discover.closed_loop.by_mode import _at_upper_end, _Constant
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
-from discover.forward import AugmentedModel, make_batch
+from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
 from discover.protocols import in_flow, start_up
 from discover.report.plots.loop.by_mode import by_mode_picture
@@ -87,6 +89,24 @@ def test_a_mode_that_no_flow_reaches_is_not_determined():
     assert slow.modes[2].ci95 is None
 
 
+def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
+    # a stretch ratio of 1 to 100 whose polynomial drives the fast modes far beyond the upper end:
+    # no run sees them, and their interval was 100 to 100 and "determined"
+    law = FreeParameter("q", 5.0, 1.0, 100.0)
+    places = np.array([0.0, -1.0, -2.0])
+    fit = SimpleNamespace(theta=np.array([5.0, 0.0, 25.0]))  # link 25 s² at the mean's −3
+    constant = _Constant(law, 0, 1, places)
+    values = constant.of_modes(fit)
+    assert values[0] == pytest.approx(5.0)
+    assert list(_at_upper_end(values, law)) == [False, True, True]
+    # what data do not see goes from one end to the other, from wherever it stands
+    low, high = constant.of_modes(fit, -np.inf), constant.of_modes(fit, np.inf)
+    assert low == pytest.approx(np.ones(3), abs=1e-6)
+    assert high == pytest.approx(np.full(3, 100.0))
+    # the lower end is no effect, which data may well tell
+    assert not _at_upper_end(np.array([1.0]), law)
+
+
 @pytest.mark.slow
 def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
@@ -99,8 +119,10 @@ def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
     # the same fluid as the Giesekus law by mode, to where fits stop
     for mode, same in zip(found.modes, of_law.modes, strict=True):
         assert mode.value == pytest.approx(same.value, rel=1e-5)
-    with pytest.raises(InputError, match="giesekus_mobility differs"):
-        result.equation()
+    named = result.equation().named
+    assert named is not None
+    assert named.law == "giesekus"
+    assert [one["alpha"] for one in named.constants] == [mode.value for mode in found.modes]
     # and with equal mobilities it stays one constant
     equal = dc.close_loop(data((0.3, 0.3, 0.3)), base, **asked)
     assert equal.by_mode["giesekus_mobility"].degree == 0

@@ -29,9 +29,9 @@ class ModeConstant:
         The constant with its 95 % interval, given that it is a smooth function of the time (see
         `discover.closed_loop.by_mode`); without one where it is left open.
     left_open
-        Whether these data leave it open: the interval leaves hardly a value out, or the runs are as
-        well described whatever this mode's constant. What stands here then comes from the other
-        modes and the smooth function alone.
+        Whether these data leave it open: the interval leaves hardly a value out, the runs are as
+        well described whatever this mode's constant, or it stands at the upper end of its range.
+        What stands here then comes from the other modes and the smooth function alone.
     """
 
     relaxation_time_s: float
