@@ -10,21 +10,19 @@ from independent.homogeneous import GiesekusFluid
 from discover.dataset import Run
 from discover.laws import Giesekus
 from discover.learners.tbnn_ude import TBNNUDE
+from discover.learners.tbnn_ude.initial_law import initial_law
 from discover.learners.tbnn_ude.least_squares import Objective, Stopping, minimise
 from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
 from discover.learners.tbnn_ude.problem import make_problem
-from discover.learners.tbnn_ude.recipe_default import (
-    DefaultRecipe,
-    initial_law,
-    is_white,
-    train_default,
-)
+from discover.learners.tbnn_ude.recipe import DefaultRecipe
+from discover.learners.tbnn_ude.recipe_default import train_default
 from discover.learners.tbnn_ude.recipe_paper import (
     PaperRecipe,
     make_network,
     paper_loss,
     train_paper,
 )
+from discover.learners.tbnn_ude.session import is_white
 from discover.learners.tbnn_ude.variational import side_by_side, states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.protocols import in_flow, oscillatory_shear, start_up

@@ -7,9 +7,9 @@ from scipy.integrate import solve_ivp
 from discover.comparison.judging.next_measurement import contenders
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.run import Run
-from discover.learners.tensor_sindy import TensorSINDy
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
+from discover.learners.tensor_sindy.recovered_terms import recovered_terms
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.trajectories.problem import make_problem
@@ -79,10 +79,8 @@ class Fitted:
     @property
     def term(self):
         """The term as the learner reports it."""
-        learner = TensorSINDy()
-        learner.uncertainty_, learner.draws_ = self.uncertainty, self.draws
         search = SupportSearch(self.problem, "stlsq", 1, 1e-5)
-        (term,) = learner._terms(search, self.fit)
+        (term,) = recovered_terms(search, self.fit, "stlsq", self.uncertainty, self.draws)
         return term
 
 

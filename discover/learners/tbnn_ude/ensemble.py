@@ -26,13 +26,9 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.recipe_default import (
-    DefaultRecipe,
-    Progress,
-    Trained,
-    train_along,
-    train_constants,
-)
+from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
+from discover.learners.tbnn_ude.recipe_default import train_along, train_constants
+from discover.learners.tbnn_ude.session import Progress
 
 FITS = 1.25
 """A member whose misfit is so many times the least is no explanation of the data.

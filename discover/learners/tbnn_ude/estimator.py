@@ -31,12 +31,8 @@ from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
-from discover.learners.tbnn_ude.recipe_default import (
-    DefaultRecipe,
-    Trained,
-    train_default,
-    work,
-)
+from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
+from discover.learners.tbnn_ude.recipe_default import train_default, work
 from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
 from discover.learners.tbnn_ude.spread import (
     MemberPredictions,

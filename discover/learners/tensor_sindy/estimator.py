@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -27,10 +26,10 @@ from discover.learners.tensor_sindy.intervals import ParameterUncertainty, param
 from discover.learners.tensor_sindy.optimisers import (
     check_optimiser,
     default_support,
-    solve_sparse,
 )
+from discover.learners.tensor_sindy.recovered_terms import recovered_terms
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.report import path_table, rival_table
+from discover.learners.tensor_sindy.report import frequency_table, noise_of, path_table, rival_table
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import (
     choose_by_bic,
@@ -306,7 +305,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             self.draws_ = draws_of_fit(
                 problem, fit, self.uncertainty_, search.slots, self.random_state or 0
             )
-        self.terms_ = self._terms(search, fit)
+        self.terms_ = recovered_terms(search, fit, self.optimizer, self.uncertainty_, self.draws_)
         misfits = [misfit for _, misfit in search.history]
         self.result_ = LearnerResult(
             learner="tensor_sindy",
@@ -322,7 +321,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 "chosen": chosen,
                 "selection": self.selection,
                 "selectors": selectors,
-                "selection_frequency": self._frequencies(library),
+                "selection_frequency": frequency_table(library, self.stability_),
                 "rivals": rival_table(search, fit),
                 "covariance": None
                 if self.uncertainty_ is None
@@ -333,7 +332,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,
                 "misfit": fit.misfit,
-                "noise": self._noise(),
+                "noise": noise_of(self.uncertainty_),
                 "n_observations": problem.n_observations,
                 "n_independent": search.n_independent,
             },
@@ -358,94 +357,6 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         )
         stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
-
-    def _frequencies(self, library: TermLibrary) -> list[dict[str, Any]]:
-        """Return how often each term was chosen from halves of the data, the most often first."""
-        if self.stability_ is None:
-            return []
-        rows = [
-            {"term": name, "frequency": float(alone), "with_twins": float(together)}
-            for name, alone, together in zip(
-                library.names,
-                self.stability_.frequency,
-                self.stability_.interchangeable,
-                strict=True,
-            )
-        ]
-        return sorted(rows, key=lambda row: (-row["with_twins"], -row["frequency"]))
-
-    def _noise(self) -> dict[str, Any] | None:
-        if self.uncertainty_ is None:
-            return None
-        noise = self.uncertainty_.noise
-        return {
-            "autoregressive_order": int(noise.coefficients.size),
-            "lag_one_correlation": float(noise.correlation[1]) if noise.coefficients.size else 0.0,
-            "effective_samples": noise.effective_samples,
-        }
-
-    def _terms(self, search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...]:
-        library = search.problem.library
-        if not fit.support:
-            return ()
-        assert self.uncertainty_ is not None  # some term was chosen
-        assert self.draws_ is not None
-        half_widths = self.uncertainty_.half_widths
-        linear = self.draws_.method == "linear"
-        weighed = self.draws_.intervals if self.draws_.method == "weighed" else None
-        model = search.model_at(fit)
-        solutions = {
-            s.support: s.coefficients
-            for s in solve_sparse(self.optimizer, model.design, model.target, search.largest)
-        }
-        penalised = solutions.get(fit.support)
-        if penalised is None:
-            # the optimiser left to itself stops elsewhere: what it says of these terms alone
-            support = list(fit.support)
-            alone = solve_sparse(
-                self.optimizer, model.design[:, support], model.target, len(support)
-            )
-            penalised = np.zeros(len(library))
-            if alone:
-                penalised[support] = max(alone, key=lambda s: len(s.support)).coefficients
-        fitted = np.append(fit.coefficients, fit.inner[list(self.uncertainty_.inner_positions)])
-
-        def around(middle: float, half: float) -> tuple[float, float]:
-            return middle - float(half), middle + float(half)
-
-        def interval(place: int, middle: float) -> tuple[float, float] | None:
-            if weighed is not None:
-                return float(weighed[place, 0]), float(weighed[place, 1])
-            return around(middle, half_widths[place]) if linear else None
-
-        terms = []
-        for position, (index, value) in enumerate(zip(fit.support, fit.coefficients, strict=True)):
-            term = library.terms[index]
-            half = half_widths[position]
-            inner, inner_ci95, at_one = {}, {}, {}
-            for place, i in enumerate(self.uncertainty_.inner_positions, len(fit.support)):
-                if (form := library.forms[i]).name == term.closed_form:
-                    known = float(fit.inner[i])
-                    inner[form.inner_name] = known
-                    if (limits := interval(place, known)) is not None:
-                        inner_ci95[form.inner_name] = limits
-                    if self.draws_.method != "none" and abs(value - 1.0) <= half:
-                        given, halves = self.uncertainty_.given(fitted, position, 1.0)
-                        ends = around(float(given[place]), halves[place])
-                        at_one[form.inner_name] = (float(given[place]), *ends)
-            terms.append(
-                RecoveredTerm(
-                    term=term.name,
-                    coefficient=float(value),
-                    coefficient_penalised=float(penalised[index]),
-                    ci95=interval(position, float(value)),
-                    inner=inner,
-                    inner_ci95=inner_ci95,
-                    inner_at_one=at_one,
-                    latex=term.latex(),
-                )
-            )
-        return tuple(terms)
 
     def _check_parameters(self) -> None:
         check_optimiser(self.optimizer)

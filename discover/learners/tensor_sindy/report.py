@@ -7,9 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.learners.tensor_sindy.deviance import draws_of_fit
-from discover.learners.tensor_sindy.intervals import parameter_uncertainty
+from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.search import SupportSearch
+from discover.learners.tensor_sindy.stability import Stability
+from tensor_library.library import TermLibrary
 
 _MOST_COVARIANCES = 8
 _CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
@@ -103,3 +105,43 @@ def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str,
     uncertainty = parameter_uncertainty(search.problem, fit, search.floor)
     draws = draws_of_fit(search.problem, fit, uncertainty, search.slots, seed)
     return {"covariance": uncertainty.total_covariance.tolist(), "draws": draws.to_json()}
+
+
+def frequency_table(library: TermLibrary, stability: Stability | None) -> list[dict[str, Any]]:
+    """Return how often each term was chosen from halves of the data, the most often first.
+
+    Parameters
+    ----------
+    library, stability
+        What was searched, and how often each of its terms was chosen; None where nobody asked.
+    """
+    if stability is None:
+        return []
+    rows = [
+        {"term": name, "frequency": float(alone), "with_twins": float(together)}
+        for name, alone, together in zip(
+            library.names,
+            stability.frequency,
+            stability.interchangeable,
+            strict=True,
+        )
+    ]
+    return sorted(rows, key=lambda row: (-row["with_twins"], -row["frequency"]))
+
+
+def noise_of(uncertainty: ParameterUncertainty | None) -> dict[str, Any] | None:
+    """Return what is known of the noise, as numbers; None for an empty law.
+
+    Parameters
+    ----------
+    uncertainty
+        Of the law.
+    """
+    if uncertainty is None:
+        return None
+    noise = uncertainty.noise
+    return {
+        "autoregressive_order": int(noise.coefficients.size),
+        "lag_one_correlation": float(noise.correlation[1]) if noise.coefficients.size else 0.0,
+        "effective_samples": noise.effective_samples,
+    }
