@@ -244,7 +244,8 @@ def extra_of(name, constants, stress, rate):
     return np.asarray(law.extra_term(jnp.asarray(stress), jnp.asarray(rate)))
 
 
-@pytest.mark.parametrize("name", LAWS)
+# a law with variables behind its stress is no function of the stress, and leaves as JSON alone
+@pytest.mark.parametrize("name", [n for n in LAWS if not make_law(n, starting_values(n)).variables])
 def test_ufl_says_every_law_that_has_a_name(name):
     ufl = pytest.importorskip("ufl")
     from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
