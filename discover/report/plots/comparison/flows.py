@@ -113,6 +113,8 @@ def start_up_picture(
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
             panel.set_xlabel(time_label)
+            if not flow.is_truth and runs_through_decades(flow.times, flow.rate):
+                make_logarithmic(panel.xaxis)
         legend_above(drawing, axes)
         return picture(
             drawing,
