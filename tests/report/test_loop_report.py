@@ -151,7 +151,7 @@ def test_a_loop_shows_itself_as_tables():
     assert "effects_added" in replace(result, stages=())._repr_html_()
 
 
-def test_every_verdict_is_three_sentences_that_answer_three_questions():
+def test_every_verdict_answers_three_questions_in_whole_sentences():
     aliased = loop_result()
     verdicts = []
     for verdict in ("effects_added", "unexplained", "no_effect_needed"):
@@ -159,14 +159,26 @@ def test_every_verdict_is_three_sentences_that_answer_three_questions():
             verdicts.append(loop_verdict(replace(aliased, verdict=verdict, stages=stages)))
     for sentences in verdicts:
         assert len(sentences) == len(QUESTIONS) == 3
-        for sentence in sentences:
-            assert sentence.endswith(".")
-            # one sentence: no full stop before the last that a capital follows
-            assert not re.search(r"\.\s+[A-ZΑ-Ω]", sentence), sentence
+        for answer in sentences:
+            assert answer.endswith(".")
+            for sentence in answer[:-1].split(". "):
+                assert sentence[0].isupper(), answer
+                assert sentence.count(";") <= 3, sentence
     assert "To tell stress gain from rate gain: a check." in loop_verdict(aliased)[2]
     unaliased = replace(aliased.stages[0], aliases=())
     confirm = loop_verdict(replace(aliased, stages=(unaliased,)))[2]
     assert confirm == "To confirm stress gain: a check."
+
+
+def test_what_passes_for_slow_noise_is_said_to_look_like_a_slow_effect():
+    slow = {**loop_result().remaining, "autocorrelation": 0.9}
+    told = "correlated to 0.9: it is taken for noise, and an effect that varies slowly would look"
+    assert told in loop_verdict(replace(loop_result(), remaining=slow))[1]
+    # not of white noise, and not where the verdict is that something is missing
+    white = {**slow, "autocorrelation": 0.05}
+    assert "slowly" not in loop_verdict(replace(loop_result(), remaining=white))[1]
+    missing = replace(loop_result(), verdict="unexplained", remaining=slow)
+    assert "slowly" not in loop_verdict(missing)[1]
 
 
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():

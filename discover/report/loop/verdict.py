@@ -42,10 +42,11 @@ _NOT_CARRIED = "What explains the fitted runs does not carry over to the runs he
 _MOST_NAMES = 3
 
 _SETTLED = 0.95
+_SLOW = 0.5  # correlation from which noise and a slow effect look alike for some samples on end
 
 
 def loop_verdict(result: LoopResult) -> list[str]:
-    """Return the verdict on a closed loop: three sentences, in the order of `QUESTIONS`."""
+    """Return the verdict on a closed loop: an answer to each of `QUESTIONS`, in order."""
     return [_loop_found(result), _loop_sure(result), _loop_next(result)]
 
 
@@ -132,7 +133,14 @@ def _loop_sure(result: LoopResult) -> str:
         noise += f" and the misfit of the linear sweep by its modes {percent(linear)}"
     if not result.remaining.get("noise_known", True):
         noise = "of which nobody knows how much is noise"
-    parts.append(f"on the fitted runs {told}, {noise}")
+    sentences = [sentence([*parts, f"on the fitted runs {told}, {noise}"])]
+    parts = []
+    together = result.remaining.get("autocorrelation") or 0.0
+    if result.verdict in _EXPLAINED and together > _SLOW:
+        parts.append(
+            f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
+            "for noise, and an effect that varies slowly would look the same"
+        )
     if before.held_out is None:
         parts.append("no run was held out to judge by")
     if few := result.remaining.get("not_judging", ()):
@@ -147,7 +155,7 @@ def _loop_sure(result: LoopResult) -> str:
         if stage.aliases:
             others = _several([*map(effect_title, stage.aliases)], "or")
             parts.append(f"these data cannot tell {effect_title(stage.effect)} from {others}")
-    return sentence(parts)
+    return " ".join([*sentences, *(sentence([part]) for part in parts)])
 
 
 def _alternatives(result: LoopResult) -> str:
