@@ -396,3 +396,12 @@ def test_reports_leave_a_notebook_its_pictures():
     code += "print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["agg", "False"]
+
+
+def test_a_picture_says_which_quantity_is_not_determined(comparison):
+    assert comparison.undetermined == ["N2"]
+    (flow, *_) = (f for f in comparison.flows if f.kind == "test" and f.oscillatory)
+    said = "not determined by these data"
+    assert texts_of(flow_picture(comparison, flow).svg).count(said) == 1
+    decided = replace(comparison, statements=())
+    assert said not in texts_of(flow_picture(decided, flow).svg)

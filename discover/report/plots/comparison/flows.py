@@ -11,6 +11,7 @@ from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle, shade_between
 from discover.report.plots.style import (
     BEFORE_STYLE,
+    INK,
     MEASURED,
     OVERLAY_STYLES,
     SHADE,
@@ -71,6 +72,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
                         panel.plot(along, stresses[quantity][last], **style)
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
             _mark_training(row[0], flow)
+            _mark_open(row[0], comparison, quantity)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
                 _draw_band(panel, comparison, flow, quantity, last, along)
@@ -89,8 +91,8 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is what the data leave open: the 95 % "
-            "intervals of the parameters, and the rival laws. Curves of the known part alone may "
-            "leave the frame.",
+            "intervals of the parameters, and the rival laws; what is not determined has no such "
+            "band. Curves of the known part alone may leave the frame.",
         )
 
 
@@ -109,6 +111,7 @@ def start_up_picture(
                 if quantity in stresses:
                     panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
+            _mark_open(panel, comparison, quantity)
             _frame(panel, comparison, flow, quantity, shown)
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
@@ -218,6 +221,15 @@ def _mark_training(panel, flow: Flow) -> None:
         panel.axvspan(
             flow.times[0], flow.training_end, color=SHADE, lw=0, label="training times", zorder=0
         )
+
+
+def _mark_open(panel, comparison: Comparison, quantity: str) -> None:
+    """Say in a panel that these data leave the quantity open, so that no missing band is narrow."""
+    if quantity in comparison.undetermined:
+        panel.annotate(
+            "not determined by these data", (0.98, 0.97), xycoords="axes fraction",
+            ha="right", va="top", fontsize=7, color=INK,
+        )  # fmt: skip
 
 
 def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
