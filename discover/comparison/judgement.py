@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
-from discover.comparison.instrument import classical_along
+from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
@@ -69,6 +69,7 @@ def judge(
     known: Known,
     library: TermLibrary,
     own: Mapping[str, LearnerOutcome],
+    frames: Mapping[str, Frame],
     seed: int,
     say: Callable[[str], None],
 ) -> Judgement:
@@ -78,15 +79,14 @@ def judge(
     ----------
     study, known, library
         The study, the known part with the flows of the page, and the terms that were searched.
-    own
-        What each learner found, in the frame in which it works.
+    own, frames
+        What each learner found, and the frame in which it did.
     seed
         Of the draws.
     say
         Called with what is going on.
     """
     flows, normal = known.flows, study.compare.use_normal_stresses
-    frames = {name: known.frame(outcome) for name, outcome in own.items()}
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
     expectation = expectation_of(study, known.before.model)
     explanation = explain(outcomes, flows, expectation, normal)

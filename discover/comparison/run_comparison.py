@@ -106,9 +106,13 @@ def compare(
             done += 1
         assert options.sweep is not None
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, at_point))
-    found = judge(
-        study, known, library, own, learning.seed, lambda text: progress(text, done / n_parts)
-    )
+    # with constants fitted along, each is a correction of all the data
+    frames = {name: known.frame(one) for name, one in own.items()}
+
+    def say(text: str) -> None:
+        progress(text, done / n_parts)
+
+    found = judge(study, known, library, own, frames, learning.seed, say)
     distillations = distilled(study, data.truth, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -129,7 +133,7 @@ def compare(
         next_measurement=found.next_measurement,
         seed=learning.seed,
         known=known_equation(model),
-        known_of={name: known_equation(known.frame(one).model) for name, one in own.items()},
+        known_of={name: known_equation(frame.model) for name, frame in frames.items()},
         known_effects=known.effects,
         conditions=material_and_temperature(data.dataset),
         stood_for=() if known.along is None else known.along.twins,

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.progress import checked
+from tensor_library.library import TermLibrary
 
 PerMode = float | int | Sequence[float] | np.ndarray | jax.Array
 """A number, or one value for each relaxation mode, shape (k,)."""
@@ -62,3 +63,23 @@ def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
             f"{name} must be positive and finite, a number or one for each mode; got {value!r}."
         )
     return values.astype(float)
+
+
+def check_library(library: TermLibrary | None) -> None:
+    """Refuse what is no library of terms.
+
+    Parameters
+    ----------
+    library
+        As an estimator was given it; None for its own.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    if library is not None and not isinstance(library, TermLibrary):
+        raise InputError(
+            "library must be a TermLibrary; got a "
+            f"{type(library).__name__}. Use tensor_library.build_library."
+        )

@@ -21,7 +21,7 @@ from discover.learners.known_part import known_part
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
-from discover.learners.settings import PerMode, check_settings
+from discover.learners.settings import PerMode, check_library, check_settings
 from discover.learners.tensor_dense.draws import DenseDraws
 from discover.learners.tensor_dense.mixture import Mixture, Optimum, explore
 from discover.learners.tensor_dense.reference_laws import (
@@ -31,12 +31,12 @@ from discover.learners.tensor_dense.reference_laws import (
     with_reference,
 )
 from discover.learners.tensor_dense.term_sizes import term_sizes
+from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.weighted_laws import Limits, WeightedLaws
 from discover.progress import Progress, by_lines
-from discover.protocols.protocol import recorded_at, stack_protocols
+from discover.protocols.protocol import stack_protocols
 from discover.simulate.grid import make_grids
-from discover.simulate.solve import solve_batch
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 
@@ -278,24 +278,10 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        fluid = self.fluid_
-        problem = make_problem(
-            runs,
-            self.library_,
-            fluid.modulus,
-            fluid.relaxation_time,
-            base=fluid.law,
-            strain_step=self.strain_step,
-        )
-        stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
-        return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
+        return predict_runs(self.fluid_, self.library_, runs, self.strain_step)
 
     def _check_parameters(self) -> None:
-        if self.library is not None and not isinstance(self.library, TermLibrary):
-            raise InputError(
-                "library must be a TermLibrary; got a "
-                f"{type(self.library).__name__}. Use tensor_library.build_library."
-            )
+        check_library(self.library)
         if self.library is not None and self.library.inner_names:
             raise InputError(
                 "TensorDense takes a library without closed forms, for their inner parameters "

@@ -20,7 +20,7 @@ from discover.learners.known_part import KnownPart, known_part
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
-from discover.learners.settings import PerMode, check_settings
+from discover.learners.settings import PerMode, check_library, check_settings
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
@@ -40,10 +40,9 @@ from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
+from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import make_problem
 from discover.progress import Progress, by_lines
-from discover.protocols.protocol import recorded_at
-from discover.simulate.solve import solve_batch
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
 
@@ -345,18 +344,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        # the same padded layout as in the fit, so that folds share a compilation
-        fluid = self.fluid_
-        problem = make_problem(
-            runs,
-            self.library_,
-            fluid.modulus,
-            fluid.relaxation_time,
-            base=fluid.law,
-            strain_step=self.strain_step,
-        )
-        stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
-        return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
+        return predict_runs(self.fluid_, self.library_, runs, self.strain_step)
 
     def _check_parameters(self) -> None:
         check_optimiser(self.optimizer)
@@ -364,11 +352,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             raise InputError(
                 f"selection must be one of {', '.join(SELECTIONS)}; got {self.selection!r}."
             )
-        if self.library is not None and not isinstance(self.library, TermLibrary):
-            raise InputError(
-                "library must be a TermLibrary; got a "
-                f"{type(self.library).__name__}. Use tensor_library.build_library."
-            )
+        check_library(self.library)
 
 
 def _groups(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:

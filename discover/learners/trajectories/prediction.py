@@ -1,0 +1,43 @@
+"""What is recorded of a fluid in runs, on the grids of the learners that search a library."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.run import Run
+from discover.laws.multimode import Fluid
+from discover.learners.trajectories.problem import make_problem
+from discover.protocols.protocol import recorded_at
+from discover.simulate.solve import solve_batch
+from tensor_library.library import TermLibrary
+
+
+def predict_runs(
+    fluid: Fluid, library: TermLibrary, runs: Sequence[Run], strain_step: float
+) -> list[Float[np.ndarray, " n"]]:
+    """Return what each run records of a fluid, in Pa, at the times of its samples.
+
+    The same padded layout as in the fit, so that folds share a compilation.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    library
+        The terms that were searched.
+    runs
+        Where to predict.
+    strain_step
+        Largest strain between steps of the integration.
+    """
+    problem = make_problem(
+        runs,
+        library,
+        fluid.modulus,
+        fluid.relaxation_time,
+        base=fluid.law,
+        strain_step=strain_step,
+    )
+    stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
+    return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
