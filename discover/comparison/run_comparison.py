@@ -7,7 +7,12 @@ from dataclasses import replace
 from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.description import data_in_words, known_in_words
 from discover.comparison.equations import known_equation
-from discover.comparison.fitting.prepared import at_rates, require_one_known_law, settled_by
+from discover.comparison.fitting.prepared import (
+    at_rates,
+    require_one_known_law,
+    settled_by,
+    thinned_to,
+)
 from discover.comparison.fitting.training import study_library
 from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known, known_part
@@ -69,6 +74,8 @@ def compare(
     """
     options = study.compare
     data = at_rates(load_study_data(study, seed) if data is None else data)
+    if made is None:  # estimators that are fitted already saw every sample
+        data = thinned_to(data, options.most_samples)
     require_teacher(study)
     sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
@@ -96,7 +103,7 @@ def compare(
         done += 1
     points = []
     for law, value, other in sweep:
-        other_data = load_study_data(other, seed)
+        other_data = thinned_to(load_study_data(other, seed), options.most_samples)
         flow = comparison_flows(other_data, ())[len(other_data.fit)]
         alone = Known(Frame(model, other_data, [flow]), None, [flow])
         elsewhere, at_point = replace(learning, study=other, made=None), {}

@@ -147,13 +147,14 @@ class Dataset(NotebookView):
 
     @property
     def thinned(self) -> str:
-        """What was thinned when it was read, in sentences; empty if nothing was."""
-        said = [
-            (run.name, run.metadata["thinned"]) for run in self.runs if "thinned" in run.metadata
-        ]
+        """What was thinned, in sentences, one for each way; empty if nothing was."""
+        said: dict[str, list[str]] = {}
+        for run in self.runs:
+            if "thinned" in run.metadata:
+                said.setdefault(run.metadata["thinned"], []).append(run.name)
         if self.linear_sweep is not None and self.linear_sweep.thinned:
-            said.append(("the linear sweep", self.linear_sweep.thinned))
-        return " ".join(f"{name}: {text}." for name, text in said)
+            said.setdefault(self.linear_sweep.thinned, []).append("the linear sweep")
+        return " ".join(f"{', '.join(names)}: {text}." for text, names in said.items())
 
     @property
     def left_out(self) -> str:

@@ -1,8 +1,11 @@
 """The data of a comparison as learners take them, and what a comparison refuses."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
+from discover.dataset import Run
 from discover.dataset.material_functions import at_measured_rate
+from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.protocols import settled
 from discover.study.data import StudyData
@@ -57,13 +60,30 @@ def settled_by(data: StudyData, relaxation_time: float) -> StudyData:
     relaxation_time
         The longest, in s.
     """
+    return _with_each_run(
+        data, lambda run: replace(run, protocol=settled(run.protocol, relaxation_time))
+    )
+
+
+def thinned_to(data: StudyData, most: int) -> StudyData:
+    """Return data with at most so many samples of each run, evenly chosen in their order.
+
+    Every sample is a step of the integration, and a record of thousands says little more of a law
+    than its hundreds do. What was thinned says so.
+
+    Parameters
+    ----------
+    data
+        Of a study, split.
+    most
+        Samples of a run, at most.
+    """
+    return _with_each_run(data, lambda run: thin_run(run, most))
+
+
+def _with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
     parts = {
-        name: replace(
-            part,
-            runs=tuple(
-                replace(run, protocol=settled(run.protocol, relaxation_time)) for run in part.runs
-            ),
-        )
+        name: replace(part, runs=tuple(change(run) for run in part.runs))
         for name in ("dataset", "fit", "held_out")
         for part in [getattr(data, name)]
     }

@@ -16,7 +16,6 @@ from jaxtyping import Float
 
 from discover.comparison.instrument.corrected import InRecord, corrected
 from discover.comparison.outcomes.constant import Constant
-from discover.dataset.thinning import thin_run
 from discover.effects import KnownEffect, library_term, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales, make_batch
@@ -44,7 +43,6 @@ LINEAR_STRAIN = 0.4
 that constants found there owe nothing to any law."""
 
 _FEWEST_LINEAR = 10
-_MOST_SAMPLES = 400
 _ROUNDS = 3
 
 _TWIN = 0.02
@@ -136,7 +134,7 @@ class FittedAlong:
         names = {effect.name for effect in classical}
         self.terms = [library_term(t) for t in library.terms if t.closed_form is None]
         terms = [term for term in self.terms if term.name not in names]
-        self.runs = [thin_run(run, _MOST_SAMPLES) for run in data.fit]
+        self.runs = list(data.fit)
         self.forward = forward
         self.model = AugmentedModel(forward, [*classical, *terms], data_scales(self.runs))
         self.batch = make_batch(self.runs)

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from discover.dataset import Run
-from discover.dataset.thinning import thin_run
 from discover.effects import ConstitutiveEffect, KnownEffect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
 from discover.laws.registry import make_law
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
-
-_MOST_SAMPLES = 400
 
 
 def fixed_with_the_law(declared: DeclaredModel, runs: Sequence[Run]) -> DeclaredModel:
@@ -42,9 +39,8 @@ def fixed_with_the_law(declared: DeclaredModel, runs: Sequence[Run]) -> Declared
     ]
     if not of_law and not of_fluid:
         return declared
-    thinned = [thin_run(run, _MOST_SAMPLES) for run in runs]
-    model = AugmentedModel(forward_model(declared), [], data_scales(thinned))
-    fit = fit_batch(model, make_batch(thinned), [model.zero()], [model.free_positions])[0]
+    model = AugmentedModel(forward_model(declared), [], data_scales(runs))
+    fit = fit_batch(model, make_batch(runs), [model.zero()], [model.free_positions])[0]
     if not fit.usable:
         raise InputError(
             "The declared model cannot be integrated through the fitted runs: its stress runs "

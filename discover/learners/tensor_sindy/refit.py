@@ -202,7 +202,9 @@ def refit(
         parameters, predicted = _descend(problem, layout, start, jnp.asarray(tolerance))
         parameters, predicted = np.asarray(parameters), np.asarray(predicted)
         rows = np.repeat(keep.reshape(-1), problem.target.shape[2])
-        kept = np.sum((predicted - target)[rows] ** 2)
+        # a trial law may end finite and yet too large to be squared
+        apart = np.clip((predicted - target)[rows], -_RUNAWAY, _RUNAWAY)
+        kept = np.sum(apart**2)
         share = problem.n_observations / max(np.sum(observed & rows), 1)
         return Fit(
             tuple(int(i) for i in support),
