@@ -16,6 +16,8 @@ from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import solve_on_grid
 
+_IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
+
 
 class TrainingProblem(eqx.Module):
     """Recorded stress of several runs, and the modes that the network serves.
@@ -68,7 +70,7 @@ class TrainingProblem(eqx.Module):
     def mean_squared_errors(
         self,
         law: AbstractConstitutiveLaw,
-        adjoint: diffrax.AbstractAdjoint | None = None,
+        adjoint: diffrax.AbstractAdjoint = _IN_REVERSE,
     ) -> Float[Array, " runs"]:
         """Return the mean squared error of each run.
 

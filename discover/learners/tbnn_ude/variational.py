@@ -8,7 +8,6 @@ network give it together with ∂f/∂θ, where one forward pass per weight woul
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
+from discover.simulate.fixed_steps import fixed_steps
 
 
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n k 4"]:
@@ -102,21 +102,10 @@ def states_and_jacobian(
         return y[..., 0], protocol.recorded_stress(jnp.tensordot(modulus, y[..., 1:], axes=1))
 
     def one_run(protocol, grid):
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(field),
-            ExponentialRungeKutta4(decay),
-            grid.times[0],
-            grid.times[-1],
-            None,
-            jnp.zeros((modulus.shape[0], 4, 1 + n_weights)),
-            args=protocol,
-            saveat=diffrax.SaveAt(t0=True, steps=True, fn=observe),
-            stepsize_controller=diffrax.StepTo(grid.times),
-            adjoint=diffrax.ForwardMode(),
-            max_steps=grid.times.shape[0] - 1,
-            throw=False,
-        )
-        return jax.tree.map(lambda values: values[grid.sample_index], solution.ys)
+        start = jnp.zeros((modulus.shape[0], 4, 1 + n_weights))
+        solver = ExponentialRungeKutta4(decay)
+        observed = fixed_steps(field, solver, grid.times, start, protocol, observe)
+        return jax.tree.map(lambda values: values[grid.sample_index], observed)
 
     states, jacobian = jax.vmap(one_run)(*runs)
     return states, jnp.where(runs[1].sample_mask[..., None], jacobian, 0.0)

@@ -13,7 +13,6 @@ Which terms are active is an index array, not a program: no support needs a comp
 
 from functools import partial
 
-import diffrax
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
@@ -22,6 +21,7 @@ from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
+from discover.simulate.fixed_steps import fixed_steps
 from tensor_library.kinematics import rate_of_deformation
 
 _LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
@@ -81,22 +81,15 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
     # Exact for the linear relaxation of the known law; where that too is unknown, a rate of this
     # size is still the natural split, and the split decides accuracy only.
     decay = (1.0 / problem.relaxation_time)[:, None, None]
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_vector_field),
+    observed = fixed_steps(
+        _vector_field,
         ExponentialRungeKutta4(jax.lax.stop_gradient(decay)),
-        grid.times[0],
-        grid.times[-1],
-        None,
+        grid.times,
         jnp.zeros((problem.modulus.shape[0], 4, columns)),
-        args=(problem, protocol, active, coefficients, inner),
-        saveat=diffrax.SaveAt(t0=True, steps=True, fn=_observe),
-        stepsize_controller=diffrax.StepTo(grid.times),
-        adjoint=diffrax.ForwardMode(),
-        max_steps=grid.times.shape[0] - 1,
-        throw=False,
+        (problem, protocol, active, coefficients, inner),
+        _observe,
     )
-    assert solution.ys is not None  # SaveAt asks for it
-    return solution.ys[grid.sample_index]
+    return observed[grid.sample_index]
 
 
 def observe(
@@ -158,22 +151,15 @@ def predict_many(
         return _recorded(total + _of_solvent(problem, args[0], t), args[0])
 
     def run(coefficients, inner, protocol, grid):
-        solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(field),
+        observed = fixed_steps(
+            field,
             ExponentialRungeKutta4((1.0 / problem.relaxation_time)[:, None]),
-            grid.times[0],
-            grid.times[-1],
-            None,
+            grid.times,
             jnp.zeros((problem.modulus.shape[0], 4)),
-            args=(protocol, coefficients, inner),
-            saveat=diffrax.SaveAt(t0=True, steps=True, fn=seen),
-            stepsize_controller=diffrax.StepTo(grid.times),
-            adjoint=diffrax.ForwardMode(),
-            max_steps=grid.times.shape[0] - 1,
-            throw=False,
+            (protocol, coefficients, inner),
+            seen,
         )
-        assert solution.ys is not None  # SaveAt asks for it
-        return solution.ys[grid.sample_index]
+        return observed[grid.sample_index]
 
     def law(numbers):
         predicted = jax.vmap(partial(run, *numbers))(problem.protocols, problem.grids)
