@@ -241,7 +241,7 @@ class Compare(Section):
     recipe: Literal["default", "thorough", "paper"] = "default"
     quick: bool = False
     members: Annotated[int, Field(ge=1, le=64)] = 3
-    most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
+    most_samples: Annotated[int, Field(ge=10, le=20_000)] = 1000
     seed: Seed = 0
     use_normal_stresses: bool = False
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)

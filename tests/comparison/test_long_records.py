@@ -31,7 +31,7 @@ def oscillations(samples: int, count: int = 2) -> StudyData:
     return StudyData(dataset, dataset.select(["0.csv"]), dataset.select(["1.csv"]))
 
 
-@pytest.mark.parametrize(("options", "expected"), [({}, 400), ({"most_samples": 150}, 150)])
+@pytest.mark.parametrize(("options", "expected"), [({}, 1000), ({"most_samples": 150}, 150)])
 def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, options, expected):
     def given(learner, study, model, runs, *rest):
         raise _Seen([len(run) for run in runs])

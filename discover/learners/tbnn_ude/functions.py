@@ -18,6 +18,7 @@ from discover.learners.tbnn_ude.session import PRIOR_SHARE, START_STEPS, Session
 
 _POLISHED = 2
 _CLOSE = 1.5  # what lies further behind the best of a race is not polished
+_MORE_ROUNDS = 4  # with the least penalty, while they pay: near laws that run away steps are short
 _STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds more than noise
 
 
@@ -109,13 +110,16 @@ def nearly_constant_functions(
     law = eqx.tree_at(lambda tree: tree.constants, law, constants)
     found = []
     before = np.inf
-    for strength in session.recipe.variations:
+    variations = session.recipe.variations
+    for number, strength in enumerate([*variations, *_MORE_ROUNDS * variations[-1:]]):
         prior = least_variation(jnp.asarray(strength))
         law = session.round(law, strength, everything, True, session.recipe.steps, prior=prior)
         misfit = session.misfit(law)
         if misfit < before:  # the same law twice is no second opinion
             found.append(law)
-        if session.settled(law) and misfit > _STILL_GAINS * before:
+        settled, gains = session.settled(law), misfit <= _STILL_GAINS * before
+        through = number + 1 >= len(variations)
+        if (settled and not gains) or (through and (settled or not gains)):
             break
         before = misfit
     return found
