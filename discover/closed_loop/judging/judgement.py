@@ -158,8 +158,10 @@ def judge(
         )
     elif not structured:
         text = f"{missed}, as {causes} ({_percent(expected)})."
-        if left.probability is not None and left.probability <= SIGNIFICANCE and plain:
-            text += " It has a pattern that noise has not, but one no larger than that."
+        if left.probability is None:
+            text += " There are too few samples to look for a pattern in what is left."
+        elif left.probability <= SIGNIFICANCE and plain:
+            text += f" It has {left.pattern}, but one no larger than that."
     elif mistaken:
         text = (
             f"{missed}, as {causes} ({_percent(expected)}), but {' and '.join(not_from_rest)} "
@@ -192,9 +194,8 @@ def judge(
         )
     else:
         text = (
-            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has a "
-            f"pattern that noise has not; the worst run is {worst.name}. Some effect is still "
-            "missing."
+            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has "
+            f"{left.pattern}; the worst run is {worst.name}. Some effect is still missing."
         )
     if left.outliers:
         text += f" Besides those left out before the fit, {left.outliers} samples are outliers."

@@ -47,7 +47,10 @@ def _found(comparison: Comparison) -> str:
         verb = "explains" if len(explanation.by) == 1 else "explain"
         sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
         rest = "what is left" if len(explanation.by) == 1 else "what each leaves"
-        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) is noise")
+        noise = "is noise"
+        if all(left[name].probability is None for name in explanation.by):
+            noise = "is no larger than noise; there are too few samples to look for a pattern in it"
+        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) {noise}")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
