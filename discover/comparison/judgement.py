@@ -21,6 +21,7 @@ from discover.comparison.judging.identifiability import (
     structure_of,
 )
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -119,6 +120,7 @@ def judge(
     if not explanation.in_library:
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
+    outcomes = with_small_strain_told(outcomes, explanation, others)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()

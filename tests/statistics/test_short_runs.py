@@ -14,11 +14,15 @@ def noise(generator, runs=6, samples=15):
     return 0.01 * generator.standard_normal((runs, samples))
 
 
+def structured(residual, weight):
+    probability = noise_probability(residual, weight)
+    assert probability is not None
+    return probability <= 0.01
+
+
 def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level_says():
     weight = np.ones((6, 15))
-    taken = sum(
-        noise_probability(noise(np.random.default_rng(seed)), weight) <= 0.01 for seed in range(300)
-    )
+    taken = sum(structured(noise(np.random.default_rng(seed)), weight) for seed in range(300))
     # 1 % of 300, within three standard deviations of a binomial count
     assert taken <= 3 + 3 * np.sqrt(300 * 0.01 * 0.99)
 
@@ -72,8 +76,8 @@ def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():
         residual = np.zeros((7, 200))
         residual[0] = correlated(200, generator)
         residual[1:, :15] = [correlated(15, generator) for _ in range(6)]
-        alone += noise_probability(residual[1:], weight[1:]) <= 0.01
-        together += noise_probability(residual, weight) <= 0.01
+        alone += structured(residual[1:], weight[1:])
+        together += structured(residual, weight)
     assert alone >= 18
     # 1 % of 20: more than 3 has a probability below 1e-4
     assert together <= 3
