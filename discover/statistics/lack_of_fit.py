@@ -61,6 +61,8 @@ class LackOfFit:
         Relative error that noise and the error of the linear data explain together.
     pattern
         What speaks against noise where `probability` is small, in words.
+    changing
+        Relative size of what changes from sample to sample; None where the noise is given.
     """
 
     verdict: FitVerdict
@@ -73,6 +75,21 @@ class LackOfFit:
     expected: float = 0.0
     outlier_samples: tuple[tuple[int, ...], ...] = ()
     pattern: str = PATTERN
+    changing: float | None = None
+
+    @property
+    def noise_unsure(self) -> bool:
+        """Whether `noise` is no more than what changes from sample to sample."""
+        return self.changing is not None and self.noise <= self.changing
+
+    def refuted(self, reason: str) -> "LackOfFit":
+        """Return the same of a model that other runs refute.
+
+        What looked like correlated noise may be its misfit, so only what changes from sample to
+        sample is still called noise.
+        """
+        noise = self.noise if self.changing is None else min(self.noise, self.changing)
+        return replace(self, verdict="unexplained", reason=reason, noise=noise)
 
 
 def lack_of_fit(
@@ -142,17 +159,19 @@ def what_is_left(
     count = sum(len(where) for where in outliers)
     if count:
         reason += f"; outliers that do not count: {count}"
+    summary = summarise(residual, weight)
     return LackOfFit(
         verdict,
         misfit,
         floor,
-        float(np.mean(summarise(residual, weight).autocorrelation)),
+        float(np.mean(summary.autocorrelation)),
         probability,
         count,
         reason,
         expected,
         outliers,
         pattern,
+        float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
     )
 
 

@@ -270,6 +270,27 @@ def test_a_law_for_the_fitted_range_only_says_so_in_the_first_sentence(passed):
     assert limited == ("is for the fitted range only" in found) == (passed is False)
 
 
+def test_a_law_as_simple_that_fits_as_well_stands_beside_the_one_found():
+    # Rolie–Poly and this law have the same σ12, and the first sentence named one of them alone
+    other = made_up().rivals[0]
+    beside = replace(other, terms={"tr(sigma.gammadot)*I": 0.3})
+    bigger = replace(other, terms={"sigma.sigma": 0.2, "gammadot.gammadot": -0.1})
+    found = comparison_verdict(made_up(rivals=[beside, bigger]))[0]
+    assert ", or 0.3 tr(σ·γ̇) I, which fits as well" in found
+    assert "one of 2 other laws as simple" in comparison_verdict(made_up(rivals=[beside, other]))[0]
+    assert "as well" not in comparison_verdict(made_up(rivals=[bigger]))[0]
+
+
+def test_what_may_be_a_misfit_is_not_called_noise():
+    one = replace(left("unexplained", misfit=0.06, correlation=0.8), changing=0.01)
+    explanation = Explanation({"tensor_sindy": one})
+    found = comparison_verdict(made_up(network=None, explanation=explanation))[0]
+    assert "leaves 6 %, of which 1 % changes from sample to sample, as noise does" in found
+    # a noise that was given is one
+    given = Explanation({"tensor_sindy": replace(one, changing=None)})
+    assert "where noise is 1 %" in comparison_verdict(made_up(network=None, explanation=given))[0]
+
+
 def test_a_sum_stands_in_brackets_behind_its_coefficient():
     terms = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "(exp(epsilon*tr(sigma))-1)*sigma")
     one = replace(outcome("tensor_sindy", 0.01, False), terms=tuple(

@@ -134,6 +134,14 @@ def judge(
     short = tuple(r.name for r in records if given and len(r.time) < FEWEST_FAST)
     which = f"The fitted runs of {FEWEST_FAST} samples or more" if short else "The fitted runs"
     missed = f"{which} are missed by {_percent(error)}"
+    like_noise = ""
+    if explained and not carries_over:
+        left = left.refuted(left.reason)
+        if STRUCTURE * left.noise < expected and not linear:
+            like_noise = (
+                f", which would pass for correlated noise ({_percent(left.noise)} changes from "
+                "sample to sample)"
+            )
     if silence == "records":
         text = (
             "The records are noise about a constant, whatever rate was imposed: they hold no "
@@ -171,16 +179,17 @@ def judge(
         )
     elif pattern:
         text = (
-            f"{missed}, as {causes} ({_percent(expected)}), but the runs held out by "
-            f"{_percent(missed_held_out)}, and what is left of them has a pattern that neither "
-            "noise nor an uncertain constant leaves. Some effect is still missing, or has another "
-            "form."
+            f"{missed}{like_noise or f', as {causes} ({_percent(expected)})'}, but the runs held "
+            f"out by {_percent(missed_held_out)}, and what is left of them has a pattern that "
+            "neither noise nor an uncertain constant leaves. Some effect is still missing, or has "
+            "another form."
         )
     elif explained:
         text = (
-            f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "
-            f"{_percent(missed_held_out)}: what was found does not carry over to them, most of all "
-            f"not to {worst.name}. Some effect is still missing, or has another form."
+            f"{missed}{like_noise or f' ({_percent(expected)} of it is what {causes})'}, but the "
+            f"runs held out by {_percent(missed_held_out)}: what was found does not carry over to "
+            f"them, most of all not to {worst.name}. Some effect is still missing, or has another "
+            "form."
         )
     elif silence == "fluid":
         text = (

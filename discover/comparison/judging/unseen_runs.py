@@ -1,7 +1,6 @@
 """Runs held out of a comparison: a law that they refute explains nothing."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +52,7 @@ def hold_against_unseen(
         columns = [_columns(outcomes[name], flow, bands.get(flow.key)) for flow in unseen]
         reason = _refuted(outcomes[name], training, unseen, columns, found[name], expectation)
         if reason:
-            found[name] = replace(found[name], verdict="unexplained", reason=reason)
+            found[name] = found[name].refuted(reason)
     return Explanation(found)
 
 

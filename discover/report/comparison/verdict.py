@@ -6,6 +6,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.exact.relations import spell_briefly
 from discover.report.wording import (
     SYMBOLS,
     estimate,
@@ -125,7 +126,10 @@ def _left(one: LackOfFit) -> str:
     """Return what a law leaves of the data, in words."""
     if not np.isfinite(one.misfit):
         return f"everything, for {one.reason}"
-    text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
+    noise = f"where noise is {percent(one.noise)}"
+    if one.noise_unsure:
+        noise = f"of which {percent(one.noise)} changes from sample to sample, as noise does"
+    text = f"{percent(one.misfit)}, {noise}"
     if one.lag_one_correlation > CORRELATED:
         text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
     elif one.misfit <= STRUCTURE * one.noise:
@@ -142,6 +146,7 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     text = f"if the law is in the library, it is {terms_text(sparse)}"
     if len(sparse.terms) > _MOST_TERMS:
         text = f"if the law is in the library, it has {len(sparse.terms)} terms (Laws found)"
+    text += _or_another(comparison, sparse)
     if comparison.truth is None:
         return text
     wanted = {t.term for t in comparison.truth}
@@ -151,6 +156,21 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
     extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
     return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+
+
+def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
+    """Return that laws of the library as simple as the one found fit too; empty if none does."""
+    own = {term.term for term in sparse.terms}
+    alike = [
+        rival
+        for rival in comparison.rivals
+        if len(rival.terms) <= len(own) and {*rival.terms} != own
+    ]
+    if not alike:
+        return ""
+    if len(alike) == 1:
+        return f", or {readable(spell_briefly(alike[0].terms))}, which fits as well"
+    return f", or one of {len(alike)} other laws as simple, which fit as well"
 
 
 def _constants_found(sparse: LearnerOutcome) -> list[str]:
