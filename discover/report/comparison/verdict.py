@@ -1,10 +1,13 @@
 """The verdict on a comparison: what was found, how sure, what to measure next."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.exact.relations import spell_briefly
 from discover.report.wording import (
@@ -212,6 +215,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
         recorded = "σ12" if shear else "the recorded stress"
         said = [
             f"{symbol} by up to {percent(value)}"
+            f"{_without_outliers(comparison, name, flows) if quantity == 'sigma12' else ''}"
             for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
             if (value := worst(errors, quantity.split()[0])) is not None
         ]
@@ -222,6 +226,20 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     return (told if parts else []) + (
         [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
     )
+
+
+def _without_outliers(comparison: Comparison, name: str, flows: Sequence[Flow]) -> str:
+    """Return the largest error without the samples that do not judge; empty where all do."""
+    count = sum(len(comparison.outliers(name, flow)) for flow in flows)
+    if not count:
+        return ""
+    errors = []
+    for flow in flows:
+        error = comparison.error_without_outliers(name, flow)
+        errors.append(comparison.errors(name, flow)["sigma12"] if error is None else error)
+    which = "the outlier that does" if count == 1 else f"the {count} outliers that do"
+    largest = max((error for error in errors if error is not None), default=None)
+    return f" ({percent(largest)} without {which} not count)"
 
 
 def _open(comparison: Comparison) -> str:
