@@ -152,6 +152,11 @@ def what_is_left(
     elif explained:
         given = "the noise given" if expectation.noise is not None else "the linear data's error"
         reason = f"what is left ({100 * misfit:.2g} %) has a pattern no larger than {given}"
+    elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
+        reason = (
+            f"what is left ({100 * misfit:.2g} %) is more than changes from sample to sample "
+            f"({100 * expected:.2g} %), but so few samples hardly tell what is noise"
+        )
     elif misfit > STRUCTURE * expected:
         reason = f"what is left ({100 * misfit:.2g} %) is more than noise ({100 * expected:.2g} %)"
     else:

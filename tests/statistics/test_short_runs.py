@@ -59,6 +59,12 @@ def test_what_short_runs_cannot_tell_is_said():
     few = what_is_left([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
     assert few.probability is None
     assert "too few samples" in few.reason
+    # 8 samples of plain noise look like more than noise one time in five
+    row = noise(np.random.default_rng(0), 1, 8)[0] + np.linspace(-0.1, 0.1, 8)
+    open_ = what_is_left([row], [np.ones(8)])
+    assert open_.verdict == "unexplained"
+    assert "hardly tell" in open_.reason
+    assert "hardly tell" not in what_is_left([row] * 3, [np.ones(8)] * 3).reason
 
 
 def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():

@@ -196,6 +196,11 @@ def judge(
             f"{missed} ({_percent(expected)} of it is what {causes}), and as well without the "
             "fluid: what was found explains nothing, and something else is in the records."
         )
+    elif error > STRUCTURE * expected and left.probability is None and expectation.noise is None:
+        text = (
+            f"{missed}, more than changes from sample to sample ({_percent(expected)}), but so few "
+            "samples hardly tell noise from a missing effect."
+        )
     elif error > STRUCTURE * expected:
         text = (
             f"{missed}, more than {causes} ({_percent(expected)}); the worst run is {worst.name}. "
