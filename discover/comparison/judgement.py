@@ -110,8 +110,11 @@ def judge(
         keys = {flow.key for flow in (*judged, *fitted)}
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands and experiments take it that the law, or a rival, is the fluid's
+        left = explanation.lack_of_fit["tensor_sindy"]
+        # outliers are no noise of the next experiment
+        misfit = left.misfit if left.outliers else None
         following = next_measurement(
-            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed
+            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed, misfit
         )
         others = other_constants(chosen.terms, frame.model)
         own_bands = following.bands if normal else with_other_gain(following.bands, others)
