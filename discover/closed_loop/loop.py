@@ -242,6 +242,7 @@ def run_loop(
             "structured": judgement.structured,
             "error": after.fit,
             "noise_floor": judgement.left.noise,
+            "noise_unsure": judgement.left.noise_unsure,
             "outliers": sum(map(len, spikes.values())),
             "outlier_times_s": spikes,
             "probability": judgement.left.probability,

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from discover.comparison.equations import outcome_equation
@@ -171,6 +172,18 @@ class Comparison(PageView, NotebookView):
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
 
+    def outliers(self, who: str, flow: Flow) -> list[int]:
+        """Return the samples of a run held out that do not judge a learner."""
+        return list(self.explanation.outliers.get(who, {}).get(flow.key, ()))
+
+    def error_without_outliers(self, who: str, flow: Flow) -> float | None:
+        """Return a learner's error of σ12 over the samples that judge it; None where all do."""
+        samples, predicted = self.outliers(who, flow), self.outcomes[who].predictions[flow.key]
+        if not samples or predicted is None:
+            return None
+        two = (np.delete(of["sigma12"], samples) for of in (predicted, flow.reference))
+        return relative_errors(*({"sigma12": column} for column in two))["sigma12"]
+
     def error_map(self, who: str) -> dict[tuple[float, float], dict[str, float | None]]:
         """Return errors over the Pipkin diagram: (Wi, De) → quantity → relative error.
 
@@ -256,6 +269,14 @@ class Comparison(PageView, NotebookView):
                     for t in outcome.terms
                 ],
                 "errors": self._errors(name, self.judged),
+                "errors_without_outliers": {
+                    flow.name: {
+                        "sigma12": self.error_without_outliers(name, flow),
+                        "outliers": len(self.outliers(name, flow)),
+                    }
+                    for flow in self.judged
+                    if self.outliers(name, flow)
+                },
                 "half_widths_of_members": {
                     flow.name: outcome.half_widths(flow) for flow in self.judged
                 },

@@ -21,6 +21,7 @@ from discover.comparison.judging.identifiability import (
     structure_of,
 )
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -109,8 +110,11 @@ def judge(
         keys = {flow.key for flow in (*judged, *fitted)}
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands and experiments take it that the law, or a rival, is the fluid's
+        left = explanation.lack_of_fit["tensor_sindy"]
+        # outliers are no noise of the next experiment
+        misfit = left.misfit if left.outliers else None
         following = next_measurement(
-            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed
+            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed, misfit
         )
         others = other_constants(chosen.terms, frame.model)
         own_bands = following.bands if normal else with_other_gain(following.bands, others)
@@ -119,6 +123,7 @@ def judge(
     if not explanation.in_library:
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
+    outcomes = with_small_strain_told(outcomes, explanation, others)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()

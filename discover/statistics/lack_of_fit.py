@@ -17,12 +17,20 @@ from discover.statistics.residual import (
     tells_noise,
 )
 from discover.statistics.same_place import repeated
-from discover.statistics.whiteness import SIGNIFICANCE, noise_probability
+from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
 
 ONLY_NOISE = 0.9
 """A model that misses a record by more of it than this says nothing of it."""
+
+
+PATTERN = "a pattern that noise has not"
+
+_PATTERN_OF_SHORT = (
+    "a pattern that independent noise has not (runs of fewer than "
+    f"{FEWEST_TESTED} samples do not tell correlated noise from a misfit)"
+)
 
 
 @dataclass(frozen=True)
@@ -41,7 +49,8 @@ class LackOfFit:
     lag_one_correlation
         Of neighbouring residuals, mean over runs.
     probability
-        Of residuals as structured as these, if they are noise; None where every run is too short.
+        Of residuals as structured as these, if they are noise; None where all runs together are
+        too short to look for a pattern.
     outliers
         Number of samples that are far outside the noise and do not vote.
     outlier_samples
@@ -50,6 +59,10 @@ class LackOfFit:
         The verdict in one sentence.
     expected
         Relative error that noise and the error of the linear data explain together.
+    pattern
+        What speaks against noise where `probability` is small, in words.
+    changing
+        Relative size of what changes from sample to sample; None where the noise is given.
     """
 
     verdict: FitVerdict
@@ -61,6 +74,22 @@ class LackOfFit:
     reason: str = ""
     expected: float = 0.0
     outlier_samples: tuple[tuple[int, ...], ...] = ()
+    pattern: str = PATTERN
+    changing: float | None = None
+
+    @property
+    def noise_unsure(self) -> bool:
+        """Whether `noise` is no more than what changes from sample to sample."""
+        return self.changing is not None and self.noise <= self.changing
+
+    def refuted(self, reason: str) -> "LackOfFit":
+        """Return the same of a model that other runs refute.
+
+        What looked like correlated noise may be its misfit, so only what changes from sample to
+        sample is still called noise.
+        """
+        noise = self.noise if self.changing is None else min(self.noise, self.changing)
+        return replace(self, verdict="unexplained", reason=reason, noise=noise)
 
 
 def lack_of_fit(
@@ -107,32 +136,47 @@ def what_is_left(
     known = expectation.noise is not None or tells_noise(weight)
     explained = known and expectation.explains(residual, weight, record)
     probability = noise_probability(residual, weight, record)
+    long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
+    pattern = PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
         reason = f"what is left ({100 * misfit:.2g} % of the records) is noise, and nearly all"
-    elif explained and (probability is None or probability > SIGNIFICANCE):
+    elif explained and probability is None:
+        reason = (
+            f"what is left ({100 * misfit:.2g} %) is no larger than noise; there are too few "
+            "samples to look for a pattern in it"
+        )
+    elif explained and probability is not None and probability > SIGNIFICANCE:
         reason = f"what is left ({100 * misfit:.2g} %) is noise"
     elif explained:
         given = "the noise given" if expectation.noise is not None else "the linear data's error"
         reason = f"what is left ({100 * misfit:.2g} %) has a pattern no larger than {given}"
+    elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
+        reason = (
+            f"what is left ({100 * misfit:.2g} %) is more than changes from sample to sample "
+            f"({100 * expected:.2g} %), but so few samples hardly tell what is noise"
+        )
     elif misfit > STRUCTURE * expected:
         reason = f"what is left ({100 * misfit:.2g} %) is more than noise ({100 * expected:.2g} %)"
     else:
-        reason = f"what is left ({100 * misfit:.2g} %) has a pattern that noise has not"
+        reason = f"what is left ({100 * misfit:.2g} %) has {pattern}"
     count = sum(len(where) for where in outliers)
     if count:
         reason += f"; outliers that do not count: {count}"
+    summary = summarise(residual, weight)
     return LackOfFit(
         verdict,
         misfit,
         floor,
-        float(np.mean(summarise(residual, weight).autocorrelation)),
+        float(np.mean(summary.autocorrelation)),
         probability,
         count,
         reason,
         expected,
         outliers,
+        pattern,
+        float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
     )
 
 

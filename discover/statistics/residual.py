@@ -9,10 +9,12 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
 from discover.statistics.independent_samples import independent_samples
-from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
-
-FEWEST_FAST = 7
-"""Samples of a run from which on its noise can be told by third differences."""
+from discover.statistics.whiteness import (
+    FEWEST_FAST,
+    FEWEST_TESTED,
+    SIGNIFICANCE,
+    noise_probability,
+)
 
 
 @dataclass(frozen=True)
@@ -102,23 +104,26 @@ def noise_floor(
     outside its neighbourhood counts no more than one six times the noise: a few samples, however
     large, say nothing of the others. Where it holds structure, it is the part of it that changes
     from sample to sample, see `summarise`; noise that is correlated itself is then underestimated.
-    Runs too short to be tested are taken to be as noisy as the tested ones, or as what changes in
+    Runs too short to be tested alone are taken to be as noisy as the others, or as what changes in
     them from sample to sample if that is more: their size is no sign of noise. Where all are so
-    short, they tell it together. Those that do not judge (`judging`) do not count.
+    short and not tested together either, or hold structure, they tell it together by what changes.
+    Those that do not judge (`judging`) do not count.
     """
     rows = judging(weight)
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
     measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    if not is_noise(residual, weight, measured):
-        return float(np.mean(fast))
-    sizes = np.array([_limited_size(r[w > 0]) for r, w in zip(residual, weight, strict=True)])
+    probability = noise_probability(residual, weight, measured)
     samples = np.count_nonzero(weight > 0, axis=1)
     tested = samples >= FEWEST_TESTED
+    known = probability is not None and probability > SIGNIFICANCE
+    if not known and not np.any(tested) and np.all(samples >= FEWEST_FAST):
+        return _pooled_fast_part(residual, weight)
+    if not known and probability is not None:
+        return float(np.mean(fast))
+    sizes = np.array([_limited_size(r[w > 0]) for r, w in zip(residual, weight, strict=True)])
     if np.any(tested):
         sizes = np.where(tested, sizes, np.maximum(fast, np.mean(sizes[tested])))
-    elif np.all(samples >= FEWEST_FAST):
-        sizes = np.array([_pooled_fast_part(residual, weight)])
     return float(np.mean(sizes))
 
 
@@ -174,7 +179,8 @@ def is_noise(
 ) -> bool:
     """Return whether residuals may be noise, white or with a first-order correlation.
 
-    Runs too short to be tested do not say that they are not; see `noise_probability`.
+    Runs too short to be tested, even together, do not say that they are not; see
+    `noise_probability`.
     """
     probability = noise_probability(residual, weight, measured)
     return probability is None or probability > SIGNIFICANCE

@@ -19,7 +19,10 @@ LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
 
 FEWEST_TESTED = 2 * LAGS
-"""Samples of a run from which on that is done."""
+"""Samples of a run from which on that is done; and of all shorter runs, to be tested together."""
+
+FEWEST_FAST = 7
+"""Samples of a run from which on its noise can be told by third differences."""
 
 SIGNIFICANCE = 0.01
 """Noise is taken for structure this often, at most. To call a misfit noise is the graver mistake,
@@ -58,7 +61,12 @@ def noise_probability(
       is nearly right leaves; see `smooth_misfit_probability`;
     - single samples that stand out at the same place of several runs; see `same_place_probability`.
 
-    The smallest probability counts as often as there are tests. None if every run is too short.
+    Runs of fewer than 24 samples have one test together: whether neighbours agree in them, see
+    `separate_probability`. The correlation is that of the longer runs; without any, their noise is
+    taken to have none, for so few samples do not tell correlated noise from a misfit.
+
+    The smallest probability counts as often as there are tests. None if all runs together are too
+    short.
 
     Parameters
     ----------
@@ -69,14 +77,18 @@ def noise_probability(
     measured
         The measurement, by which cycles are found; without it they are not looked for.
     """
-    rows, records = [], []
+    rows, records, short = [], [], []
     for i, (values, seen) in enumerate(zip(residual, weight, strict=True)):
         row = np.asarray(values)[np.asarray(seen) > 0]
         if len(row) >= FEWEST_TESTED and np.any(row):
             rows.append(row / _spread(row))
             records.append(None if measured is None else np.asarray(measured[i])[seen > 0])
+        elif len(row) >= FEWEST_FAST and np.any(row):
+            short.append(row)
+    if sum(map(len, short)) < FEWEST_TESTED:
+        short = []  # too few to say anything
     if not rows:
-        return None
+        return separate_probability(short) if short else None
     size = max(len(row) for row in rows)
     padded = np.array([np.append(row, np.zeros(size - len(row))) for row in rows])
     count = np.array([len(row) for row in rows])
@@ -98,6 +110,10 @@ def noise_probability(
     if any(length is not None for length in cycles):
         tests.append(_repeats(white, count, cycles))
     tests.append(smooth_misfit_probability(rows))
+    if short:
+        tests.append(
+            separate_probability([_differences(r[None], np.array([rho]))[0, 0] for r in short])
+        )
     return float(min(1.0, len(tests) * min(tests)))
 
 

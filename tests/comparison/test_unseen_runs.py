@@ -61,7 +61,10 @@ def test_knocks_in_a_run_held_out_refute_no_law(drawn):
     knocked = drawn["held"][0].copy()
     size = np.sqrt(np.mean(knocked**2))
     knocked[[20, 45, 60]] += size * np.array([1.0, -1.0, 0.8])
-    assert judged(drawn, held=knocked).verdict == "explained"
+    found = judged(drawn, held=knocked)
+    assert found.verdict == "explained"
+    assert found.outliers["tensor_sindy"] == {"held_out/held": (20, 45, 60)}
+    assert judged(drawn).outliers["tensor_sindy"] == {}
     # and excuse none that misses the rest
     assert judged(drawn, held=1.1 * knocked).verdict == "unexplained"
 

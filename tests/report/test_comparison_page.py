@@ -270,6 +270,48 @@ def test_a_law_for_the_fitted_range_only_says_so_in_the_first_sentence(passed):
     assert limited == ("is for the fitted range only" in found) == (passed is False)
 
 
+def test_a_law_as_simple_that_fits_as_well_stands_beside_the_one_found():
+    # Rolie–Poly and this law have the same σ12, and the first sentence named one of them alone
+    other = made_up().rivals[0]
+    beside = replace(other, terms={"tr(sigma.gammadot)*I": 0.3})
+    bigger = replace(other, terms={"sigma.sigma": 0.2, "gammadot.gammadot": -0.1})
+    found = comparison_verdict(made_up(rivals=[beside, bigger]))[0]
+    assert ", or 0.3 tr(σ·γ̇) I, which fits as well" in found
+    assert "one of 2 other laws as simple" in comparison_verdict(made_up(rivals=[beside, other]))[0]
+    assert "as well" not in comparison_verdict(made_up(rivals=[bigger]))[0]
+
+
+def test_an_error_that_outliers_make_stands_beside_that_without_them(tmp_path, no_pictures):
+    knocked = np.sin(TIMES)
+    knocked[7] += 5.0
+    held = replace(flow("b", "held_out"), reference={"sigma12": knocked})
+    comparison = made_up(network=None, flows=[flow("a", "training"), held])
+    told = replace(comparison.explanation, outliers={"tensor_sindy": {held.key: (7,)}})
+    comparison = replace(comparison, explanation=told)
+    # the rest is predicted exactly
+    assert comparison.error_without_outliers("tensor_sindy", held) == 0.0
+    whole = comparison.errors("tensor_sindy", held)["sigma12"]
+    assert whole == pytest.approx(5.0 / np.linalg.norm(knocked))
+    said = f"{percent(whole)} (0 % without the outlier that does not count)"
+    assert said in comparison_verdict(comparison)[1]
+    assert "0 % without 1 outlier" in page_of(comparison, tmp_path)
+    written = json.loads((tmp_path / "comparison.json").read_text("utf-8"))
+    written = written["learners"]["tensor_sindy"]["errors_without_outliers"]
+    assert written == {"b": {"sigma12": 0.0, "outliers": 1}}
+    clean = made_up(network=None)
+    assert "without" not in comparison_verdict(clean)[1]
+
+
+def test_what_may_be_a_misfit_is_not_called_noise():
+    one = replace(left("unexplained", misfit=0.06, correlation=0.8), changing=0.01)
+    explanation = Explanation({"tensor_sindy": one})
+    found = comparison_verdict(made_up(network=None, explanation=explanation))[0]
+    assert "leaves 6 %, of which 1 % changes from sample to sample, as noise does" in found
+    # a noise that was given is one
+    given = Explanation({"tensor_sindy": replace(one, changing=None)})
+    assert "where noise is 1 %" in comparison_verdict(made_up(network=None, explanation=given))[0]
+
+
 def test_a_sum_stands_in_brackets_behind_its_coefficient():
     terms = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "(exp(epsilon*tr(sigma))-1)*sigma")
     one = replace(outcome("tensor_sindy", 0.01, False), terms=tuple(

@@ -128,6 +128,24 @@ def test_what_answers_to_the_rate_is_a_signal(answer, noise):
     assert holds_signal(records(answer, noise), RATES)
 
 
+def test_what_looks_like_correlated_noise_is_no_noise_once_the_model_is_refuted():
+    residual, record = 0.3 * correlated(0.85, 0), WAVE
+    found = lack_of_fit([residual], [record])
+    assert found.verdict == "explained"
+    assert found.noise == pytest.approx(np.sqrt(np.mean(residual**2)) / 7.07, rel=0.1)
+    assert not found.noise_unsure
+    refuted = found.refuted("missed elsewhere")
+    assert (refuted.verdict, refuted.noise_unsure) == ("unexplained", True)
+    # third differences of such noise: 20 − 30ρ + 12ρ² − 2ρ³ of 20 of its variance
+    share = np.sqrt((20 - 30 * 0.85 + 12 * 0.85**2 - 2 * 0.85**3) / 20)
+    assert refuted.noise == pytest.approx(share * found.noise, rel=0.2)
+    # white noise is hardly touched, and a noise that is given not at all
+    white = lack_of_fit([0.3 * correlated(0.0, 1)], [record])
+    assert white.refuted("").noise == pytest.approx(white.noise, rel=0.2)
+    given = lack_of_fit([residual], [record], Expectation(noise=0.05))
+    assert given.refuted("").noise == 0.05
+
+
 def test_one_steady_flow_does_not_tell_a_constant_from_an_answer():
     steady = [42.0 + correlated(0.0, 0)]
     assert holds_signal(steady, RATES[:1])

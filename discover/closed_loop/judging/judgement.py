@@ -134,6 +134,14 @@ def judge(
     short = tuple(r.name for r in records if given and len(r.time) < FEWEST_FAST)
     which = f"The fitted runs of {FEWEST_FAST} samples or more" if short else "The fitted runs"
     missed = f"{which} are missed by {_percent(error)}"
+    like_noise = ""
+    if explained and not carries_over:
+        left = left.refuted(left.reason)
+        if STRUCTURE * left.noise < expected and not linear:
+            like_noise = (
+                f", which would pass for correlated noise ({_percent(left.noise)} changes from "
+                "sample to sample)"
+            )
     if silence == "records":
         text = (
             "The records are noise about a constant, whatever rate was imposed: they hold no "
@@ -158,8 +166,10 @@ def judge(
         )
     elif not structured:
         text = f"{missed}, as {causes} ({_percent(expected)})."
-        if left.probability is not None and left.probability <= SIGNIFICANCE and plain:
-            text += " It has a pattern that noise has not, but one no larger than that."
+        if left.probability is None:
+            text += " There are too few samples to look for a pattern in what is left."
+        elif left.probability <= SIGNIFICANCE and plain:
+            text += f" It has {left.pattern}, but one no larger than that."
     elif mistaken:
         text = (
             f"{missed}, as {causes} ({_percent(expected)}), but {' and '.join(not_from_rest)} "
@@ -169,21 +179,27 @@ def judge(
         )
     elif pattern:
         text = (
-            f"{missed}, as {causes} ({_percent(expected)}), but the runs held out by "
-            f"{_percent(missed_held_out)}, and what is left of them has a pattern that neither "
-            "noise nor an uncertain constant leaves. Some effect is still missing, or has another "
-            "form."
+            f"{missed}{like_noise or f', as {causes} ({_percent(expected)})'}, but the runs held "
+            f"out by {_percent(missed_held_out)}, and what is left of them has a pattern that "
+            "neither noise nor an uncertain constant leaves. Some effect is still missing, or has "
+            "another form."
         )
     elif explained:
         text = (
-            f"{missed} ({_percent(expected)} of it is what {causes}), but the runs held out by "
-            f"{_percent(missed_held_out)}: what was found does not carry over to them, most of all "
-            f"not to {worst.name}. Some effect is still missing, or has another form."
+            f"{missed}{like_noise or f' ({_percent(expected)} of it is what {causes})'}, but the "
+            f"runs held out by {_percent(missed_held_out)}: what was found does not carry over to "
+            f"them, most of all not to {worst.name}. Some effect is still missing, or has another "
+            "form."
         )
     elif silence == "fluid":
         text = (
             f"{missed} ({_percent(expected)} of it is what {causes}), and as well without the "
             "fluid: what was found explains nothing, and something else is in the records."
+        )
+    elif error > STRUCTURE * expected and left.probability is None and expectation.noise is None:
+        text = (
+            f"{missed}, more than changes from sample to sample ({_percent(expected)}), but so few "
+            "samples hardly tell noise from a missing effect."
         )
     elif error > STRUCTURE * expected:
         text = (
@@ -192,9 +208,8 @@ def judge(
         )
     else:
         text = (
-            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has a "
-            f"pattern that noise has not; the worst run is {worst.name}. Some effect is still "
-            "missing."
+            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has "
+            f"{left.pattern}; the worst run is {worst.name}. Some effect is still missing."
         )
     if left.outliers:
         text += f" Besides those left out before the fit, {left.outliers} samples are outliers."

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import even
 from discover.forward.least_squares import Fit
-from discover.statistics.lack_of_fit import LackOfFit, what_is_left
+from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
 from discover.statistics.residual import (
     FEWEST_FAST,
     STRUCTURE,
@@ -89,8 +89,10 @@ class ToleratedMisfit:
             return left
         if pattern <= STRUCTURE * self.expectation.linear_error:
             return left
-        reason = f"what is left ({100 * left.misfit:.2g} %) has a pattern that noise has not"
-        return replace(left, verdict="unexplained", probability=probability, reason=reason)
+        reason = f"what is left ({100 * left.misfit:.2g} %) has {PATTERN}"
+        return replace(
+            left, verdict="unexplained", probability=probability, reason=reason, pattern=PATTERN
+        )
 
     def explained(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves is what a complete model may leave."""

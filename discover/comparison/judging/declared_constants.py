@@ -22,6 +22,9 @@ from tensor_library.terms import parse_term
 
 _TIME, _MODULUS = "sigma", "gammadot"
 
+LINEAR_TERMS = (_TIME, _MODULUS)
+"""Terms that change the moduli at vanishing strain."""
+
 
 @dataclass(frozen=True)
 class OtherConstant:
@@ -83,7 +86,7 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
     """
     found = []
     for term in terms:
-        if term.term not in (_TIME, _MODULUS):
+        if term.term not in LINEAR_TERMS:
             continue
         values = (term.coefficient, *(term.ci95 or ()))
         if term.term == _TIME:

@@ -24,9 +24,13 @@ class Explanation:
     ----------
     lack_of_fit
         By learner.
+    outliers
+        By learner that explains the training runs, and by the key of a run held out: samples that
+        do not judge it. Only runs that have some.
     """
 
     lack_of_fit: Mapping[str, LackOfFit] = field(default_factory=dict)
+    outliers: Mapping[str, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
 
     @property
     def verdict(self) -> FitVerdict:

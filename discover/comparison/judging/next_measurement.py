@@ -124,6 +124,7 @@ def next_measurement(
     flows: Sequence[Flow],
     options: NextExperiment,
     seed: int = 0,
+    misfit: float | None = None,
 ) -> NextMeasurement:
     """Return bands and proposals for the law that sparse regression chose.
 
@@ -141,9 +142,11 @@ def next_measurement(
         What the user could run.
     seed
         Of the draws from the parameters' uncertainty.
+    misfit
+        Relative error of the law without outliers, where there are any.
     """
     chosen, others = contenders(outcome, rivals)
-    misfit = float(outcome.details.get("misfit") or 0.0)
+    misfit = float(outcome.details.get("misfit") or 0.0) if misfit is None else misfit
     noise = options.noise or max(misfit, LEAST_NOISE)
     bands = {}
     if flows:

@@ -1,7 +1,6 @@
 """Runs held out of a comparison: a law that they refute explains nothing."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -48,13 +47,29 @@ def hold_against_unseen(
     ]
     if not unseen:
         return explanation
-    found = dict(explanation.lack_of_fit)
+    found, outliers = dict(explanation.lack_of_fit), {}
     for name in explanation.by:
+        outliers[name] = _outliers(outcomes[name], unseen, expectation)
         columns = [_columns(outcomes[name], flow, bands.get(flow.key)) for flow in unseen]
-        reason = _refuted(outcomes[name], training, unseen, columns, found[name], expectation)
+        reason = _refuted(
+            outcomes[name], training, unseen, columns, found[name], expectation, outliers[name]
+        )
         if reason:
-            found[name] = replace(found[name], verdict="unexplained", reason=reason)
-    return Explanation(found)
+            found[name] = found[name].refuted(reason)
+    return Explanation(found, outliers)
+
+
+def _outliers(
+    outcome: LearnerOutcome, unseen: Sequence[Flow], expectation: Expectation
+) -> dict[str, tuple[int, ...]]:
+    """Return which samples of the runs held out are outliers, by the key of the run."""
+    told = [(flow, row) for flow in unseen if (row := _residual(outcome, flow)) is not None]
+    if not told:
+        return {}
+    records = [np.asarray(flow.reference["sigma12"], dtype=float) for flow, _ in told]
+    left = what_is_left([row for _, row in told], records, expectation)
+    pairs = zip(told, left.outlier_samples, strict=True)
+    return {flow.key: samples for (flow, _), samples in pairs if samples}
 
 
 def _refuted(
@@ -64,6 +79,7 @@ def _refuted(
     columns: Sequence[np.ndarray],
     left: LackOfFit,
     expectation: Expectation,
+    outliers: Mapping[str, tuple[int, ...]],
 ) -> str:
     """Return why the runs held out refute a law, in words; empty if they do not."""
     residuals, records = [], []
@@ -74,9 +90,9 @@ def _refuted(
         residuals.append(residual)
         records.append(np.asarray(flow.reference["sigma12"], dtype=float))
     # knocks in a run held out refute no law, as they do not where it was fitted
-    outliers = what_is_left(residuals, records, expectation).outlier_samples
+    knocks = [list(outliers.get(flow.key, ())) for flow in unseen]
     residuals, records, columns = (
-        [np.delete(row, list(out), axis=-1) for row, out in zip(part, outliers, strict=True)]
+        [np.delete(row, out, axis=-1) for row, out in zip(part, knocks, strict=True)]
         for part in (residuals, records, columns)
     )
     pairs = zip(residuals, records, strict=True)

@@ -8,6 +8,7 @@ import numpy as np
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.identifiability import EXACT, Rival
 from discover.comparison.outcomes.constant import in_words as constant_in_words
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.equations import Equation
 from discover.equations.mathml import law_element, term_element, term_mathml
@@ -20,6 +21,7 @@ from discover.report.wording import (
     RULES,
     interval,
     known,
+    percent,
     readable,
     selection_sentence,
     significant,
@@ -83,6 +85,7 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
                     "value": value,
                     "half_width": None if value is None else mine.get(name),
                     "runs_away": law[flow.key] is None and name in flow.reference,
+                    "without": without_outliers(comparison, who, flow) if name == "sigma12" else "",
                 }
                 for name, value in comparison.errors(who, flow).items()
             ]
@@ -95,6 +98,15 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def without_outliers(comparison: Comparison, who: str, flow: Flow) -> str:
+    """Return a learner's error of the stress without outliers, in words; empty without any."""
+    samples = [] if who == "before" else comparison.outliers(who, flow)
+    if not samples:
+        return ""
+    which = "1 outlier" if len(samples) == 1 else f"{len(samples)} outliers"
+    return f"{percent(comparison.error_without_outliers(who, flow))} without {which}"
 
 
 def law_rows(comparison: Comparison) -> list[dict[str, Any]]:

@@ -1,11 +1,15 @@
 """The verdict on a comparison: what was found, how sure, what to measure next."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.exact.relations import spell_briefly
 from discover.report.wording import (
     SYMBOLS,
     estimate,
@@ -47,7 +51,10 @@ def _found(comparison: Comparison) -> str:
         verb = "explains" if len(explanation.by) == 1 else "explain"
         sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
         rest = "what is left" if len(explanation.by) == 1 else "what each leaves"
-        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) is noise")
+        noise = "is noise"
+        if all(left[name].probability is None for name in explanation.by):
+            noise = "is no larger than noise; there are too few samples to look for a pattern in it"
+        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) {noise}")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
@@ -122,7 +129,10 @@ def _left(one: LackOfFit) -> str:
     """Return what a law leaves of the data, in words."""
     if not np.isfinite(one.misfit):
         return f"everything, for {one.reason}"
-    text = f"{percent(one.misfit)}, where noise is {percent(one.noise)}"
+    noise = f"where noise is {percent(one.noise)}"
+    if one.noise_unsure:
+        noise = f"of which {percent(one.noise)} changes from sample to sample, as noise does"
+    text = f"{percent(one.misfit)}, {noise}"
     if one.lag_one_correlation > CORRELATED:
         text += f", with neighbouring samples correlated to {one.lag_one_correlation:.2g}"
     elif one.misfit <= STRUCTURE * one.noise:
@@ -139,6 +149,7 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     text = f"if the law is in the library, it is {terms_text(sparse)}"
     if len(sparse.terms) > _MOST_TERMS:
         text = f"if the law is in the library, it has {len(sparse.terms)} terms (Laws found)"
+    text += _or_another(comparison, sparse)
     if comparison.truth is None:
         return text
     wanted = {t.term for t in comparison.truth}
@@ -148,6 +159,21 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
     extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
     return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+
+
+def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
+    """Return that laws of the library as simple as the one found fit too; empty if none does."""
+    own = {term.term for term in sparse.terms}
+    alike = [
+        rival
+        for rival in comparison.rivals
+        if len(rival.terms) <= len(own) and {*rival.terms} != own
+    ]
+    if not alike:
+        return ""
+    if len(alike) == 1:
+        return f", or {readable(spell_briefly(alike[0].terms))}, which fits as well"
+    return f", or one of {len(alike)} other laws as simple, which fit as well"
 
 
 def _constants_found(sparse: LearnerOutcome) -> list[str]:
@@ -189,6 +215,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
         recorded = "σ12" if shear else "the recorded stress"
         said = [
             f"{symbol} by up to {percent(value)}"
+            f"{_without_outliers(comparison, name, flows) if quantity == 'sigma12' else ''}"
             for symbol, quantity in ((recorded, "sigma12"), ("N1", "N1"), ("N2", "N2 (of N1)"))
             if (value := worst(errors, quantity.split()[0])) is not None
         ]
@@ -199,6 +226,20 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     return (told if parts else []) + (
         [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
     )
+
+
+def _without_outliers(comparison: Comparison, name: str, flows: Sequence[Flow]) -> str:
+    """Return the largest error without the samples that do not judge; empty where all do."""
+    count = sum(len(comparison.outliers(name, flow)) for flow in flows)
+    if not count:
+        return ""
+    errors = []
+    for flow in flows:
+        error = comparison.error_without_outliers(name, flow)
+        errors.append(comparison.errors(name, flow)["sigma12"] if error is None else error)
+    which = "the outlier that does" if count == 1 else f"the {count} outliers that do"
+    largest = max((error for error in errors if error is not None), default=None)
+    return f" ({percent(largest)} without {which} not count)"
 
 
 def _open(comparison: Comparison) -> str:

@@ -131,6 +131,11 @@ def _loop_sure(result: LoopResult) -> str:
     noise = f"where noise explains {percent(result.noise_floor)}"
     if linear > result.noise_floor:
         noise += f" and the misfit of the linear sweep by its modes {percent(linear)}"
+    elif result.verdict == "unexplained" and result.remaining.get("noise_unsure"):
+        # slow noise is not told from a misfit
+        noise = (
+            f"of which {percent(result.noise_floor)} changes from sample to sample, as noise does"
+        )
     if not result.remaining.get("noise_known", True):
         noise = "of which nobody knows how much is noise"
     sentences = [sentence([*parts, f"on the fitted runs {told}, {noise}"])]
