@@ -34,11 +34,17 @@ _UNPROMISED = [jax.export.DisabledSafetyCheck.custom_call("lapack_dormqr_ffi")]
 
 _ALL: weakref.WeakSet = weakref.WeakSet()
 
+# bytes as exported; those of a loop with all candidates are larger, and from there on the newer
+# emitters compile them sooner
+_LARGE = 200_000
+
 _made_so_far = itertools.count(1)
 _LOOK_EVERY = 50  # programs: to count what is mapped takes some 10 ms
 
 
-def compiled(function: Callable[P, R], made_from: Any = None) -> "Compiled[P, R]":
+def compiled(
+    function: Callable[P, R], made_from: Any = None, runs_long: bool = False
+) -> "Compiled[P, R]":
     """Compile a function as `equinox.filter_jit` does, and keep its program for the next start.
 
     Arrays are traced, everything else is part of the program. Inside of a transformation, without a
@@ -52,8 +58,11 @@ def compiled(function: Callable[P, R], made_from: Any = None) -> "Compiled[P, R]
     made_from
         What tells a function made inside of another from others made there, in place of everything
         that it encloses.
+    runs_long
+        Whether to let the compiler take its time: a program that a fit calls for many seconds on
+        large matrices is worth it.
     """
-    return Compiled(function, made_from)
+    return Compiled(function, made_from, runs_long)
 
 
 def forget_programs() -> None:
@@ -66,10 +75,11 @@ def forget_programs() -> None:
 class Compiled(Generic[P, R]):
     """A function with its programs, one for each kind of arguments. See `compiled`."""
 
-    def __init__(self, function: Callable[P, R], made_from: Any = None):
+    def __init__(self, function: Callable[P, R], made_from: Any = None, runs_long: bool = False):
         functools.update_wrapper(self, function)
         self._function: Any = function
         self._made_from = made_from
+        self._runs_long = runs_long
         self._traced: Any = eqx.filter_jit(function)
         self._programs: dict[Any, Callable[[Any, Any, Sequence[Any]], R]] = {}
         self._lock = threading.RLock()
@@ -108,9 +118,15 @@ class Compiled(Generic[P, R]):
 
     def _made(self, args, kwargs, arrays, folder):
         """Return the program for such arguments: found, or exported and kept, or traced."""
+        options = None if self._runs_long else _compiled_soon()
+        # its signature does not name what it hands on to jax.jit
+        alone = eqx.filter_jit(self._function, compiler_options=options)  # pyright: ignore
 
         def traced(args, kwargs, arrays):
-            return self._traced(*args, **kwargs)
+            # a program apart, also where another function is being traced: JAX takes no options for
+            # one inside of another
+            with jax.ensure_compile_time_eval():
+                return alone(*args, **kwargs)
 
         if next(_made_so_far) % _LOOK_EVERY == 0 and is_crowded():
             _LOGGER.debug("programs are dropped to make room for others")
@@ -124,6 +140,7 @@ class Compiled(Generic[P, R]):
                 kept = self._export(args, kwargs, arrays)
                 save_program(file, *kept)
             nesting, data = kept
+            options = options if len(data) < _LARGE else None
             exported = jax.export.deserialize(bytearray(data))
         except (NotTold, NotImplementedError, ValueError, TypeError) as reason:
             _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)
@@ -135,10 +152,11 @@ class Compiled(Generic[P, R]):
         run.__name__ = self._function.__name__  # by which JAX files it
         # what an exported program returns is bound to its device, and JAX compiles once more for
         # bound arguments than for others, unless it is told beforehand where all of them are
-        call = jax.jit(run, in_shardings=_where())
+        call = jax.jit(run, in_shardings=_where(), compiler_options=options)
 
         def found(args, kwargs, arrays):
-            return put_together(nesting, iter(call(*arrays)))
+            with jax.ensure_compile_time_eval():  # as above
+                return put_together(nesting, iter(call(*arrays)))
 
         return found
 
@@ -168,6 +186,22 @@ class Compiled(Generic[P, R]):
         shapes = [jax.ShapeDtypeStruct(a.shape, a.dtype, weak_type=_weak(a)) for a in arrays]
         exported = jax.export.export(jax.jit(flat), disabled_checks=_UNPROMISED)(*shapes)
         return nesting[0], bytes(exported.serialize())
+
+
+@functools.cache
+def _compiled_soon() -> dict[str, bool] | None:
+    """Return options that make XLA compile sooner, or None where its version knows none of them.
+
+    Most programs are small and run for a second or less, and XLA's newer emitters take half as
+    long again to compile them as its older ones. What those make is as fast, but for large
+    matrices.
+    """
+    options = {"xla_cpu_use_fusion_emitters": False}
+    try:
+        jax.jit(jnp.negative, compiler_options=options).lower(0.0).compile()
+    except jax.errors.JaxRuntimeError:
+        return None
+    return options
 
 
 def _where() -> jax.sharding.Sharding:

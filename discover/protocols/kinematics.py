@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
+from discover.words import listed
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 
@@ -167,5 +168,4 @@ def stack_kinematics(each: Sequence[Kinematics | None]) -> Kinematics | None:
 def in_words(quantities: Iterable[str]) -> str:
     """Return in words what is recorded, of several quantities."""
     found = set(quantities)
-    names = [words for quantity, words in _IN_WORDS.items() if quantity in found]
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return listed([words for quantity, words in _IN_WORDS.items() if quantity in found])

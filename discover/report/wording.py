@@ -48,11 +48,6 @@ def sentence(parts: Iterable[str]) -> str:
     return text[:1].upper() + text[1:] + "."
 
 
-def listed(parts: Sequence[str]) -> str:
-    """Return what is listed in a sentence: 'one', 'one and another', 'one, another and a third'."""
-    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
-
-
 def known(value: float | None) -> bool:
     """Return whether there is a number: JSON keeps what is not finite as None."""
     return value is not None and math.isfinite(value)

@@ -238,6 +238,31 @@ def solve_batch(
     return jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
 
 
+def _change_in_any_flow(t, stress, args):
+    law, velocity_gradient = args
+    return law.stress_rate(stress, velocity_gradient(t))
+
+
+@compiled
+def _solve_in_any_flow(law, velocity_gradient, times, rtol, atol):
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(_change_in_any_flow),
+        diffrax.Tsit5(),
+        0.0,
+        times[-1],
+        None,
+        jnp.zeros((3, 3)),
+        args=(law, velocity_gradient),
+        saveat=diffrax.SaveAt(ts=times),
+        stepsize_controller=diffrax.ClipStepSizeController(
+            diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times
+        ),
+        max_steps=MAX_STEPS,
+        throw=False,
+    )
+    return solution.ys, solution.result == diffrax.RESULTS.successful
+
+
 def simulate_homogeneous_flow(
     law: AbstractConstitutiveLaw,
     velocity_gradient,
@@ -252,7 +277,8 @@ def simulate_homogeneous_flow(
     law
         A dimensionless law.
     velocity_gradient
-        Function of time that returns L, shape (3, 3).
+        Function of time that returns L, shape (3, 3). Flows that differ in the arrays of a
+        `jax.tree_util.Partial` alone share a program.
     times
         Dimensionless sampling times, shape (n,), increasing, from 0 on.
     rtol, atol
@@ -263,23 +289,11 @@ def simulate_homogeneous_flow(
     SimulationError
         If the stress runs away, as it does in UCM beyond a critical extension rate.
     """
-    sampling = jnp.asarray(times, dtype=float)
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(lambda t, stress, args: law.stress_rate(stress, velocity_gradient(t))),
-        diffrax.Tsit5(),
-        0.0,
-        sampling[-1],
-        None,
-        jnp.zeros((3, 3)),
-        saveat=diffrax.SaveAt(ts=sampling),
-        stepsize_controller=diffrax.ClipStepSizeController(
-            diffrax.PIDController(rtol=rtol, atol=atol), step_ts=sampling
-        ),
-        max_steps=MAX_STEPS,
-        throw=False,
+    found, successful = _solve_in_any_flow(
+        law, velocity_gradient, jnp.asarray(times, dtype=float), rtol, atol
     )
-    stress = np.asarray(solution.ys)
-    if solution.result != diffrax.RESULTS.successful or not np.all(np.isfinite(stress)):
+    stress = np.asarray(found)
+    if not successful or not np.all(np.isfinite(stress)):
         raise SimulationError(
             f"The law could not be integrated to t = {float(times[-1]):g}: its stress runs away. "
             "Check its parameters and the rate of deformation."

@@ -9,6 +9,7 @@ from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.statements import WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.words import percent_of
 
 DENSE = "tensor_dense"
 
@@ -54,20 +55,20 @@ def _held(
             return _opened(statement, f"in {flow.title} the dense library has no band")
         if not width < WIDEST:
             text = (
-                f"in {flow.title} the dense library leaves it open by ± {_percent(width)} of {of}"
+                f"in {flow.title} the dense library leaves it open by ± {percent_of(width)} of {of}"
             )
             return _opened(statement, text)
         off = _outside(dense, outcomes.get("tensor_sindy"), flow, quantity)
         if off > SEPARATED:
             text = (
                 f"in {flow.title} the sparse law's {quantity} lies outside the dense library's "
-                f"band, by {_percent(off)} of {of}"
+                f"band, by {percent_of(off)} of {of}"
             )
             return _opened(statement, text)
         widest = max(widest, width)
     told = (
         f"The dense library, which does not take it that the law is sparse, leaves ± "
-        f"{_percent(widest)} of {of} at the widest."
+        f"{percent_of(widest)} of {of} at the widest."
     )
     return replace(statement, text=f"{statement.text} {told}") if flows else statement
 
@@ -89,7 +90,3 @@ def _outside(
 def _opened(statement: Statement, reason: str) -> Statement:
     text = f"{reason[:1].upper()}{reason[1:]}. {statement.text}"
     return replace(statement, determined="no", text=text)
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"

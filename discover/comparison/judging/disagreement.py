@@ -15,6 +15,7 @@ from discover.comparison.judging.statements import Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import QUANTITIES, PredictionBand
+from discover.words import percent_of
 
 _SHOWN = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
@@ -78,7 +79,7 @@ def contested(
     return {
         quantity: (
             f"The two learners, trained on the same σ12, disagree on {_SHOWN[quantity]} beyond "
-            f"their bands, by {_percent(gap.size)} {_of(quantity)} in {gap.flow.title}: at least "
+            f"their bands, by {percent_of(gap.size)} {_of(quantity)} in {gap.flow.title}: at least "
             "one of them is wrong there, and these data do not say which."
         )
         for quantity, gap in found.items()
@@ -121,7 +122,7 @@ def _members(network: LearnerOutcome | None, flows: Sequence[Flow]) -> list[str]
         if flow is not None and width > SEPARATED:
             said.append(
                 f"Networks trained on the same σ12 disagree on {_SHOWN[quantity]} by "
-                f"±{_percent(width)} {_of(quantity)} in {flow.title}."
+                f"±{percent_of(width)} {_of(quantity)} in {flow.title}."
             )
     return said
 
@@ -150,7 +151,3 @@ def _alone(outcome: LearnerOutcome, flow: Flow) -> Limits | None:
 
 def _of(quantity: str) -> str:
     return "of N1" if quantity == "N2" else "of its size"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"

@@ -1,6 +1,7 @@
 """Levenberg–Marquardt on trajectories and prior together, one step at a time."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -108,7 +109,7 @@ def linearise(
     return _with_prior(weights, objective, states, jacobian)
 
 
-@compiled
+@partial(compiled, runs_long=True)
 def _with_prior(weights, objective, states, jacobian):
     scale = data_scale(objective.problem)
     misses = scale * objective.problem.misses(states)

@@ -57,7 +57,7 @@ def _joined(first, last, common: int):
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b[common:]]), first, last)
 
 
-@compiled
+@partial(compiled, runs_long=True)
 def states_and_jacobian(
     weights: Float[Array, " p"],
     rebuild: Rebuild,

@@ -160,6 +160,14 @@ def _lay_out(problem: TrajectoryProblem, support, begin, scale, slots: int, keep
     return _Layout(*(jnp.asarray(a) for a in arrays)), jnp.asarray(start)
 
 
+def sum_of_squares(apart: Float[np.ndarray, " rows"]) -> float:
+    """Return the sum of squares of relative misfits, of a law that ran away as of one at the limit.
+
+    A law may end finite and yet too large to be squared.
+    """
+    return float(np.sum(np.clip(apart, -_RUNAWAY, _RUNAWAY) ** 2))
+
+
 def refit(
     problem: TrajectoryProblem,
     supports: Sequence[tuple[int, ...]],
@@ -202,9 +210,7 @@ def refit(
         parameters, predicted = _descend(problem, layout, start, jnp.asarray(tolerance))
         parameters, predicted = np.asarray(parameters), np.asarray(predicted)
         rows = np.repeat(keep.reshape(-1), problem.target.shape[2])
-        # a trial law may end finite and yet too large to be squared
-        apart = np.clip((predicted - target)[rows], -_RUNAWAY, _RUNAWAY)
-        kept = np.sum(apart**2)
+        kept = sum_of_squares((predicted - target)[rows])
         share = problem.n_observations / max(np.sum(observed & rows), 1)
         return Fit(
             tuple(int(i) for i in support),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.learners.tensor_sindy.refit import SCREENING, Fit, refit
+from discover.learners.tensor_sindy.refit import SCREENING, Fit, refit, sum_of_squares
 from discover.learners.trajectories.problem import TrajectoryProblem
 
 
@@ -55,7 +55,7 @@ def held_out_misfits(
     by_run = np.empty((len(path), len(folds)))
 
     def misfit(fit: Fit, rows: np.ndarray) -> float:
-        squares = np.sum((fit.predicted[rows] - target[rows]) ** 2)
+        squares = sum_of_squares(fit.predicted[rows] - target[rows])
         # weights carry 1/√(all observations); here the mean is over the rows asked for
         return float(np.sqrt(squares * problem.n_observations / max(np.sum(rows), 1)))
 

@@ -15,7 +15,6 @@ from discover.report.wording import (
     estimate,
     interval,
     learner_as_subject,
-    listed,
     percent,
     readable,
     sentence,
@@ -25,6 +24,7 @@ from discover.report.wording import (
 )
 from discover.statistics import LackOfFit
 from discover.statistics.residual import STRUCTURE
+from discover.words import listed
 
 CORRELATED = 0.3
 """A correlation of neighbours that is worth its number in a sentence."""

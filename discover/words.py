@@ -1,0 +1,13 @@
+"""Lists and shares as sentences have them, for all rooms."""
+
+from collections.abc import Sequence
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Return what is listed in a sentence: 'one', 'one and another', 'one, another and a third'."""
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
+
+
+def percent_of(share: float) -> str:
+    """Return a share as a percentage with two digits."""
+    return f"{100.0 * share:.2g} %"

@@ -1,0 +1,44 @@
+"""Most programs are compiled in haste, and those that run long are not."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.programs import compiled
+from discover.programs.kept import _compiled_soon
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What the compiler was asked for, program by program."""
+    seen, jit = [], jax.jit
+
+    def listening(function, **kwargs):
+        seen.append(kwargs.get("compiler_options"))
+        return jit(function, **kwargs)
+
+    monkeypatch.setattr(jax, "jit", listening)
+    return seen
+
+
+@pytest.mark.parametrize("runs_long", [False, True])
+def test_only_what_does_not_run_long_is_compiled_in_haste(asked, runs_long):
+    double = compiled(lambda x: 2.0 * x, runs_long=runs_long)
+    assert double(jnp.ones(3)).tolist() == [2.0, 2.0, 2.0]
+    assert (_compiled_soon() in asked) is not runs_long
+    assert _compiled_soon() is not None  # with the version of XLA that these tests run on
+
+
+def test_a_program_may_be_called_with_numbers_while_another_is_traced():
+    double = compiled(lambda x: 2.0 * x)
+    both = jax.jit(lambda x: x + double(jnp.ones(3)) + double(x))
+    np.testing.assert_array_equal(both(jnp.arange(3.0)), [2.0, 5.0, 8.0])
+
+
+def test_an_option_that_the_compiler_does_not_know_is_left_out(monkeypatch):
+    def refuse(function, **kwargs):
+        raise jax.errors.JaxRuntimeError("No such compile option")
+
+    monkeypatch.setattr(jax, "jit", refuse)
+    assert _compiled_soon.__wrapped__() is None
