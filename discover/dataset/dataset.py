@@ -151,7 +151,7 @@ class Dataset(NotebookView):
         said: dict[str, list[str]] = {}
         for run in self.runs:
             if "thinned" in run.metadata:
-                said.setdefault(run.metadata["thinned"], []).append(run.name)
+                said.setdefault(str(run.metadata["thinned"]), []).append(run.name)
         if self.linear_sweep is not None and self.linear_sweep.thinned:
             said.setdefault(self.linear_sweep.thinned, []).append("the linear sweep")
         return " ".join(f"{', '.join(names)}: {text}." for text, names in said.items())
