@@ -9,5 +9,5 @@ def listed(parts: Sequence[str]) -> str:
 
 
 def percent_of(share: float) -> str:
-    """Return a share as a percentage with two digits."""
-    return f"{100.0 * share:.2g} %"
+    """Return a share as a percentage, with two digits below a hundred and whole from there."""
+    return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"

@@ -12,6 +12,7 @@ from discover.progress import Progress, by_lines
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
+from discover.words import percent_of
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -180,7 +181,7 @@ def run_close_loop(
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
     modes = f"{len(model.modulus)} relaxation mode{'s' if len(model.modulus) > 1 else ''}"
     if model.spectrum is not None:
-        modes += f" from the linear sweep (error {100 * model.spectrum.relative_error:.2g} %)"
+        modes += f" from the linear sweep (error {percent_of(model.spectrum.relative_error)})"
     summary = (
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"

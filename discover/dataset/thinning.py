@@ -9,6 +9,7 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
+from discover.words import percent_of
 
 MOST_SAMPLES = 20_000
 """A record with more samples is thinned: they cost time and say nothing new about a law."""
@@ -67,7 +68,7 @@ def thin(
     )
     if lost > _FOLLOWED:
         note += (
-            f"; the strain between them is then off by {100 * lost:.2g} % of its range, so the "
+            f"; the strain between them is then off by {percent_of(lost)} of its range, so the "
             "rate varies faster than the samples kept: give a shorter record"
         )
     return keep, note

@@ -15,6 +15,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.notebook_view import NotebookView
+from discover.words import percent_of
 
 if TYPE_CHECKING:
     import sympy
@@ -65,7 +66,7 @@ class Tested:
         lines = [f"Learned in {self.learned_in.text}."]
         if self.judged_in is None:
             return [*lines, "Tested in no other flow."]
-        errors = ", ".join(f"{name} {100 * e:.2g} %" for name, e in self.worst_errors.items())
+        errors = ", ".join(f"{name} {percent_of(e)}" for name, e in self.worst_errors.items())
         text = f"Tested in {self.judged_in.text}"
         return [*lines, f"{text}; largest error: {errors}." if errors else f"{text}."]
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import MODULI
+from discover.words import percent_of
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
@@ -59,7 +60,7 @@ def percent(value: float | None) -> str:
         return "–"
     if value != 0 and abs(value) < 1e-5:
         return "< 0.001 %"
-    return f"{100.0 * value:.2g} %" if abs(value) < 0.995 else f"{100.0 * value:.0f} %"
+    return percent_of(value)
 
 
 def percent_range(values: Sequence[float | None] | None) -> str:

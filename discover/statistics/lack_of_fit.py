@@ -18,6 +18,7 @@ from discover.statistics.residual import (
 )
 from discover.statistics.same_place import repeated
 from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
+from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
 
@@ -141,26 +142,26 @@ def what_is_left(
     verdict: FitVerdict = "explained" if explained else "unexplained"
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
-        reason = f"what is left ({100 * misfit:.2g} % of the records) is noise, and nearly all"
+        reason = f"what is left ({percent_of(misfit)} of the records) is noise, and nearly all"
     elif explained and probability is None:
         reason = (
-            f"what is left ({100 * misfit:.2g} %) is no larger than noise; there are too few "
+            f"what is left ({percent_of(misfit)}) is no larger than noise; there are too few "
             "samples to look for a pattern in it"
         )
     elif explained and probability is not None and probability > SIGNIFICANCE:
-        reason = f"what is left ({100 * misfit:.2g} %) is noise"
+        reason = f"what is left ({percent_of(misfit)}) is noise"
     elif explained:
         given = "the noise given" if expectation.noise is not None else "the linear data's error"
-        reason = f"what is left ({100 * misfit:.2g} %) has a pattern no larger than {given}"
+        reason = f"what is left ({percent_of(misfit)}) has a pattern no larger than {given}"
     elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
         reason = (
-            f"what is left ({100 * misfit:.2g} %) is more than changes from sample to sample "
-            f"({100 * expected:.2g} %), but so few samples hardly tell what is noise"
+            f"what is left ({percent_of(misfit)}) is more than changes from sample to sample "
+            f"({percent_of(expected)}), but so few samples hardly tell what is noise"
         )
     elif misfit > STRUCTURE * expected:
-        reason = f"what is left ({100 * misfit:.2g} %) is more than noise ({100 * expected:.2g} %)"
+        reason = f"what is left ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
     else:
-        reason = f"what is left ({100 * misfit:.2g} %) has {pattern}"
+        reason = f"what is left ({percent_of(misfit)}) has {pattern}"
     count = sum(len(where) for where in outliers)
     if count:
         reason += f"; outliers that do not count: {count}"

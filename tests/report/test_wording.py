@@ -12,12 +12,14 @@ from discover.report.wording import (
     readable,
     significant,
 )
+from discover.words import percent_of
 
 
 def test_numbers_keep_what_tells_them_apart():
     assert interval((0.20001, 0.20002)) == "0.20001 to 0.20002"
     assert percent(None) == significant(None) == interval(None) == "–"
     assert percent(0.1234) == "12 %"
+    assert percent(2.4) == percent_of(2.4) == "240 %"
     assert significant(-0.5) == "−0.5"
     assert significant(1411.0, 3) == "1410"
     assert significant(1.606e-5) == "1.606 × 10⁻⁵"

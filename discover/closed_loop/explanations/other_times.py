@@ -20,6 +20,7 @@ from discover.closed_loop.search.augment import taken_out
 from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE, criterion
 from discover.forward.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise
+from discover.words import percent_of
 
 FACTOR = "relaxation_time_factor"
 """Among the aliases of an effect, that a factor on all declared times does instead."""
@@ -55,7 +56,7 @@ class OtherTimes:
         beside = f" and {' and '.join(self.effects)}" if self.effects else ""
         return (
             f"With relaxation times that are all {self.factor:.3g} times the declared ones{beside} "
-            f"the fitted runs are missed by {100 * self.error:.2g} %. A sweep at another "
+            f"the fitted runs are missed by {percent_of(self.error)}. A sweep at another "
             "temperature or of another sample does that: look at it, or fit the times along "
             '([model] relaxation_time_s = "fit").'
         )

@@ -20,6 +20,7 @@ from discover.statistics.residual import (
 )
 from discover.statistics.unseen import CARRIED, refutes
 from discover.statistics.whiteness import SIGNIFICANCE
+from discover.words import percent_of
 
 Silence = Literal["records", "fluid"]
 """What holds no signal: the records themselves, or what a fit leaves to the fluid of them."""
@@ -133,13 +134,13 @@ def judge(
     causes = "noise and the error of the linear data explain" if linear else "noise explains"
     short = tuple(r.name for r in records if given and len(r.time) < FEWEST_FAST)
     which = f"The fitted runs of {FEWEST_FAST} samples or more" if short else "The fitted runs"
-    missed = f"{which} are missed by {_percent(error)}"
+    missed = f"{which} are missed by {percent_of(error)}"
     like_noise = ""
     if explained and not carries_over:
         left = left.refuted(left.reason)
         if STRUCTURE * left.noise < expected and not linear:
             like_noise = (
-                f", which would pass for correlated noise ({_percent(left.noise)} changes from "
+                f", which would pass for correlated noise ({percent_of(left.noise)} changes from "
                 "sample to sample)"
             )
     if silence == "records":
@@ -162,53 +163,53 @@ def judge(
     elif not structured and error > STRUCTURE * expected:
         text = (
             f"{missed}, no more than finite steps, rates known only at the samples and rounded "
-            f"numbers leave ({_percent(resolution)}). These data show no smaller effect."
+            f"numbers leave ({percent_of(resolution)}). These data show no smaller effect."
         )
     elif not structured:
-        text = f"{missed}, as {causes} ({_percent(expected)})."
+        text = f"{missed}, as {causes} ({percent_of(expected)})."
         if left.probability is None:
             text += " There are too few samples to look for a pattern in what is left."
         elif left.probability <= SIGNIFICANCE and plain:
             text += f" It has {left.pattern}, but one no larger than that."
     elif mistaken:
         text = (
-            f"{missed}, as {causes} ({_percent(expected)}), but {' and '.join(not_from_rest)} "
+            f"{missed}, as {causes} ({percent_of(expected)}), but {' and '.join(not_from_rest)} "
             "cannot have started from rest, as is assumed: what came before looks like an effect. "
             "Say in runs.csv what it was (start, step_strain, rate_before), or give the record "
             "from rest on."
         )
     elif pattern:
         text = (
-            f"{missed}{like_noise or f', as {causes} ({_percent(expected)})'}, but the runs held "
-            f"out by {_percent(missed_held_out)}, and what is left of them has a pattern that "
+            f"{missed}{like_noise or f', as {causes} ({percent_of(expected)})'}, but the runs held "
+            f"out by {percent_of(missed_held_out)}, and what is left of them has a pattern that "
             "neither noise nor an uncertain constant leaves. Some effect is still missing, or has "
             "another form."
         )
     elif explained:
         text = (
-            f"{missed}{like_noise or f' ({_percent(expected)} of it is what {causes})'}, but the "
-            f"runs held out by {_percent(missed_held_out)}: what was found does not carry over to "
-            f"them, most of all not to {worst.name}. Some effect is still missing, or has another "
-            "form."
+            f"{missed}{like_noise or f' ({percent_of(expected)} of it is what {causes})'}, but the "
+            f"runs held out by {percent_of(missed_held_out)}: what was found does not carry over "
+            f"to them, most of all not to {worst.name}. Some effect is still missing, or has "
+            "another form."
         )
     elif silence == "fluid":
         text = (
-            f"{missed} ({_percent(expected)} of it is what {causes}), and as well without the "
+            f"{missed} ({percent_of(expected)} of it is what {causes}), and as well without the "
             "fluid: what was found explains nothing, and something else is in the records."
         )
     elif error > STRUCTURE * expected and left.probability is None and expectation.noise is None:
         text = (
-            f"{missed}, more than changes from sample to sample ({_percent(expected)}), but so few "
-            "samples hardly tell noise from a missing effect."
+            f"{missed}, more than changes from sample to sample ({percent_of(expected)}), but so "
+            "few samples hardly tell noise from a missing effect."
         )
     elif error > STRUCTURE * expected:
         text = (
-            f"{missed}, more than {causes} ({_percent(expected)}); the worst run is {worst.name}. "
-            "Some effect is still missing."
+            f"{missed}, more than {causes} ({percent_of(expected)}); the worst run is {worst.name}."
+            " Some effect is still missing."
         )
     else:
         text = (
-            f"{missed}, hardly more than {causes} ({_percent(expected)}), but what is left has "
+            f"{missed}, hardly more than {causes} ({percent_of(expected)}), but what is left has "
             f"{left.pattern}; the worst run is {worst.name}. Some effect is still missing."
         )
     if left.outliers:
@@ -240,7 +241,3 @@ def _error(records: Sequence[RunRecord]) -> float:
     """Return the mean error of the final model over the runs that judge; 0 of none."""
     told = [record for record in records if len(record.time) >= FEWEST_FAST]
     return float(np.mean([record.errors[-1] for record in told or records] or [0.0]))
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"

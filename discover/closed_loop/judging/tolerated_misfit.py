@@ -18,6 +18,7 @@ from discover.statistics.residual import (
     tells_noise,
 )
 from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
+from discover.words import percent_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class ToleratedMisfit:
             return left
         if pattern <= STRUCTURE * self.expectation.linear_error:
             return left
-        reason = f"what is left ({100 * left.misfit:.2g} %) has {PATTERN}"
+        reason = f"what is left ({percent_of(left.misfit)}) has {PATTERN}"
         return replace(
             left, verdict="unexplained", probability=probability, reason=reason, pattern=PATTERN
         )

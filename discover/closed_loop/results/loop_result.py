@@ -44,6 +44,7 @@ from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
+from discover.words import percent_of
 
 
 @dataclass(frozen=True)
@@ -124,8 +125,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
     def __repr__(self) -> str:
         added = ", ".join(stage.effect for stage in self.stages) or "no effect"
         fit, held = self.error_after.fit, self.error_after.held_out
-        judged = "" if held is None else f", held out {100 * held:.2g} %"
-        return f"<LoopResult: {self.verdict}; {added}; error {100 * fit:.2g} %{judged}>"
+        judged = "" if held is None else f", held out {percent_of(held)}"
+        return f"<LoopResult: {self.verdict}; {added}; error {percent_of(fit)}{judged}>"
 
     @property
     def by_mode(self) -> dict[str, ConstantByMode]:

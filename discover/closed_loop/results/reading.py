@@ -10,6 +10,7 @@ from scipy.stats import permutation_test, rankdata
 
 from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.results.waves import Wave, oscillation, read_wave
+from discover.words import percent_of
 
 _BINS = 24
 _DECADES = 30.0
@@ -138,7 +139,7 @@ class Reading:
             return []
         return [
             f"Over the oscillating runs the residual is mostly {largest}: "
-            f"{100 * sizes[largest]:.2g} % of the fundamental of the stress."
+            f"{percent_of(sizes[largest])} of the fundamental of the stress."
         ]
 
     def to_json(self) -> dict[str, Any]:

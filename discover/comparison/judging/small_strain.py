@@ -10,6 +10,7 @@ from discover.comparison.judging.declared_constants import LINEAR_TERMS, OtherCo
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.soundness.physics import SMALL_STRAIN
+from discover.words import percent_of
 
 
 def with_small_strain_told(
@@ -59,12 +60,12 @@ def _told(
     limit = noise if known_to is None else known_to
     if value <= limit:
         why = (
-            f"that is less than the noise of the records ({100 * noise:.2g} %), and nothing says "
+            f"that is less than the noise of the records ({percent_of(noise)}), and nothing says "
             "how much better they determine the law's linear part"
             if known_to is None
             else "the intervals of the law's linear terms leave as much"
         )
-        text = f"Not tested to better than {100 * limit:.2g} % by these data: {why}."
+        text = f"Not tested to better than {percent_of(limit)} by these data: {why}."
     elif others and abs(value - _of(others)) <= limit:
         names = " and ".join(other.name for other in others)
         text = f"That is another {names} than declared, and no fault of the law."

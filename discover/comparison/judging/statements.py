@@ -16,6 +16,7 @@ from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.identify import Structure
 from discover.identify.exact.relations import spell_briefly
 from discover.identify.rivals.bands import PredictionBand
+from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
 
@@ -249,11 +250,11 @@ def _of_band(quantity: str, check: BandCheck) -> str:
     if check.missed:
         return (
             f"But in {check.missed} the {quantity} known lies outside the band, by "
-            f"{100 * check.off:.2g} %, so the band is not to be believed. {beyond}"
+            f"{percent_of(check.off)}, so the band is not to be believed. {beyond}"
         )
     if not check.holds:
         return f"But the parameters' intervals leave a band that is wider than {quantity} itself."
-    width = f"± {100 * max(check.half_width, 1e-5):.2g} %"
+    width = f"± {percent_of(max(check.half_width, 1e-5))}"
     of = " of N1" if quantity == "N2" else ""
     return f"Then its 95 % band is {width}{of} at the widest. {beyond}"
 
@@ -287,7 +288,7 @@ def _without_structure(
                 " Checked by simulation: "
                 + spell_briefly(example.terms)
                 + f" gives the same σ12 but an N2 that differs by "
-                f"{100.0 * (example.errors_to_chosen['N2'] or 0.0):.2g} % of N1."
+                f"{percent_of(example.errors_to_chosen['N2'] or 0.0)} of N1."
             )
         found.append(Statement("N2", "no", text))
     if "N1" not in seen:

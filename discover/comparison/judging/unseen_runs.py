@@ -12,6 +12,7 @@ from discover.statistics import LackOfFit, noise_model
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import STRUCTURE, Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes
+from discover.words import percent_of
 
 _HALF_BAND = 1.96  # standard deviations
 
@@ -105,13 +106,13 @@ def _refuted(
     told = all(len(column) for column in columns)  # how uncertain the constants are
     if told and refutes(against, fitted, known, expectation):
         return (
-            f"runs held out are missed by {100 * missed:.2g} %, more than noise and uncertain "
+            f"runs held out are missed by {percent_of(missed)}, more than noise and uncertain "
             "constants leave"
         )
     if missed > CARRIED * max(left.misfit, left.expected, ARITHMETIC):
         return (
-            f"runs held out are missed by {100 * missed:.2g} %, those of training by "
-            f"{100 * left.misfit:.2g} %"
+            f"runs held out are missed by {percent_of(missed)}, those of training by "
+            f"{percent_of(left.misfit)}"
         )
     return ""
 

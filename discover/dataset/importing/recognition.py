@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, purer
 from discover.dataset.importing.readings import Readings
+from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02
 _SAME_AMPLITUDE = 1.2
@@ -139,14 +140,14 @@ def _one_oscillatory(readings: Readings, rows: Rows) -> Recognised:
         if amplitude is not None and several:
             why += (
                 f"; the strain is not one but {100 * amplitude.min():.2g} to "
-                f"{100 * amplitude.max():.2g} %, taken as small"
+                f"{percent_of(amplitude.max())}, taken as small"
             )
         elif varied is None:
             why += "; nothing says how large the strain was, it is taken as small"
         return Recognised("frequency_sweep", rows, why)
     at_one = f"one frequency, {omega[0]:.3g} rad/s"
     if amplitude is not None and varied is not None and varied > _SAME_AMPLITUDE:
-        span = f"{100 * amplitude.min():.2g} to {100 * amplitude.max():.2g} %"
+        span = f"{100 * amplitude.min():.2g} to {percent_of(amplitude.max())}"
         return Recognised("amplitude_sweep", rows, f"{at_one}, and strains from {span}")
     temperature = readings.get("temperature")
     if temperature is not None and np.ptp(temperature[rows]) > _SAME_TEMPERATURE:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.identify.exact.relations import spell_briefly
+from discover.words import percent_of
 
 EXACT = 1e-13
 """Singular value, relative to the largest of unit columns, that counts as zero.
@@ -59,7 +60,7 @@ class Direction:
             return f"The data see nothing of {what}; {touched}."
         return (
             f"{what} is known to 0.1 only with noise below "
-            f"{100.0 * self.noise_for_tenth:.2g} %; {touched}."
+            f"{percent_of(self.noise_for_tenth)}; {touched}."
         )
 
     def to_json(self) -> dict[str, Any]:

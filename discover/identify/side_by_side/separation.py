@@ -11,6 +11,7 @@ from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.simulate.grid import make_grids
+from discover.words import percent_of
 from tensor_library.library import TermLibrary
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)
@@ -47,7 +48,7 @@ class Separation:
         size = (
             "one grows without bound"
             if not np.isfinite(self.difference)
-            else f"{100.0 * self.difference:.2g} %"
+            else percent_of(self.difference)
         )
         return f"{self.quantity} in {self.flow} ({size})"
 

@@ -30,6 +30,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of
+from discover.words import percent_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -372,6 +373,6 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
     if feeble:
         limit = min(d.noise_for_tenth for d in feeble)
         text += (
-            f"; a library of which every term were free would need noise below {100 * limit:.2g} %"
+            f"; a library of which every term were free would need noise below {percent_of(limit)}"
         )
     return QuantityVerdict(quantity, "determined", text + ".")

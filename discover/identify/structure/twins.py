@@ -30,6 +30,7 @@ from discover.identify.side_by_side.separation import Separation, separations
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.notebook_view import NotebookView
+from discover.words import percent_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -88,9 +89,9 @@ class Twin(NotebookView):
         )
         apart = []
         if not self.keeps_N1:
-            apart.append(f"N1 by {100.0 * self.difference.N1:.2g} %")
+            apart.append(f"N1 by {percent_of(self.difference.N1)}")
         if self.difference.N2 > SAME:
-            apart.append(f"N2 by {100.0 * self.difference.N2:.2g} % of N1")
+            apart.append(f"N2 by {percent_of(self.difference.N2)} of N1")
         text += f"; {' and '.join(apart)} apart" if apart else "; N2 is the same too"
         if self.separated_by:
             text += "; " + " or ".join(s.text for s in self.separated_by) + " would tell"
