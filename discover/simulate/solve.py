@@ -182,44 +182,40 @@ def solve_on_grid(
     -------
     σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
-    return _solve_on_grid(fluid, protocol, grid, _observe, adjoint)
-
-
-def solve_states_on_grid(
-    fluid: Fluid,
-    protocol: FlowProtocol,
-    grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
-) -> Float[Array, "n k 4"]:
-    """Return the dimensionless stress of every mode at the samples of one grid.
-
-    As `solve_on_grid`, but before the modes are added.
-    """
-    return _solve_on_grid(fluid, protocol, grid, None, adjoint)
-
-
-def _solve_on_grid(fluid, protocol, grid, observe, adjoint):
-    solver = ExponentialRungeKutta4(_decay(fluid))
-    args = (fluid, protocol)
     if adjoint is None:
-        values = fixed_steps(_vector_field, solver, grid.times, fluid.rest(), args, observe)
-        return values[grid.sample_index]
-    saved = diffrax.SaveAt(t0=True, steps=True)
+        return _in_fixed_steps(fluid, protocol, grid, _observe)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
-        solver,
+        ExponentialRungeKutta4(_decay(fluid)),
         grid.times[0],
         grid.times[-1],
         None,
         fluid.rest(),
-        args=args,
-        saveat=saved if observe is None else diffrax.SaveAt(t0=True, steps=True, fn=observe),
+        args=(fluid, protocol),
+        saveat=diffrax.SaveAt(t0=True, steps=True, fn=_observe),
         stepsize_controller=diffrax.StepTo(grid.times),
         adjoint=adjoint,
         max_steps=grid.times.shape[0] - 1,
         throw=False,
     )
     return jnp.asarray(solution.ys)[grid.sample_index]
+
+
+def solve_states_on_grid(
+    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
+) -> Float[Array, "n k 4"]:
+    """Return the dimensionless stress of every mode at the samples of one grid.
+
+    As `solve_on_grid` without an adjoint, but before the modes are added.
+    """
+    return _in_fixed_steps(fluid, protocol, grid, None)
+
+
+def _in_fixed_steps(fluid, protocol, grid, observe):
+    solver = ExponentialRungeKutta4(_decay(fluid))
+    args = (fluid, protocol)
+    values = fixed_steps(_vector_field, solver, grid.times, fluid.rest(), args, observe)
+    return values[grid.sample_index]
 
 
 @compiled
