@@ -135,6 +135,8 @@ def thin_run(run: Run, most: int) -> Run:
         return run
     keep = evenly_chosen(n, most)
     text = f"kept {int(keep.sum()):,} of {n:,} samples, evenly in their order"
+    if "thinned" in run.metadata:  # when it was read, which may warn of what was lost
+        text = f"{run.metadata['thinned']}; of these {text}"
     thinned = replace(run.window(keep), metadata={**run.metadata, "thinned": text})
     sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
     if run.protocol.control == "rate" and sampled:

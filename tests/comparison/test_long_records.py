@@ -1,5 +1,7 @@
 """Of a long record, learners are given as many samples as a study allows, and the page says so."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from discover.comparison import compare
 from discover.comparison.description import data_in_words
 from discover.comparison.fitting.prepared import thinned_to
 from discover.dataset import Dataset, Run
-from discover.dataset.thinning import evenly_chosen, followed_rate
+from discover.dataset.thinning import evenly_chosen, followed_rate, thin_run
 from discover.protocols import measured_rate
 from discover.study import parse_study
 from discover.study.data import StudyData
@@ -62,6 +64,15 @@ def test_a_thinned_record_is_said_and_follows_the_same_strain():
     whole = data.fit["0.csv"]
     kept = np.isin(whole.time, thinned.fit["0.csv"].time)
     np.testing.assert_array_equal(whole.recorded[kept], thinned.fit["0.csv"].recorded)
+
+
+def test_what_was_thinned_when_it_was_read_is_still_said():
+    run = replace(oscillations(600).fit["0.csv"], metadata={"thinned": "kept 600 of 9,000 samples"})
+    said = thin_run(thin_run(run, 300), 100).metadata["thinned"]
+    assert said == (
+        "kept 600 of 9,000 samples; of these kept 300 of 600 samples, evenly in their order; "
+        "of these kept 100 of 300 samples, evenly in their order"
+    )
 
 
 def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
