@@ -61,7 +61,7 @@ def main() -> None:
             )
             return jnp.mean((solution.ys[:, 0, 3] - target) ** 2)
 
-        return jnp.sum(jax.vmap(one)(problem.protocols, problem.grids, problem.target))
+        return jnp.sum(problem.flows.over(one, problem.target))
 
     def through(adjoint):
         gradient = eqx.filter_jit(jax.grad(lambda w, p: loss(w, p, adjoint)))

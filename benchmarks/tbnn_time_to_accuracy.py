@@ -81,7 +81,7 @@ def adaptive_gradient(problem, network):
             )
             return jnp.mean((solution.ys[:, 0, 3] - target) ** 2)
 
-        errors = jax.vmap(one)(problem.protocols, problem.grids, problem.target)
+        errors = problem.flows.over(one, problem.target)
         weights = jax.tree.leaves(eqx.filter(part, eqx.is_inexact_array))
         return jnp.sum(errors) + 0.01 * sum(jnp.sum(jnp.abs(w)) for w in weights)
 

@@ -101,6 +101,14 @@ def judge(index: int, kind: str, law: str, case: PlantedCase, result: LoopResult
         "first_name": {name: any(s.effect == name for s in result.stages) for name in planted},
         "false": [s.effect for s, names in zip(result.stages, said, strict=True)
                   if not names & planted],
+        # beside what was planted, or what the loop holds for the same
+        "probable_besides": {
+            name: probability
+            for name, probability in result.explanations.inclusion.items()
+            if probability >= 0.5 and not any(name in names and names & planted for names in said)
+            and name not in planted
+        },
+        "unexplained_probability": result.explanations.unexplained_probability,
         "parameters": parameters,
         "before": [result.error_before.fit, result.error_before.held_out],
         "after": [result.error_after.fit, result.error_after.held_out],
@@ -157,6 +165,7 @@ def summarise(rows: list[dict]) -> dict:
         "named_by_size_over_noise": by_size,
         "false_on_clean": share([bool(r["stages"]) for r in rows if r["kind"] == "clean"]),
         "false_besides_planted": share([bool(row["false"]) for row in flawed]),
+        "probable_besides_planted": share([bool(row["probable_besides"]) for row in flawed]),
         "unexplained_though_in_dictionary": share(
             [row["verdict"] == "unexplained" for row in flawed]
         ),

@@ -17,6 +17,8 @@ from discover.protocols.protocol import FlowProtocol, recording
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
 
+# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
+_LEAST_STEADY = 1e-4
 
 _NEEDED = ("time", "rate", "stress")
 _COLUMNS = (
@@ -198,6 +200,23 @@ class Run:
         if values is None:
             raise InputError(f"The run {self.name!r} has no {self.quantity}; it was not recorded.")
         return values
+
+    def sizes(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Return in units of what a misfit of each of these values is told, shape (n,).
+
+        The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion
+        to each value and of which each decade counts, the value itself.
+
+        Parameters
+        ----------
+        values
+            A quantity that the run records.
+        """
+        size = np.full(len(values), np.sqrt(np.mean(values**2)))
+        if self.protocol.control in ("steady", "oscillation"):
+            largest = float(np.max(np.abs(values), initial=0.0))
+            size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
+        return np.where(size > 0, size, 1.0)
 
     def observing(self, quantity: RecordedQuantity) -> "Run":
         """Return the same run with another quantity fitted or judged, under a name of its own.

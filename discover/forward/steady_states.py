@@ -6,9 +6,7 @@ from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-
-# Pseudo-time steps, from a fraction of the fastest time of the flow to where a step is Newton's
-_STEPS, _FIRST, _LAST = 60, 0.05, 1e8
+from discover.simulate.steady_states import STEPS, linearly_implicit_step, pseudo_time_step
 
 
 def steady_states(
@@ -42,8 +40,6 @@ def _approach(dynamics: Dynamics, rate, flow):
     stress, levels = dynamics.rest()
     intensity = 1.0 if flow is None else flow.intensity
     weissenberg = intensity * jnp.abs(rate) * modes.relaxation_time
-    first = _FIRST / (1.0 + weissenberg)
-    growth = (_LAST / first) ** (1.0 / (_STEPS - 1))
 
     def step(carry, number):
         stress, levels, felt = carry
@@ -52,13 +48,7 @@ def _approach(dynamics: Dynamics, rate, flow):
         def change(state):
             return dynamics.change(state, felt, slow, flow)
 
-        now, tangent = jax.linearize(change, stress)
-        # each mode changes by itself: as many directions as it has numbers give every tangent
-        unit = jnp.eye(len(stress))[:, :, None] * jnp.ones(stress.shape)
-        jacobian = jnp.moveaxis(jax.vmap(tangent)(unit), 2, 0)  # mode, direction, component
-        width = first * growth**number
-        matrix = jnp.eye(len(stress)) / width[:, None, None] - jnp.swapaxes(jacobian, 1, 2)
-        stress = stress + jnp.linalg.solve(matrix, now.T[:, :, None])[:, :, 0].T
+        stress = linearly_implicit_step(change, stress, pseudo_time_step(number, weissenberg))
         sheared, sheared_rate = dynamics.sheared(stress, felt, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         levels = tuple(
@@ -72,7 +62,7 @@ def _approach(dynamics: Dynamics, rate, flow):
         return (stress, levels, felt), None
 
     start = (stress, levels, jnp.asarray(rate, dtype=stress.dtype))
-    (stress, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(_STEPS, dtype=float))
+    (stress, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(STEPS, dtype=float))
     scale = dynamics.combined("modulus_factor", levels)
     return scale * dynamics.recorded(stress, flow), felt
 

@@ -6,16 +6,14 @@ from functools import partial
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol
-from discover.simulate.grid import IntegrationGrid
-from discover.simulate.solve import solve_on_grid
+from discover.simulate.flow_batch import FlowBatch
+from discover.simulate.solve import observed_on_grid
 from discover.statistics.weighted_quantiles import weighted_quantiles
 
 QUANTITIES = ("sigma12", "N1", "N2")
@@ -48,8 +46,7 @@ class WeightedLaws:
     def bands(
         self,
         modes: tuple[Float[Array, " k"], Float[Array, " k"], Float[Array, ""]],
-        protocols: FlowProtocol,
-        grids: IntegrationGrid,
+        flows: FlowBatch,
         samples: Sequence[int],
     ) -> list[Limits | None]:
         """Return the 95 % band of each flow.
@@ -58,8 +55,8 @@ class WeightedLaws:
         ----------
         modes
             Moduli in Pa, relaxation times in s, and the solvent's viscosity in Pa s.
-        protocols, grids
-            The flows, from `stack_protocols` and `make_grids`.
+        flows
+            From `lay_out`.
         samples
             Number of samples of each flow.
 
@@ -67,7 +64,7 @@ class WeightedLaws:
         -------
         None for a flow in which laws of more than half of the weight run away.
         """
-        predicted = np.asarray(_predict(self.laws, *modes, protocols, grids))
+        predicted = np.asarray(_predict(self.laws, *modes, flows))
         bands: list[Limits | None] = []
         for flow, n in enumerate(samples):
             values = predicted[:, flow, :n]
@@ -82,15 +79,12 @@ class WeightedLaws:
 
 @compiled
 def _predict(
-    laws, modulus, relaxation_time, solvent_viscosity, protocols, grids
+    laws, modulus, relaxation_time, solvent_viscosity, flows
 ) -> Float[Array, "laws flows n 3"]:
     arrays, rest = eqx.partition(laws, eqx.is_array)
 
     def of_law(law):
         fluid = Fluid(eqx.combine(law, rest), modulus, relaxation_time, solvent_viscosity)
-        stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
-        recorded = jax.vmap(lambda flow, s: flow.recorded_stress(s.T))(protocols, stress)
-        s11, s22, s33, _ = jnp.moveaxis(stress, -1, 0)
-        return jnp.stack([recorded, s11 - s22, s22 - s33], axis=-1)
+        return flows.over(partial(observed_on_grid, fluid))
 
     return jax.lax.map(of_law, arrays, batch_size=_LAWS_AT_ONCE)

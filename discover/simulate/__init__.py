@@ -1,6 +1,7 @@
 """From a fluid and a protocol to stresses."""
 
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.grid import IntegrationGrid, make_grid, make_grids
 from discover.simulate.solve import (
     ShearStress,
@@ -15,10 +16,12 @@ from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 
 __all__ = [
     "ExponentialRungeKutta4",
+    "FlowBatch",
     "IntegrationGrid",
     "ShearStress",
     "SimulationError",
     "SyntheticDataset",
+    "lay_out",
     "make_grid",
     "make_grids",
     "simulate",

@@ -96,6 +96,8 @@ def make_grid(
         If the run would need an absurd number of steps.
     """
     times = np.asarray(times, dtype=float)
+    if protocol.control == "steady":
+        return times, np.arange(len(times))  # time counts the samples, and nothing is stepped
     begins, end = float(protocol.begins), float(times[-1])
     knots = np.asarray(protocol.table_times)
     rates = np.asarray(protocol.table_rates)

@@ -12,10 +12,12 @@ from jaxtyping import Array, Float
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol
+from discover.protocols.protocol import FlowProtocol, shear_rates
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.grid import IntegrationGrid
+from discover.simulate.steady_states import steady_state
 
 MAX_STEPS = 100_000
 
@@ -124,6 +126,8 @@ def simulate(
         If no solution to this tolerance was found within 100,000 steps.
     """
     times = np.asarray(times, dtype=float)
+    if protocol.control == "steady":
+        return _steady(fluid, protocol, times)
     end = float(times[-1])
     if end == float(protocol.begins):
         gradient = protocol.velocity_gradient(jnp.asarray(end))
@@ -147,6 +151,17 @@ def simulate(
         raise SimulationError(
             f"The law could not be integrated to t = {end:g}: its stress runs away, or it needs "
             f"more than {MAX_STEPS} steps. Check its parameters and the shear rate."
+        )
+    return ShearStress(times, components)
+
+
+def _steady(fluid: Fluid, protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> ShearStress:
+    components = np.asarray(solve_batch(fluid, lay_out([protocol], [times])))[0]
+    if not np.all(np.isfinite(components)):
+        lost = shear_rates(protocol, times)[np.argmax(~np.all(np.isfinite(components), axis=1))]
+        raise SimulationError(
+            f"The law has no steady state that is reached from rest at a rate of {lost:g} 1/s. "
+            "Check its parameters and the rate."
         )
     return ShearStress(times, components)
 
@@ -182,7 +197,7 @@ def solve_on_grid(
     -------
     σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
-    if adjoint is None:
+    if adjoint is None or protocol.control == "steady":
         return _in_fixed_steps(fluid, protocol, grid, _observe)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
@@ -201,6 +216,15 @@ def solve_on_grid(
     return jnp.asarray(solution.ys)[grid.sample_index]
 
 
+def observed_on_grid(
+    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
+) -> Float[Array, "n 3"]:
+    """Return the recorded stress, N1 and N2 in Pa at the samples of one grid, shape (n, 3)."""
+    stress = solve_on_grid(fluid, protocol, grid)
+    s11, s22, s33, _ = stress.T
+    return jnp.stack([protocol.recorded_stress(stress.T), s11 - s22, s22 - s33], axis=-1)
+
+
 def solve_states_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> Float[Array, "n k 4"]:
@@ -212,26 +236,34 @@ def solve_states_on_grid(
 
 
 def _in_fixed_steps(fluid, protocol, grid, observe):
+    if protocol.control == "steady":
+        return _in_steady_flow(fluid, protocol, grid, observe)
     solver = ExponentialRungeKutta4(_decay(fluid))
     args = (fluid, protocol)
     values = fixed_steps(_vector_field, solver, grid.times, fluid.rest(), args, observe)
     return values[grid.sample_index]
 
 
+def _in_steady_flow(fluid, protocol, grid, observe):
+    def at(time):
+        state = steady_state(fluid, protocol.velocity_gradient(time))
+        return state if observe is None else observe(time, state, (fluid, protocol))
+
+    return jax.vmap(at)(grid.times[grid.sample_index])
+
+
 @compiled
-def solve_batch(
-    fluid: Fluid, protocols: FlowProtocol, grids: IntegrationGrid
-) -> Float[Array, "runs n 4"]:
+def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
     """Return the stresses of one fluid in a batch of runs, on fixed grids.
 
     Parameters
     ----------
     fluid
         The fluid, shared by all runs.
-    protocols, grids
-        From `stack_protocols` and `make_grids`, with a leading axis of runs.
+    flows
+        From `lay_out`.
     """
-    return jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
+    return flows.over(partial(solve_on_grid, fluid))
 
 
 def _change_in_any_flow(t, stress, args):

@@ -137,7 +137,7 @@ def test_a_run_that_is_not_seen_has_no_residual(problem):
     assert np.all(np.isfinite(data_scale(seen)))
     whole = data_scale(problem)
     np.testing.assert_allclose(data_scale(seen)[0], whole[0])
-    np.testing.assert_array_equal(seen.grids.sample_mask.sum(axis=1), [41, 0])
+    np.testing.assert_array_equal(seen.sample_mask.sum(axis=1), [41, 0])
 
 
 @pytest.mark.slow

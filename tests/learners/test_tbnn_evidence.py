@@ -117,23 +117,23 @@ def test_a_law_that_runs_away_at_twice_the_rate_is_taken_only_for_want_of_anothe
     assert np.isfinite(surprises([wild], own)[0])
 
 
-def test_draws_of_the_posterior_fit_alike_and_differ_where_shear_stress_says_nothing(own, law):
+def test_draws_of_the_posterior_fit_alike_and_are_other_laws(own, law):
     fits = 1.25
     drawn = posterior_draws(law, own, jax.random.split(jax.random.key(2), 3), fits)
     assert len(drawn) == 3
     misfits = member_misfits([law, *drawn], own)
     assert np.all(misfits[1:] <= fits * misfits[0])
-    # in units of N1: σ12 is held to 1 % noise, N1 was seen by nobody
-    flow = dc.start_up(2.0)
+    flow = dc.oscillatory_shear(2.0, 0.5)  # the second run
     found = [simulate(Fluid.dimensionless(one), flow, TIMES) for one in (law, *drawn)]
-    sigma, N1 = (
-        max(np.linalg.norm(v - values[0]) / np.linalg.norm(values[0]) for v in values[1:])
-        for values in (
-            [one.shear_stress for one in found],
-            [one.first_normal_stress_difference for one in found],
-        )
-    )
-    assert sigma < N1
+
+    def apart(quantity):
+        values = [getattr(one, quantity) for one in found]
+        return [np.linalg.norm(v - values[0]) / np.linalg.norm(values[0]) for v in values[1:]]
+
+    # σ12 was seen, with this noise; N1 by nobody, and differs by far more than the 1e-8 to which
+    # it is integrated
+    assert max(apart("shear_stress")) < NOISE
+    assert min(apart("first_normal_stress_difference")) > 1e-5
 
 
 def test_the_penalty_on_variation_leaves_constants_nearly_free(own, law):

@@ -74,11 +74,10 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
 def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
     law = make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
-    some = jax.tree.map(
-        lambda x: x[:n],
-        (giesekus_problem.protocols, giesekus_problem.grids, giesekus_problem.target),
-    )
-    problem = eqx.tree_at(lambda p: (p.protocols, p.grids, p.target), giesekus_problem, some)
+    whole = giesekus_problem
+    some = [x[:n] for x in (whole.target, whole.size, whole.sample_mask)]
+    problem = eqx.tree_at(lambda p: (p.target, p.size, p.sample_mask), whole, some)
+    problem = eqx.tree_at(lambda p: p.flows, problem, whole.flows.some(0, n))
     together = states_and_jacobian(rebuild.start, rebuild, giesekus_problem)
     halves = side_by_side(rebuild.start, rebuild, problem)
     for half, whole in zip(halves, together, strict=True):

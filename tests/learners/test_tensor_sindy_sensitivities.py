@@ -45,7 +45,7 @@ def test_the_augmented_system_predicts_what_the_law_predicts(problem, trial):
     coefficients, inner = trial
     residual, _ = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
     law = LibraryExpansion(jnp.asarray(coefficients), jnp.asarray(inner), LIBRARY)
-    stress = solve_batch(Fluid.dimensionless(law), problem.protocols, problem.grids)[..., 3]
+    stress = solve_batch(Fluid.dimensionless(law), problem.flows)[..., 3]
     expected = problem.weight[..., 0] * (problem.target[..., 0] - stress)
     shear_rows = np.asarray(residual).reshape(problem.target.shape)[..., 0]
     # the same method on the same grid: rounding only

@@ -21,11 +21,10 @@ from discover.protocols import (
     recorded_at,
     shear_rates,
     smooth_between_samples,
-    stack_protocols,
     start_up,
     step_rates,
 )
-from discover.simulate import make_grids, simulate, solve_batch
+from discover.simulate import lay_out, simulate, solve_batch
 
 MODULUS, TIME, SOLVENT, MOBILITY = np.array([100.0, 20.0]), np.array([0.2, 3.0]), 5.0, 0.3
 TIMES = np.linspace(0.05, 4.0, 30)
@@ -54,8 +53,7 @@ def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     protocol = in_flow(start_up(0.6), kind)
     exact = BY_SCIPY.recorded(kind, lambda _: 0.6, TIMES)
     adaptive = recorded_at(protocol, simulate(fluid(), protocol, TIMES).components)
-    grids = make_grids([protocol], [TIMES])
-    fixed = np.asarray(solve_batch(fluid(), stack_protocols([protocol]), grids))[0]
+    fixed = np.asarray(solve_batch(fluid(), lay_out([protocol], [TIMES])))[0]
     # rtol 1e-8 of a mode; the fixed grid is good to 1e-6 in shear and the loop's steps to 1e-5
     np.testing.assert_allclose(adaptive, exact, rtol=1e-6)
     np.testing.assert_allclose(recorded_at(protocol, fixed), exact, rtol=1e-5)
@@ -99,8 +97,7 @@ def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learner
     exact = BY_SCIPY.recorded(
         "shear", lambda t: 2.0 if t < 0.0 else 0.2, TIMES, begins=-40.0, jumps=[0.0]
     )
-    grids = make_grids([run.protocol], [TIMES])
-    found = np.asarray(solve_batch(fluid(), stack_protocols([run.protocol]), grids))[0]
+    found = np.asarray(solve_batch(fluid(), lay_out([run.protocol], [TIMES])))[0]
     # the flow before is followed for 80 s, 27 relaxation times; the grid is good to 1e-5
     np.testing.assert_allclose(recorded_at(run.protocol, found), exact, rtol=2e-5)
 

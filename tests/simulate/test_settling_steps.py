@@ -15,11 +15,10 @@ from discover.protocols import (
     measured_rate,
     oscillatory_shear,
     shear_rates,
-    stack_protocols,
     start_up,
     step_rates,
 )
-from discover.simulate import make_grid, make_grids, solve_batch
+from discover.simulate import lay_out, make_grid, solve_batch
 
 TIME = 0.4
 RATES = [0.0, 1.0], [0.1, 20.0]
@@ -48,13 +47,13 @@ LAWS = {
 def error(law, time, told):
     """Return the largest error over the largest stress, and the number of steps."""
     parameters, independent = LAWS[law]
-    grids = make_grids([FLOW], [TIMES], relaxation_time=told)
+    flows = lay_out([FLOW], [TIMES], relaxation_time=told)
     fluid = Fluid(make_law(law, parameters), 1.0, time)
-    s11, s22, s33, s12 = np.asarray(solve_batch(fluid, stack_protocols([FLOW]), grids))[0].T
+    s11, s22, s33, s12 = np.asarray(solve_batch(fluid, flows))[0].T
     exact = replace(independent, relaxation_time=time).respond(RECORD, TIMES)
     pairs = (s12, exact.sigma12), (s11 - s22, exact.N1), (s22 - s33, exact.N2)
     size = max(np.max(np.abs(record)) for _, record in pairs)
-    return max(np.max(np.abs(a - b)) for a, b in pairs) / size, grids.times.shape[1]
+    return max(np.max(np.abs(a - b)) for a, b in pairs) / size, flows.n_steps
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -72,8 +71,7 @@ def test_what_a_law_adds_to_the_relaxation_does_not_make_steps_unstable():
     times = np.append(0.0, np.geomspace(2e-3, 30.0, 60))
 
     def off(**limits):
-        grids = make_grids([flow], [times], **limits)
-        found = np.asarray(solve_batch(fluid, stack_protocols([flow]), grids))[0, :, 3]
+        found = np.asarray(solve_batch(fluid, lay_out([flow], [times], **limits)))[0, :, 3]
         return np.max(np.abs(found / steady - (1.0 - np.exp(-3.0 * times / time))))
 
     assert off(relaxation_time=time) < 1e-4

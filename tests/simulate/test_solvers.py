@@ -11,11 +11,11 @@ from discover.protocols import (
     oscillatory_shear,
     paper_test_protocols,
     paper_training_protocols,
-    stack_protocols,
     start_up,
     step_rates,
 )
 from discover.simulate import (
+    lay_out,
     make_grid,
     make_grids,
     simulate,
@@ -100,7 +100,7 @@ def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
     ours = simulate(fluid, start_up(rate), times).components
     np.testing.assert_allclose(ours, total, atol=2e-6 * np.abs(total).max())
     protocol = start_up(rate)
-    on_grid = solve_batch(fluid, stack_protocols([protocol]), make_grids([protocol], [times]))[0]
+    on_grid = solve_batch(fluid, lay_out([protocol], [times]))[0]
     np.testing.assert_allclose(on_grid, total, atol=2e-6 * np.abs(total).max())
 
 
@@ -110,10 +110,9 @@ def test_the_exponential_method_converges_at_fourth_order():
     reference = simulate(fluid, protocol, times, rtol=1e-11, atol=1e-13).components
     errors = []
     for step in (0.1, 0.05, 0.025):
-        grid = make_grids([protocol], [times], strain_step=np.inf, phase_step=np.inf, max_step=step)
-        errors.append(
-            np.abs(solve_batch(fluid, stack_protocols([protocol]), grid)[0] - reference).max()
-        )
+        coarse = {"strain_step": np.inf, "phase_step": np.inf, "max_step": step}
+        found = solve_batch(fluid, lay_out([protocol], [times], **coarse))[0]
+        errors.append(np.abs(found - reference).max())
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert np.all(orders > 3.7), f"observed orders {orders}"
     assert np.all(orders < 4.6), f"observed orders {orders}"
@@ -124,8 +123,7 @@ def test_default_grids_are_accurate_to_1e_6_on_all_flows_of_the_paper():
         fluid = Fluid.dimensionless(make_law(law, parameters))
         flows = list(paper_training_protocols().values()) + list(paper_test_protocols().values())
         times = np.linspace(0, 20, 41)
-        grids = make_grids(flows, [times] * len(flows))
-        fast = solve_batch(fluid, stack_protocols(flows), grids)
+        fast = solve_batch(fluid, lay_out(flows, [times] * len(flows)))
         for stress, flow in zip(fast, flows, strict=True):
             exact = simulate(fluid, flow, times, rtol=1e-10, atol=1e-12).components
             assert float(jnp.max(jnp.abs(stress - exact))) < 5e-6 * np.abs(exact).max()
@@ -147,10 +145,9 @@ def test_phi_functions_match_their_integrals():
 def test_a_cessation_is_not_smeared_over_a_step():
     flow, times = step_rates([0.0, 2.03], [1.5, 0.0]), np.array([0.0, 1.0, 2.03, 3.0])
     fluid = Fluid.dimensionless(UpperConvectedMaxwell())
-    grids = make_grids([flow], [times])
     expected = 1.5 * (1 - np.exp(-np.minimum(times, 2.03))) * np.exp(-np.maximum(times - 2.03, 0))
     for stress in (
-        solve_batch(fluid, stack_protocols([flow]), grids)[0][:, 3],
+        solve_batch(fluid, lay_out([flow], [times]))[0][:, 3],
         simulate(fluid, flow, times).shear_stress,
     ):
         np.testing.assert_allclose(stress, expected, atol=1e-6)
@@ -177,7 +174,7 @@ def test_a_law_that_runs_away_on_a_grid_gives_no_error_and_no_finite_number():
     flow, times = start_up(5.0), np.linspace(0, 20, 5)
     law = make_law("giesekus", {"alpha": 0.2})
     bad = Fluid.dimensionless(law.__class__(-5.0))
-    stress = solve_batch(bad, stack_protocols([flow]), make_grids([flow], [times]))
+    stress = solve_batch(bad, lay_out([flow], [times]))
     assert not bool(jnp.all(jnp.isfinite(stress)))
 
 

@@ -13,8 +13,7 @@ from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
 from discover.learners.weighted_laws import WeightedLaws
-from discover.protocols.protocol import stack_protocols
-from discover.simulate.grid import make_grids
+from discover.simulate.flow_batch import lay_out
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
@@ -200,8 +199,7 @@ def _weighted_bands(
     protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
     found = weighted.bands(
         (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
-        stack_protocols(protocols),
-        make_grids(protocols, times, strain_step=_STRAIN_STEP, relaxation_time=fluid.settling_time),
+        lay_out(protocols, times, strain_step=_STRAIN_STEP, relaxation_time=fluid.settling_time),
         [len(t) for t in times],
     )
     middle, bands = {}, {}

@@ -5,9 +5,6 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 
-# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
-_LEAST_STEADY = 1e-4
-
 
 def measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return weights and values of a run's samples, padded with zeros.
@@ -19,12 +16,7 @@ def measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
     n
         Length to which it is padded.
     """
-    size = np.full(len(run), np.sqrt(np.mean(run.recorded**2)))
-    if run.protocol.control in ("steady", "oscillation"):
-        # over decades of values the noise is in proportion to them, and each decade counts
-        largest = float(np.max(np.abs(run.recorded)))
-        size = np.maximum(np.abs(run.recorded), _LEAST_STEADY * largest)
-    scale = 1.0 / (np.where(size > 0, size, 1.0) * np.sqrt(len(run)))
+    scale = 1.0 / (run.sizes(run.recorded) * np.sqrt(len(run)))
     pad = (0, n - len(run))
     return np.pad(scale, pad), np.pad(run.recorded, pad)
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -16,9 +15,9 @@ from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol, stack_protocols
-from discover.simulate.grid import IntegrationGrid, make_grids
-from discover.simulate.solve import solve_on_grid
+from discover.protocols.protocol import FlowProtocol
+from discover.simulate.flow_batch import FlowBatch, lay_out
+from discover.simulate.solve import observed_on_grid
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -133,18 +132,13 @@ def predict_laws(
     protocols, times
         The flows and their sampling times.
     """
-    grids = make_grids(protocols, times, relaxation_time=fluids.settling_time)
-    return np.asarray(_predict(fluids, stack_protocols(protocols), grids))
+    flows = lay_out(protocols, times, relaxation_time=fluids.settling_time)
+    return np.asarray(_predict(fluids, flows))
 
 
 @compiled
-def _predict(
-    fluids: Fluid, protocols: FlowProtocol, grids: IntegrationGrid
-) -> Float[Array, "laws flows n 3"]:
+def _predict(fluids: Fluid, flows: FlowBatch) -> Float[Array, "laws flows n 3"]:
     def of_law(fluid):
-        stress = jax.vmap(partial(solve_on_grid, fluid))(protocols, grids)
-        recorded = jax.vmap(lambda flow, s: flow.recorded_stress(s.T))(protocols, stress)
-        s11, s22, s33, _ = jnp.moveaxis(stress, -1, 0)
-        return jnp.stack([recorded, s11 - s22, s22 - s33], axis=-1)
+        return flows.over(partial(observed_on_grid, fluid))
 
     return eqx.filter_vmap(of_law)(fluids)

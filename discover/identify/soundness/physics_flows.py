@@ -11,8 +11,9 @@ from jaxtyping import Float
 
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol, oscillatory_shear, stack_protocols
-from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear
+from discover.simulate.flow_batch import lay_out
+from discover.simulate.grid import IntegrationGrid
 from discover.simulate.solve import solve_batch, solve_states_on_grid
 
 _CYCLES = 3
@@ -131,9 +132,7 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
         np.linspace(0.0, _CYCLES * 2.0 * np.pi * scale / de, _CYCLES * _SAMPLES_A_CYCLE + 1)
         for _, de in pairs
     ]
-    grids = make_grids(flows, times, strain_step=0.2)
-    protocols = stack_protocols(flows)
-    stress = np.asarray(solve_batch(fluid, protocols, grids))[..., 3]
+    stress = np.asarray(solve_batch(fluid, lay_out(flows, times, strain_step=0.2)))[..., 3]
     work = np.full(len(pairs), np.nan)
     for i, ((wi, de), t) in enumerate(zip(pairs, times, strict=True)):
         values = stress[i, : t.size]

@@ -107,8 +107,8 @@ def halves_of_runs(
 
 def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
     """Return the problem with only some of the runs looked at; its shapes stay the same."""
-    mask = problem.grids.sample_mask & jnp.asarray(runs)[:, None]
-    return eqx.tree_at(lambda tree: tree.grids.sample_mask, problem, mask)
+    mask = problem.sample_mask & jnp.asarray(runs)[:, None]
+    return eqx.tree_at(lambda tree: tree.sample_mask, problem, mask)
 
 
 def choose_member(

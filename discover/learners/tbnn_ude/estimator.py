@@ -260,7 +260,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             np.asarray(fluid.relaxation_time),
             known_relaxation=fluid.law.linear_relaxation,
         )
-        stresses = np.asarray(solve_batch(self.fluid_, problem.protocols, problem.grids))
+        stresses = np.asarray(solve_batch(self.fluid_, problem.flows))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:

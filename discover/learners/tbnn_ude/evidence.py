@@ -50,7 +50,7 @@ def surprises(
     best = int(np.argmin(squares))
     if not 0.0 < squares[best] < np.inf:
         return np.where(squares == squares[best], 0.0, np.inf)
-    mask = np.asarray(problem.grids.sample_mask)
+    mask = np.asarray(problem.sample_mask)
     precision = _independent(misses[best], mask) / squares[best]
     enduring = np.isfinite(squares) & [endures(law, problem) for law in laws]
     found = np.full(len(laws), np.inf)
@@ -63,11 +63,8 @@ def surprises(
 
 def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
     """Return whether a law's stress stays finite in the training flows at twice the rate."""
-    faster = eqx.tree_at(
-        lambda tree: (tree.protocols.table_rates, tree.protocols.amplitudes),
-        problem,
-        replace_fn=lambda rates: 2.0 * rates,
-    )
+    twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
+    faster = eqx.tree_at(lambda tree: tree.flows, problem, twice)
     return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster)))))
 
 
@@ -96,7 +93,7 @@ def posterior_draws(
     states = trajectories(law, problem)
     misses = np.asarray(relative_misses(states, problem))
     least = float(np.sqrt(np.sum(misses**2)))
-    precision = _independent(misses, np.asarray(problem.grids.sample_mask)) / max(least**2, 1e-300)
+    precision = _independent(misses, np.asarray(problem.sample_mask)) / max(least**2, 1e-300)
     rebuild, acts, columns = _sensitivities(law, states, problem)
     values, vectors = np.linalg.eigh(columns.T @ columns)
     spread = vectors / np.sqrt(1.0 + precision * np.clip(values, 0.0, None))

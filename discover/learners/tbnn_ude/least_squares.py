@@ -62,15 +62,16 @@ class Objective(eqx.Module):
     prior: PriorWeights
 
 
-def data_scale(problem: TrainingProblem) -> Float[Array, "runs 1"]:
+def data_scale(problem: TrainingProblem) -> Float[Array, "runs n"]:
     """Return the factor that turns residuals into parts of the mean relative misfit."""
-    mask = problem.grids.sample_mask
+    mask = problem.sample_mask
     # a run of which nothing is seen has no sample to count
     count = jnp.maximum(jnp.sum(mask, axis=1), 1)
     mean_square = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1) / count
     # A run at rest has no scale of its own; unit modulus serves
     mean_square = jnp.where(mean_square > 0.0, mean_square, 1.0)
-    return (1.0 / jnp.sqrt(mean_square * count * mask.shape[0]))[:, None]
+    size = jnp.where(problem.size > 0.0, problem.size, jnp.sqrt(mean_square)[:, None])
+    return 1.0 / (size * jnp.sqrt(count * mask.shape[0])[:, None])
 
 
 class Linearised(eqx.Module):

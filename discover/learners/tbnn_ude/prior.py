@@ -73,13 +73,13 @@ def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
 def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
     """Return states evenly spread over the samples, from the stresses of every mode there."""
 
-    def one(states, protocol, grid):
+    def one(protocol, grid, states):
         pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
         times = grid.times[grid.sample_index][pick]
         shear_rates = jax.vmap(protocol.rate)(times)[:, None] * problem.relaxation_time
         return states[pick], shear_rates
 
-    stress, shear_rate = jax.vmap(one)(states, problem.protocols, problem.grids)
+    stress, shear_rate = problem.flows.over(one, states)
     stress, shear_rate = stress.reshape(-1, 4), shear_rate.reshape(-1)
     rate = jax.vmap(rate_of_deformation)(shear_rate)
     basis = jax.vmap(integrity_basis)(stress, rate)
@@ -93,7 +93,7 @@ def _weights(problem: TrainingProblem) -> Float[Array, "runs states k"]:
     shape = (runs, STATES_PER_RUN, modes)
     if modes == 1:
         return jnp.ones(shape)
-    mask = problem.grids.sample_mask
+    mask = problem.sample_mask
     squares = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1)
     stress = jnp.sqrt(squares / jnp.maximum(jnp.sum(mask, axis=1), 1))
     stress = jnp.where(stress > 0.0, stress, 1.0)  # a run at rest has no scale of its own

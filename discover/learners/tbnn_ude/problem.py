@@ -4,16 +4,14 @@ from collections.abc import Sequence
 
 import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
-from discover.protocols.protocol import FlowProtocol, stack_protocols
-from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import solve_on_grid
 
 _IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
@@ -24,17 +22,23 @@ class TrainingProblem(eqx.Module):
 
     Attributes
     ----------
-    protocols, grids
-        Flows and fixed time grids, with a leading axis of runs.
+    flows
+        The runs, on fixed time grids.
     target
         Measured stress over the sum of the moduli, shape (runs, n).
+    size
+        Of a flow curve's samples, whose misfits are told in units of each; 0 for other runs, of
+        which that is the root-mean-square. Shape (runs, n).
+    sample_mask
+        Which samples are looked at, shape (runs, n): False where one is padding.
     modulus, relaxation_time
         Of each mode, shape (k,); the moduli sum to one.
     """
 
-    protocols: FlowProtocol
-    grids: IntegrationGrid
+    flows: FlowBatch
     target: Float[Array, "runs n"]
+    size: Float[Array, "runs n"]
+    sample_mask: Bool[Array, "runs n"]
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
 
@@ -53,19 +57,19 @@ class TrainingProblem(eqx.Module):
         def one(protocol, grid):
             return protocol.recorded_stress(solve_on_grid(fluid, protocol, grid, adjoint).T)
 
-        return self._missed_by(jax.vmap(one)(self.protocols, self.grids))
+        return self._missed_by(self.flows.over(one))
 
     def misses(self, states: Float[Array, "runs n k 4"]) -> Float[Array, "runs n"]:
         """Return predicted minus measured stress from the stresses of the modes at the samples."""
         total = jnp.tensordot(self.modulus, states, axes=(0, 2))
 
-        def recorded(protocol, components):
+        def recorded(protocol, _, components):
             return protocol.recorded_stress(components.T)
 
-        return self._missed_by(jax.vmap(recorded)(self.protocols, total))
+        return self._missed_by(self.flows.over(recorded, total))
 
     def _missed_by(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
-        return jnp.where(self.grids.sample_mask, predicted - self.target, 0.0)
+        return jnp.where(self.sample_mask, predicted - self.target, 0.0)
 
     def mean_squared_errors(
         self,
@@ -79,7 +83,7 @@ class TrainingProblem(eqx.Module):
         (``benchmarks/adjoints.py``: 51, 94 and 481 ms for the paper's network).
         """
         residual = self.residual(law, adjoint)
-        return jnp.sum(residual**2, axis=1) / jnp.sum(self.grids.sample_mask, axis=1)
+        return jnp.sum(residual**2, axis=1) / jnp.sum(self.sample_mask, axis=1)
 
 
 def make_problem(
@@ -111,20 +115,23 @@ def make_problem(
     """
     total = float(np.sum(modulus))
     protocols = [run.protocol for run in runs]
-    grids = make_grids(
+    flows = lay_out(
         protocols,
         [run.time for run in runs],
         strain_step=strain_step,
         phase_step=phase_step,
         relaxation_time=float(np.max(relaxation_time)) if known_relaxation else None,
     )
-    n = grids.sample_index.shape[1]
+    n = max(map(len, runs))
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
     target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])
+    own = [run.sizes(run.recorded) * (run.protocol.control == "steady") for run in runs]
+    size = np.stack([np.pad(sizes, (0, n - len(sizes))) for sizes in own])
     return TrainingProblem(
-        stack_protocols(protocols),
-        grids,
+        flows,
         jnp.asarray(target / total),
+        jnp.asarray(size / total),
+        jnp.asarray(np.arange(n) < np.array([[len(run)] for run in runs])),
         jnp.asarray(modulus / total),
         jnp.asarray(relaxation_time),
     )

@@ -123,7 +123,7 @@ def train_default(
 
 def work(problem: TrainingProblem) -> float:
     """Return modes times runs times steps of time: what an integration of a problem costs."""
-    return float(problem.modulus.size * problem.grids.times.size)
+    return float(problem.modulus.size * problem.flows.n_steps)
 
 
 def train_constants(

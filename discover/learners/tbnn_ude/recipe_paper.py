@@ -64,14 +64,8 @@ def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> Tens
 
 def _with_series(problem: TrainingProblem, active: Bool[Array, " runs"]) -> TrainingProblem:
     """Return the problem with the other series at rest, where they cannot run away."""
-    protocols = problem.protocols
-    on = active[:, None].astype(protocols.table_rates.dtype)
-    quiet = eqx.tree_at(
-        lambda p: (p.table_rates, p.amplitudes),
-        protocols,
-        (protocols.table_rates * on, protocols.amplitudes * on),
-    )
-    return eqx.tree_at(lambda p: p.protocols, problem, quiet)
+    quiet = problem.flows.faster(active.astype(problem.target.dtype))
+    return eqx.tree_at(lambda p: p.flows, problem, quiet)
 
 
 def paper_loss(

@@ -19,6 +19,7 @@ from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.steady_states import steady_modes
 
 
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n k 4"]:
@@ -43,7 +44,7 @@ def side_by_side(
     n = problem.target.shape[0]
     # halves of one size share a program; of an odd number of runs the middle one is in both
     half = -(-n // 2)
-    if n < 2:
+    if n < 2 or len(problem.flows.parts) > 1:  # runs of several controls are programs of their own
         return states_and_jacobian(weights, rebuild, problem)
     with ThreadPoolExecutor(1) as pool:
         last = pool.submit(states_and_jacobian, weights, rebuild, problem, half, np.int32(n - half))
@@ -76,9 +77,10 @@ def states_and_jacobian(
     count, first
         How many runs, and the first of them; by default all.
     """
-    runs = (problem.protocols, problem.grids)
+    flows, looked_at = problem.flows, problem.sample_mask
     if count is not None:
-        runs = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, first, count), runs)
+        flows = flows.some(first, count)
+        looked_at = jax.lax.dynamic_slice_in_dim(looked_at, first, count)
     modulus, relaxation_time = problem.modulus, problem.relaxation_time
     fluid = problem.fluid(rebuild(weights))
     decay = jax.lax.stop_gradient(fluid.decay_rate())[..., None]
@@ -101,11 +103,27 @@ def states_and_jacobian(
     def observe(t, y, protocol):
         return y[..., 0], protocol.recorded_stress(jnp.tensordot(modulus, y[..., 1:], axes=1))
 
+    def steady_run(protocol, grid):
+        def at(time):
+            gradient = jnp.multiply.outer(relaxation_time, protocol.velocity_gradient(time))
+
+            def recorded(w):
+                state = steady_modes(rebuild(w).stress_rate, gradient, fluid.rest())
+                return protocol.recorded_stress(jnp.tensordot(modulus, state, axes=1)), state
+
+            # one number recorded: a pullback costs what one weight's tangent would
+            by_weight, state = jax.jacrev(recorded, has_aux=True)(weights)
+            return state, by_weight
+
+        return jax.vmap(at)(grid.times[grid.sample_index])
+
     def one_run(protocol, grid):
+        if protocol.control == "steady":
+            return steady_run(protocol, grid)
         start = jnp.zeros((modulus.shape[0], 4, 1 + n_weights))
         solver = ExponentialRungeKutta4(decay)
         observed = fixed_steps(field, solver, grid.times, start, protocol, observe)
         return jax.tree.map(lambda values: values[grid.sample_index], observed)
 
-    states, jacobian = jax.vmap(one_run)(*runs)
-    return states, jnp.where(runs[1].sample_mask[..., None], jacobian, 0.0)
+    states, jacobian = flows.over(one_run)
+    return states, jnp.where(looked_at[..., None], jacobian, 0.0)

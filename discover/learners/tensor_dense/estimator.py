@@ -35,8 +35,7 @@ from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.weighted_laws import Limits, WeightedLaws
 from discover.progress import Progress, by_lines
-from discover.protocols.protocol import stack_protocols
-from discover.simulate.grid import make_grids
+from discover.simulate.flow_batch import lay_out
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 
@@ -243,8 +242,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         runs = as_runs(X, fluid.relaxation_time)
         return self.laws_that_fit().bands(
             (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
-            stack_protocols([run.protocol for run in runs]),
-            make_grids(
+            lay_out(
                 [r.protocol for r in runs],
                 [r.time for r in runs],
                 strain_step=self.strain_step,

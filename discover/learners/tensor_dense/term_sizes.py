@@ -42,6 +42,6 @@ def _sizes(problem: TrajectoryProblem) -> Float[Array, " n"]:
         found = jax.vmap(of_modes, in_axes=(0, 0, None))(states, gradients, fluid.relaxation_time)
         return jnp.where(grid.sample_mask[:, None, None], found, 0.0)
 
-    found = jax.vmap(of_run)(problem.protocols, problem.grids)
-    samples = jnp.sum(problem.grids.sample_mask) * problem.modulus.shape[0]
+    found = problem.flows.over(of_run)
+    samples = jnp.sum(problem.flows.sample_mask) * problem.modulus.shape[0]
     return jnp.sqrt(jnp.sum(found, axis=(0, 1, 2)) / samples)

@@ -39,5 +39,5 @@ def predict_runs(
         base=fluid.law,
         strain_step=strain_step,
     )
-    stresses = np.asarray(solve_batch(fluid, problem.protocols, problem.grids))
+    stresses = np.asarray(solve_batch(fluid, problem.flows))
     return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]

@@ -13,8 +13,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.runs import as_runs
-from discover.protocols.protocol import FlowProtocol, stack_protocols
-from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from tensor_library.library import TermLibrary
 
 OBSERVED = ("recorded", "first_normal_stress_difference", "second_normal_stress_difference")
@@ -37,14 +36,14 @@ class TrajectoryProblem(eqx.Module):
         Of each mode, shape (k,), in Pa and s.
     solvent_viscosity
         In Pa s.
-    protocols, grids
-        Batched over runs.
+    flows
+        The runs and their grids.
     target
         Observed σ12, N1, N2, shape (runs, n, 3), zero where nothing was observed.
     weight
-        Of each observation: one over the root-mean-square of its run and kind, over the square
-        root of the number of observations; zero where nothing was observed. A residual vector
-        thus has a norm equal to the relative misfit.
+        Of each observation: one over the root-mean-square of its run and kind, in a flow curve
+        over its own size, over the square root of the number of observations; zero where nothing
+        was observed. A residual vector thus has a norm equal to the relative misfit.
     order_of_time
         Time over the duration of the run, shape (runs, n).
     """
@@ -54,8 +53,7 @@ class TrajectoryProblem(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
-    protocols: FlowProtocol
-    grids: IntegrationGrid
+    flows: FlowBatch
     target: Float[Array, "runs n 3"]
     weight: Float[Array, "runs n 3"]
     order_of_time: Float[Array, "runs n"]
@@ -147,11 +145,12 @@ def make_problem(
                     )
                 continue  # a normal stress difference may vanish in truth, but sets no scale
             target[i, : len(run), kind] = values
-            weight[i, : len(run), kind] = 1.0 / scale
+            weight[i, : len(run), kind] = 1.0 / run.sizes(values)
     base = UpperConvectedMaxwell(known_relaxation) if base is None else base
-    grids = make_grids(
+    flows = lay_out(
         [r.protocol for r in runs],
         [r.time for r in runs],
+        padded,
         strain_step=strain_step,
         relaxation_time=Fluid(base, modulus, relaxation_time).settling_time,
     )
@@ -161,25 +160,8 @@ def make_problem(
         modulus=jnp.asarray(modulus),
         relaxation_time=jnp.asarray(relaxation_time),
         solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
-        protocols=stack_protocols([r.protocol for r in runs]),
-        grids=_pad_grids(grids, padded),
+        flows=flows.with_steps_in(_PADDED_STEPS),
         target=jnp.asarray(target),
         weight=jnp.asarray(weight / np.sqrt(np.sum(weight > 0))),
         order_of_time=jnp.asarray(order),
-    )
-
-
-def _pad_grids(grids: IntegrationGrid, n_samples: int) -> IntegrationGrid:
-    """Round the shapes up, so that folds of different runs often share a compilation."""
-    times = np.asarray(grids.times)
-    index = np.asarray(grids.sample_index)
-    mask = np.asarray(grids.sample_mask)
-    steps = -(-times.shape[1] // _PADDED_STEPS) * _PADDED_STEPS - times.shape[1]
-    spacing = (times[:, -1] - times[:, -2])[:, None]
-    times = np.concatenate([times, times[:, -1:] + spacing * np.arange(1, steps + 1)], axis=1)
-    samples = n_samples - index.shape[1]
-    return IntegrationGrid(
-        jnp.asarray(times),
-        jnp.asarray(np.pad(index, ((0, 0), (0, samples)), mode="edge")),
-        jnp.asarray(np.pad(mask, ((0, 0), (0, samples)))),
     )

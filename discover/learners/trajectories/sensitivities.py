@@ -22,6 +22,7 @@ from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.steady_states import steady_modes
 from tensor_library.kinematics import rate_of_deformation
 
 _LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
@@ -77,6 +78,8 @@ def _recorded(total, protocol):
 
 
 def _solve_run(problem, active, coefficients, inner, protocol, grid):
+    if protocol.control == "steady":
+        return _steady_run(problem, active, coefficients, inner, protocol, grid)
     columns = 1 + coefficients.shape[0] + inner.shape[0]
     # Exact for the linear relaxation of the known law; where that too is unknown, a rate of this
     # size is still the natural split, and the split decides accuracy only.
@@ -90,6 +93,37 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
         _observe,
     )
     return observed[grid.sample_index]
+
+
+def _steady_run(problem, active, coefficients, inner, protocol, grid):
+    """Return what `_solve_run` does of steady states, by the implicit function."""
+    numbers = coefficients, inner
+
+    def at(time):
+        def recorded(numbers):
+            state = _steady_modes(problem, active, *numbers, protocol, time)
+            return _observed(problem, protocol, time, state)
+
+        return jnp.concatenate([recorded(numbers)[:, None], *jax.jacfwd(recorded)(numbers)], axis=1)
+
+    return jax.vmap(at)(grid.times[grid.sample_index])
+
+
+def _steady_modes(problem, active, coefficients, inner, protocol, time):
+    gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
+    law = partial(_known_less_terms, problem, active, coefficients, inner)
+    return steady_modes(law, gradient, jnp.zeros((problem.modulus.shape[0], 4)))
+
+
+def _known_less_terms(problem, active, coefficients, inner, stress, rate):
+    terms = evaluate_active(problem.library, active, stress, rate_of_deformation(rate), inner)
+    return problem.base.stress_rate(stress, rate) - jnp.tensordot(coefficients, terms, axes=1)
+
+
+def _observed(problem, protocol, time, state):
+    """Return the recorded stress, N1 and N2 of modes, shape (k, 4)."""
+    total = jnp.tensordot(problem.modulus, state, axes=1)
+    return _recorded(total + _of_solvent(problem, protocol, time), protocol)
 
 
 def observe(
@@ -117,7 +151,7 @@ def observe(
     Not finite where the trial law runs away.
     """
     run = partial(_solve_run, problem, active, coefficients, inner)
-    observed = jax.vmap(run)(problem.protocols, problem.grids)
+    observed = problem.flows.over(run)
     return observed[..., 0], observed[..., 1:]
 
 
@@ -133,36 +167,34 @@ def predict_many(
     Parameters as in `observe`, with a leading axis of laws. Not finite where a law runs away.
     """
 
-    def field(t, stress, args):
-        protocol, coefficients, inner = args
-        rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
-
-        def mode(stress, rate):
-            terms = evaluate_active(
-                problem.library, active, stress, rate_of_deformation(rate), inner
-            )
-            known = problem.base.stress_rate(stress, rate)
-            return known - jnp.tensordot(coefficients, terms, axes=1)
-
-        return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
-
-    def seen(t, stress, args):
-        total = jnp.tensordot(problem.modulus, stress, axes=1)
-        return _recorded(total + _of_solvent(problem, args[0], t), args[0])
-
     def run(coefficients, inner, protocol, grid):
+        mode = partial(_known_less_terms, problem, active, coefficients, inner)
+        if protocol.control == "steady":
+            return jax.vmap(
+                lambda time: _observed(
+                    problem,
+                    protocol,
+                    time,
+                    _steady_modes(problem, active, coefficients, inner, protocol, time),
+                )
+            )(grid.times[grid.sample_index])
+
+        def field(t, stress, _):
+            rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
+            return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
+
         observed = fixed_steps(
             field,
             ExponentialRungeKutta4((1.0 / problem.relaxation_time)[:, None]),
             grid.times,
             jnp.zeros((problem.modulus.shape[0], 4)),
-            (protocol, coefficients, inner),
-            seen,
+            None,
+            lambda t, stress, _: _observed(problem, protocol, t, stress),
         )
         return observed[grid.sample_index]
 
     def law(numbers):
-        predicted = jax.vmap(partial(run, *numbers))(problem.protocols, problem.grids)
+        predicted = problem.flows.over(partial(run, *numbers))
         return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
 
     return jax.lax.map(law, (coefficients, inner), batch_size=_LAWS_AT_ONCE)

@@ -1,0 +1,118 @@
+"""Steady states of a fluid, found without waiting for them."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.multimode import Fluid
+from tensor_library.kinematics import VelocityGradient
+
+# Pseudo-time steps, from a fraction of the fastest time of the flow to where a step is Newton's
+STEPS = 60
+_FIRST, _LAST = 0.05, 1e8
+
+
+def pseudo_time_step(
+    number: Float[Array, ""], weissenberg_number: Float[Array, " k"]
+) -> Float[Array, " k"]:
+    """Return the width of one of `STEPS` steps of each mode, in its relaxation times.
+
+    Parameters
+    ----------
+    number
+        Of the step, from 0 on.
+    weissenberg_number
+        Rate of the flow times the relaxation time of each mode.
+    """
+    first = _FIRST / (1.0 + weissenberg_number)
+    return first * (_LAST / first) ** (number / (STEPS - 1))
+
+
+def linearly_implicit_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    stress: Float[Array, "s k"],
+    width: Float[Array, " k"],
+) -> Float[Array, "s k"]:
+    """Return modes after one linearly implicit Euler step; an infinite one is Newton's.
+
+    Parameters
+    ----------
+    change
+        Rate of change of all modes, each of which changes by itself.
+    stress
+        Where the step begins.
+    width
+        Of the step, in the unit of time of each mode.
+    """
+    now, jacobian = _with_jacobian(change, stress)
+    matrix = jnp.eye(len(stress)) / width[:, None, None] - jacobian
+    return stress + _solved(matrix, now)
+
+
+def _with_jacobian(change, stress):
+    """Return the change, and of each mode its derivative, shape (k, s, s)."""
+    now, tangent = jax.linearize(change, stress)
+    # each mode changes by itself: as many directions as it has numbers give every tangent
+    unit = jnp.eye(len(stress))[:, :, None] * jnp.ones(stress.shape)
+    return now, jnp.transpose(jax.vmap(tangent)(unit), (2, 1, 0))
+
+
+def _solved(matrix: Float[Array, "k s s"], change: Float[Array, "s k"]) -> Float[Array, "s k"]:
+    return jnp.linalg.solve(matrix, change.T[:, :, None])[:, :, 0].T
+
+
+def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Array, "k s"]:
+    """Return the dimensionless state of every mode of a fluid in one steady flow.
+
+    As `steady_modes`.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    velocity_gradient
+        The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
+    """
+    scaled = jnp.multiply.outer(fluid.relaxation_time, velocity_gradient)
+    return steady_modes(fluid.law.stress_rate, scaled, fluid.rest())
+
+
+def steady_modes(
+    stress_rate: Callable[[Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
+    scaled_gradient: Float[Array, " k"] | Float[Array, "k 4"],
+    rest: Float[Array, "k s"],
+) -> Float[Array, "k s"]:
+    """Return the dimensionless state of modes in one steady flow.
+
+    Approached from rest by linearly implicit Euler steps in pseudo-time that grow until they are
+    Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]. Where a law has several steady
+    states it is the one that a start-up leads to. Not finite, or far off, where there is none.
+
+    Derivatives by the law's parameters are those of the implicit function: no tangent passes
+    through the steps.
+
+    Parameters
+    ----------
+    stress_rate
+        Dimensionless dσ/dt of a mode, of its σ and its λL.
+    scaled_gradient
+        λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
+    rest
+        The modes at rest.
+    """
+    # the shear rate, or of an extension the largest rate of stretching
+    weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)
+
+    def change(stress):
+        return jax.vmap(stress_rate)(stress.T, scaled_gradient).T
+
+    def step(stress, number):
+        return linearly_implicit_step(change, stress, pseudo_time_step(number, weissenberg)), None
+
+    reached, _ = jax.lax.scan(step, rest.T, jnp.arange(STEPS, dtype=float))
+    reached = jax.lax.stop_gradient(reached)
+    now, jacobian = _with_jacobian(change, reached)
+    # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
+    return (reached + _solved(jax.lax.stop_gradient(-jacobian), now)).T
