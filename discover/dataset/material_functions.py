@@ -202,19 +202,15 @@ modes and is fitted or judged only where that is asked for."""
 def at_measured_rate(run: Run) -> Run:
     """Return a run at a given stress as one that follows the rate derived from its strain.
 
+    A flow curve stays what it is, for its steady states are solved for.
+
     Raises
     ------
     InputError
-        If the stress was put on at once, which no finite rate follows, or it is a flow curve or
-        moduli.
+        If the stress was put on at once, which no finite rate follows, or it holds moduli.
     """
-    if run.protocol.control == "rate":
+    if run.protocol.control in ("rate", "steady"):
         return run
-    if run.protocol.control == "steady":
-        raise InputError(
-            f"{run.name} is a flow curve, which a learner that follows a rate in time cannot fit. "
-            "discover close-loop fits it; leave it out here."
-        )
     if run.protocol.control == "oscillation":
         raise InputError(
             f"{run.name} holds moduli of oscillations, which a learner that follows a rate in time "

@@ -31,6 +31,26 @@ _COLUMNS = (
 )
 
 
+def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
+    """Return in units of what a misfit of each of some values is told, shape (n,).
+
+    The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion to
+    each value and of which each decade counts, the value itself.
+
+    Parameters
+    ----------
+    values
+        A quantity recorded in the flow.
+    protocol
+        Of the flow.
+    """
+    size = np.full(len(values), np.sqrt(np.mean(values**2)))
+    if protocol.control in ("steady", "oscillation"):
+        largest = float(np.max(np.abs(values), initial=0.0))
+        size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
+    return np.where(size > 0, size, 1.0)
+
+
 @dataclass(frozen=True)
 class Run:
     """One experiment in shear or in extension.
@@ -202,21 +222,8 @@ class Run:
         return values
 
     def sizes(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return in units of what a misfit of each of these values is told, shape (n,).
-
-        The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion
-        to each value and of which each decade counts, the value itself.
-
-        Parameters
-        ----------
-        values
-            A quantity that the run records.
-        """
-        size = np.full(len(values), np.sqrt(np.mean(values**2)))
-        if self.protocol.control in ("steady", "oscillation"):
-            largest = float(np.max(np.abs(values), initial=0.0))
-            size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
-        return np.where(size > 0, size, 1.0)
+        """Return in units of what a misfit of each of these values is told, as `sizes_of` does."""
+        return sizes_of(values, self.protocol)
 
     def observing(self, quantity: RecordedQuantity) -> "Run":
         """Return the same run with another quantity fitted or judged, under a name of its own.

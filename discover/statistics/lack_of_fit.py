@@ -98,6 +98,7 @@ def lack_of_fit(
     measured: Sequence[Float[np.ndarray, " _"]],
     expectation: Expectation | None = None,
     rates: Sequence[Float[np.ndarray, " _"]] | None = None,
+    even: Sequence[Float[np.ndarray, " _"]] | None = None,
 ) -> LackOfFit:
     """Return what a model leaves of the records, and whether that is noise.
 
@@ -113,8 +114,16 @@ def lack_of_fit(
         What a complete model may leave; by default noise of unknown size.
     rates
         What was imposed, at the samples; with them a record that never follows it is told.
+    even
+        By what records and residuals are multiplied so that their noise has one size; by default
+        by nothing.
     """
-    left = what_is_left(residuals, measured, expectation)
+    factors = [np.ones(len(record)) for record in measured] if even is None else even
+    residuals, records = (
+        [factor * row for factor, row in zip(factors, rows, strict=True)]
+        for rows in (residuals, measured)
+    )
+    left = what_is_left(residuals, records, expectation)
     if holds_signal(measured, rates):
         return left
     return replace(

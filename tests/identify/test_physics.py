@@ -14,8 +14,8 @@ from discover.identify.soundness.steady_states import (
     steady_uniaxial_extension,
 )
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
-from discover.protocols import oscillatory_shear, stack_protocols
-from discover.simulate import make_grids
+from discover.protocols import oscillatory_shear
+from discover.simulate import lay_out
 from tensor_library import TermLibrary, parse_term
 
 FLOWS = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}
@@ -33,9 +33,9 @@ def expansion(**coefficients):
 
 def report(law, solvent=0.0):
     flows = list(FLOWS.values())
-    grids = make_grids(flows, [np.linspace(0, 10, 81)] * 2)
     fluid = Fluid(law, 1.0, 1.0, solvent)
-    return check_physics(fluid, stack_protocols(flows), grids, list(FLOWS), 2.0, 1.0)
+    batch = lay_out(flows, [np.linspace(0, 10, 81)] * 2)
+    return check_physics(fluid, batch, list(FLOWS), 2.0, 1.0)
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from discover.comparison.outcomes.flows import (
     relative_errors,
 )
 from discover.comparison.outcomes.truth import true_terms
+from discover.dataset.run import sizes_of
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
@@ -220,8 +221,8 @@ def _misfits(
     squares = np.zeros(len(predicted[0]))
     for flow, rows in zip(training, predicted, strict=False):  # judged flows follow
         assert flow.measured is not None
-        size = float(np.mean(flow.measured**2)) or 1.0
-        squares += np.sum((rows[:, :, 0] - flow.measured) ** 2, axis=1) / size
+        size = sizes_of(flow.measured, flow.protocol)
+        squares += np.sum(((rows[:, :, 0] - flow.measured) / size) ** 2, axis=1)
     misfit = np.sqrt(squares / sum(flow.times.size for flow in training))
     return np.where(np.isfinite(misfit), misfit, np.inf)
 

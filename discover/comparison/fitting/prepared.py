@@ -13,7 +13,7 @@ from discover.study.declared_model import DeclaredModel
 
 
 def at_rates(data: StudyData) -> StudyData:
-    """Return data in which every run follows a rate in time, which is what the learners fit.
+    """Return data in which every run has a rate, in time or of a steady flow.
 
     What has none is refused among the runs to fit, and set aside among those that only judge.
 
@@ -32,7 +32,8 @@ def at_rates(data: StudyData) -> StudyData:
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
             'such as held_out = ["fast.csv"].'
         )
-    if all(run.protocol.control == "rate" for run in (*data.fit, *data.held_out)):
+    followed = ("rate", "steady")
+    if all(run.protocol.control in followed for run in (*data.fit, *data.held_out)):
         return data
     fit = replace(data.fit, runs=tuple(at_measured_rate(run) for run in data.fit))
     held, aside = [], dict(data.dataset.set_aside)

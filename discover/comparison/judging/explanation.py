@@ -105,7 +105,7 @@ def _left(
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
-    residuals, records, rates = [], [], []
+    residuals, records, rates, even = [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
         for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
@@ -116,10 +116,12 @@ def _left(
                 nan = float("nan")
                 reason = f"the law runs away in {flow.name}, a run that it was learned from"
                 return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
-            residuals.append(np.asarray(prediction[quantity] - record, dtype=float))
-            records.append(np.asarray(record, dtype=float))
+            record = np.asarray(record, dtype=float)
+            residuals.append(prediction[quantity] - record)
+            records.append(record)
+            even.append(flow.even(record))
             rates.append(np.asarray(flow.rate, dtype=float))
-    found = lack_of_fit(residuals, records, expectation, rates)
+    found = lack_of_fit(residuals, records, expectation, rates, even)
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"

@@ -27,8 +27,7 @@ from discover.identify.soundness.physics import mean_relaxation_time
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
-from discover.protocols.protocol import stack_protocols
-from discover.simulate.grid import make_grids
+from discover.simulate.flow_batch import lay_out
 from discover.study.declared_model import DeclaredModel
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
@@ -279,8 +278,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     times = [_thinned(flow.times) for flow in along]
     return check_physics(
         fluid,
-        stack_protocols(protocols),
-        make_grids(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
+        lay_out(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
         [flow.title for flow in along],
         weissenberg,
         # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
@@ -290,6 +288,8 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
 def _frequency(flow: Flow) -> float:
     """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
+    if flow.is_steady:
+        return 0.0
     whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
     return max(whole, flow.frequency or 0.0)
 

@@ -67,7 +67,7 @@ def _outliers(
     told = [(flow, row) for flow in unseen if (row := _residual(outcome, flow)) is not None]
     if not told:
         return {}
-    records = [np.asarray(flow.reference["sigma12"], dtype=float) for flow, _ in told]
+    records = [_record(flow) for flow, _ in told]
     left = what_is_left([row for _, row in told], records, expectation)
     pairs = zip(told, left.outlier_samples, strict=True)
     return {flow.key: samples for (flow, _), samples in pairs if samples}
@@ -89,7 +89,7 @@ def _refuted(
         if residual is None:
             return f"the law runs away in {flow.name}, a run held out"
         residuals.append(residual)
-        records.append(np.asarray(flow.reference["sigma12"], dtype=float))
+        records.append(_record(flow))
     # knocks in a run held out refute no law, as they do not where it was fitted
     knocks = [list(outliers.get(flow.key, ())) for flow in unseen]
     residuals, records, columns = (
@@ -101,7 +101,7 @@ def _refuted(
     if missed <= max(ARITHMETIC, STRUCTURE * outcome.resolution):
         return ""
     fitted = [row for flow in training if (row := _residual(outcome, flow)) is not None]
-    known = [np.asarray(flow.measured, dtype=float) for flow in training]
+    known = [_record(flow) for flow in training]
     against = Unseen(residuals, records, columns, noise_model(fitted).correlation)
     told = all(len(column) for column in columns)  # how uncertain the constants are
     if told and refutes(against, fitted, known, expectation):
@@ -117,24 +117,35 @@ def _refuted(
     return ""
 
 
+def _measured(flow: Flow) -> np.ndarray:
+    record = flow.measured if flow.kind == "training" else flow.reference["sigma12"]
+    return np.asarray(record, dtype=float)
+
+
+def _record(flow: Flow) -> np.ndarray:
+    """Return what was measured, so told that noise has one size in all of it."""
+    return flow.even(_measured(flow)) * _measured(flow)
+
+
 def _residual(outcome: LearnerOutcome, flow: Flow) -> np.ndarray | None:
     predicted = outcome.predictions.get(flow.key)
-    record = flow.measured if flow.kind == "training" else flow.reference["sigma12"]
-    if predicted is None or record is None or not np.all(np.isfinite(predicted["sigma12"])):
+    record = _measured(flow)
+    if predicted is None or not np.all(np.isfinite(predicted["sigma12"])):
         return None
-    return np.asarray(predicted["sigma12"] - record, dtype=float)
+    return flow.even(record) * (predicted["sigma12"] - record)
 
 
 def _columns(outcome: LearnerOutcome, flow: Flow, band: PredictionBand | None) -> np.ndarray:
     """Return changes of σ12 by one standard deviation each, shape (directions, n); (0, n): none."""
+    even = flow.even(_measured(flow))
     if outcome.learner == "tensor_sindy":
         directions = None if band is None else band.directions
-        return np.zeros((0, len(flow.times))) if directions is None else directions
+        return np.zeros((0, len(flow.times))) if directions is None else even * directions
     limits = outcome.bands.get(flow.key)
     if limits is None:
         return np.zeros((0, len(flow.times)))
     low, high = limits["sigma12"]
-    return (high - low)[None] / (2.0 * _HALF_BAND)
+    return even * (high - low)[None] / (2.0 * _HALF_BAND)
 
 
 def _size(values: np.ndarray) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
-from discover.dataset.run import Run
+from discover.dataset.run import Run, sizes_of
 from discover.laws.multimode import Fluid
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
 from discover.protocols.protocol import FlowProtocol, oscillatory_shear, recorded_at, shear_rates
@@ -93,6 +93,24 @@ class Flow:
         return self.protocol.flow == "shear"
 
     @property
+    def is_steady(self) -> bool:
+        """Whether it is a flow curve: each sample a steady state, and time counts them."""
+        return self.protocol.control == "steady"
+
+    @property
+    def along(self) -> Float[np.ndarray, " n"]:
+        """What the record is drawn against: time in s, of a flow curve the rate in 1/s."""
+        return self.rate if self.is_steady else self.times
+
+    def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Return by what a record and its residual are multiplied so that noise has one size.
+
+        Ones but for a flow curve, whose noise is in proportion to each value.
+        """
+        size = sizes_of(record, self.protocol)
+        return np.min(size) / size
+
+    @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
         amplitudes = np.asarray(self._imposed.amplitudes)
@@ -106,7 +124,9 @@ class Flow:
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
-        """Strain since the first sample, shape (n,)."""
+        """Strain since the first sample, shape (n,); nan of steady states, which do not know it."""
+        if self.is_steady:
+            return np.full(self.times.shape, np.nan)
         return cumulative_simpson(self.rate, x=self.times, initial=0.0)
 
     @property
@@ -119,7 +139,7 @@ class Flow:
             i = int(np.flatnonzero(amplitudes)[0])
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
-        if not np.any(amplitudes) and rates.size == 1:
+        if not np.any(amplitudes) and rates.size == 1 and not self.is_steady:
             if self._imposed.flow != "shear":
                 return f"{self._imposed.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
@@ -186,6 +206,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
             "N2": run.second_normal_stress_difference,
         }
         reference = {key: value for key, value in candidates.items() if value is not None}
+    steady = run.protocol.control == "steady"
     return Flow(
         run.name,
         kind,
@@ -195,7 +216,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference,
         run.recorded if kind == "training" else None,
         is_truth=exact is not None,
-        training_end=float(run.time[-1]) if kind == "training" else None,
+        training_end=float(run.time[-1]) if kind == "training" and not steady else None,
         oscillatory=_oscillates(run.protocol, run.rate),
     )
 

@@ -95,7 +95,8 @@ def place(flow: Flow, training: Sequence[Flow]) -> Placement:
 
 
 def _largest(values: np.ndarray) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
+    # a flow curve says nothing of strain, its states have gone through any
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 def _ratio(value: float, others: Sequence[float]) -> float:

@@ -106,6 +106,7 @@ def weak_directions(
     exact = [
         _direction(names, vector, observed, quantities, n_observations, True)
         for vector in _sparse_basis(right[null] / scale)
+        if np.any(vector)  # of fewer samples than terms, elimination may use a direction up
     ]
     near = [
         _direction(names, vector / scale, observed, quantities, n_observations, False)

@@ -25,8 +25,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol
-from discover.simulate.grid import IntegrationGrid
+from discover.simulate.flow_batch import FlowBatch
 
 _ROUNDING = 1e-6
 """Size below zero that integration error alone may give."""
@@ -122,8 +121,7 @@ class PhysicsReport(SentenceAndTable):
 
 def check_physics(
     fluid: Fluid,
-    protocols: FlowProtocol,
-    grids: IntegrationGrid,
+    flows: FlowBatch,
     names: Sequence[str],
     weissenberg: float,
     deborah: float,
@@ -134,16 +132,15 @@ def check_physics(
     ----------
     fluid
         The fluid.
-    protocols, grids
-        Flows along which stresses are looked at, batched, as from `stack_protocols` and
-        `make_grids`.
+    flows
+        Flows along which stresses are looked at.
     names
         Of the flows.
     weissenberg, deborah
         Largest shear rate and frequency of training, times the mean relaxation time: the corner of
         the box beyond which the law extrapolates.
     """
-    along = trajectories(fluid, protocols, grids)
+    along = trajectories(fluid, flows)
     beyond = cycles(
         fluid,
         [weissenberg * factor for factor in _BOX_FACTORS],

@@ -11,9 +11,8 @@ from jaxtyping import Float
 
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.protocol import FlowProtocol, oscillatory_shear
-from discover.simulate.flow_batch import lay_out
-from discover.simulate.grid import IntegrationGrid
+from discover.protocols.protocol import oscillatory_shear
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import solve_batch, solve_states_on_grid
 
 _CYCLES = 3
@@ -46,18 +45,18 @@ class Trajectories:
         return run, float(values[run])
 
 
-def trajectories(fluid: Fluid, protocols: FlowProtocol, grids: IntegrationGrid) -> Trajectories:
+def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
     """Return conformation and dissipation of a fluid along flows.
 
     Parameters
     ----------
     fluid
         The fluid.
-    protocols, grids
-        Batched flows.
+    flows
+        The flows.
     """
-    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, protocols, grids))
-    sampled = np.asarray(grids.sample_mask)[..., None]
+    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
+    sampled = np.asarray(flows.sample_mask)[..., None]
     whole = np.all(np.isfinite(states), axis=(1, 2, 3))
     smallest = np.where(sampled, smallest, np.inf).min(axis=(1, 2))
     # without a positive definite conformation the stored energy is not defined
@@ -68,7 +67,7 @@ def trajectories(fluid: Fluid, protocols: FlowProtocol, grids: IntegrationGrid) 
 
 
 @compiled
-def _along(fluid, protocols, grids):
+def _along(fluid, flows):
     def one(protocol, grid):
         states = solve_states_on_grid(fluid, protocol, grid)
         rates = jax.vmap(protocol.rate)(grid.times[grid.sample_index])
@@ -77,7 +76,7 @@ def _along(fluid, protocols, grids):
         smallest, dissipation = jax.vmap(at_mode)(states, scaled)
         return states, smallest, dissipation
 
-    return jax.vmap(one)(protocols, grids)
+    return flows.over(one)
 
 
 def _energy(law, stress, rate):

@@ -9,6 +9,7 @@ from matplotlib.patches import Patch
 
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
+from discover.dataset.run import sizes_of
 from discover.learners.registry import learner_title
 from discover.report.plots.comparison.flows import units
 from discover.report.plots.loop.runs import along_in_common, models_of, shortened
@@ -78,6 +79,8 @@ def loop_residual_map(result: LoopResult) -> Picture | None:
 def comparison_residual_map(comparison: Comparison) -> Picture | None:
     """Return the residual of σ12 in the training runs: of the known part, and of each learner."""
     flows = [flow for flow in comparison.flows_of("training") if flow.measured is not None]
+    in_time = [flow for flow in flows if not flow.is_steady]
+    flows = in_time or flows  # what goes on in time and what does not share no axis
     everyone = {"before": comparison.before}
     everyone |= {learner_title(n): o.predictions for n, o in comparison.outcomes.items()}
     panels = {}
@@ -86,17 +89,18 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
         for flow in flows:
             prediction, measured = predictions[flow.key], flow.measured
             if prediction is not None and measured is not None:
-                size = float(np.sqrt(np.mean(measured**2))) or 1.0
-                values = (prediction["sigma12"] - measured) / size
+                values = (prediction["sigma12"] - measured) / sizes_of(measured, flow.protocol)
                 if not np.all(np.isfinite(values)):
                     continue
-                rows.append(ResidualRow(flow.title, flow.times, values))
+                rows.append(ResidualRow(flow.title, flow.along, values))
         if rows:
             panels[title] = rows
     if max(map(len, panels.values()), default=0) < 2:  # streaks are seen across runs
         return None
-    logarithmic = all(runs_through_decades(f.times, f.rate) for f in flows)
-    return _draw(panels, units(comparison)[1], logarithmic, "in the order of the data")
+    states = all(flow.is_steady for flow in flows)
+    logarithmic = states or all(runs_through_decades(f.times, f.rate) for f in flows)
+    label = units(comparison)[2 if states else 1]
+    return _draw(panels, label, logarithmic, "in the order of the data")
 
 
 def _draw(

@@ -100,7 +100,7 @@ def start_up_picture(
     comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
 ) -> Picture:
     """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
-    stress_unit, time_label, _ = units(comparison)
+    stress_unit, time_label, rate_label = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
     with figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
@@ -109,14 +109,16 @@ def start_up_picture(
         for panel, quantity in zip(axes[0], quantities, strict=True):
             for label, style, stresses in curves(comparison, flow, overlays):
                 if quantity in stresses:
-                    panel.plot(flow.times[shown], stresses[quantity][shown], label=label, **style)
+                    panel.plot(flow.along[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
             _mark_open(panel, comparison, quantity)
             _frame(panel, comparison, flow, quantity, shown)
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
-            panel.set_xlabel(time_label)
-            if not flow.is_truth and runs_through_decades(flow.times, flow.rate):
+            panel.set_xlabel(rate_label if flow.is_steady else time_label)
+            if flow.is_steady:
+                _make_decades(panel, quantity)
+            elif not flow.is_truth and runs_through_decades(flow.times, flow.rate):
                 make_logarithmic(panel.xaxis)
         legend_above(drawing, axes)
         return picture(
@@ -129,7 +131,7 @@ def start_up_picture(
 def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
-    stress_unit, time_label, _ = units(comparison)
+    stress_unit, time_label, rate_label = units(comparison)
     recorded = recorded_symbol(flow.protocol.quantity for flow in flows)
     columns = min(4, len(flows))
     rows = -(-len(flows) // columns)
@@ -138,20 +140,23 @@ def training_picture(comparison: Comparison) -> Picture:
             panel.set_visible(False)
         for panel, flow in zip(axes.ravel(), flows, strict=False):
             if flow.measured is not None:
-                panel.plot(flow.times, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
+                panel.plot(flow.along, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
                     style = learner_style(name)
                     panel.plot(
-                        flow.times, prediction["sigma12"], label=learner_title(name), **style
+                        flow.along, prediction["sigma12"], label=learner_title(name), **style
                     )
             _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
-            if runs_through_decades(flow.times, flow.rate):
+            if flow.is_steady:
+                _make_decades(panel, "sigma12")
+                panel.set_xlabel(rate_label)
+            elif runs_through_decades(flow.times, flow.rate):
                 make_logarithmic(panel.xaxis)
-        for panel in axes[-1]:
-            panel.set_xlabel(time_label)
+        for panel, flow in zip(axes[-1], flows[(rows - 1) * columns :], strict=False):
+            panel.set_xlabel(rate_label if flow.is_steady else time_label)
         for panel in axes[:, 0]:
             panel.set_ylabel(recorded + stress_unit)
         legend_above(drawing, axes)
@@ -182,9 +187,9 @@ _FITTING_AS_WELL = {
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
     """Shade what the data leave open: the intervals of the parameters, rivals, and members.
 
-    Against time, or against what is given of the samples shown.
+    Against time, of a flow curve the rate, or against what is given of the samples shown.
     """
-    along = flow.times[shown] if along is None else along
+    along = flow.along[shown] if along is None else along
     for name, label in _FITTING_AS_WELL.items():
         outcome = comparison.outcomes.get(name)
         limits = None if outcome is None else outcome.bands.get(flow.key)
@@ -216,6 +221,14 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     )
 
 
+def _make_decades(panel, quantity: str) -> None:
+    """Show a flow curve in decades of rate, and of the stress where it has one sign."""
+    make_logarithmic(panel.xaxis)
+    if quantity != "N2":
+        panel.set_yscale("log")
+        panel.autoscale(axis="y")
+
+
 def _mark_training(panel, flow: Flow) -> None:
     if flow.training_end is not None and flow.training_end < flow.times[-1]:
         panel.axvspan(
@@ -234,6 +247,8 @@ def _mark_open(panel, comparison: Comparison, quantity: str) -> None:
 
 def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
     """Let truth and learners, not what came before, decide the range."""
+    if flow.is_steady and quantity != "N2":
+        return  # in decades what came before hides nothing
     values = [
         stresses[quantity][shown]
         for label, _, stresses in curves(comparison, flow)

@@ -1,0 +1,95 @@
+"""Learners on flow curves: steady states in the place of a rate in time."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import Giesekus, start_up
+
+import discover as dc
+from discover.learners.tbnn_ude.initial_law import initial_law
+from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
+from discover.learners.tbnn_ude.variational import states_and_jacobian
+from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.sensitivities import linearise
+from discover.protocols.control import steady_rates
+from tensor_library.library import build_library
+
+LIBRARY = build_library(degree=0)
+RATES = np.geomspace(0.1, 20.0, 24)
+SLOW = RATES[RATES < 2.0]  # in faster flow the stress of a trial law bends too fast for differences
+MOBILITY, NOISE = 0.3, 0.01
+
+
+def flow_curve(noise=0.0, rates=RATES):
+    """Where start-ups of a Giesekus fluid end by scipy, with noise in proportion."""
+    material = Giesekus(MOBILITY)
+    stress = [material.respond(start_up(r), np.linspace(0.0, 40.0, 3)).sigma12[-1] for r in rates]
+    off = 1.0 + noise * np.random.default_rng(0).standard_normal(rates.size)
+    counted = np.arange(1.0, rates.size + 1.0)
+    return dc.Run("flow_curve.csv", counted, steady_rates(rates), rates, np.array(stress) * off)
+
+
+def start(rate=2.0):
+    times = np.linspace(0.05, 8.0, 40)
+    stress = Giesekus(MOBILITY).respond(start_up(rate), times).sigma12
+    return dc.Run("start.csv", times, dc.start_up(rate), np.full(times.size, rate), stress)
+
+
+def test_sensitivities_of_a_flow_curve_beside_a_transient_are_its_differences():
+    problem = make_problem([flow_curve(rates=SLOW), start()], LIBRARY)
+    at = jnp.zeros(len(LIBRARY)).at[LIBRARY.names.index("sigma.sigma")].set(0.2)
+    nothing = jnp.zeros(0)
+    residual, columns = linearise(problem, at, nothing)
+    step = 1e-5  # the difference errs by its square, and by rounding over it
+    for i in range(len(LIBRARY)):
+        moved = [linearise(problem, at.at[i].add(s), nothing)[0] for s in (step, -step)]
+        # the residual is data less prediction
+        np.testing.assert_allclose(
+            -columns[:, i], (moved[0] - moved[1]) / (2.0 * step), rtol=1e-5, atol=1e-7
+        )
+    # at the law that made them both are reproduced
+    right = at.at[LIBRARY.names.index("sigma.sigma")].set(MOBILITY)
+    assert float(jnp.linalg.norm(linearise(problem, right, nothing)[0])) < 1e-5
+    assert float(jnp.linalg.norm(residual)) > 0.05
+
+
+def test_the_network_is_told_of_steady_states_as_their_differences_say():
+    problem = make_training_problem([flow_curve(rates=SLOW), start()], np.ones(1), np.ones(1))
+    law = initial_law(jax.random.key(0), 3, True, jnp.ones(8))
+    last = 0.01 * jax.random.normal(jax.random.key(1), law.network.layers[-1].weight.shape)
+    law = eqx.tree_at(  # a fluid that is nearly a Giesekus one
+        lambda tree: (tree.network.layers[-1].weight, tree.constants),
+        law,
+        (last, jnp.zeros(8).at[3].set(MOBILITY)),
+    )
+    rebuild = Rebuild.everything(law)
+    weights = rebuild.start
+    states, jacobian = states_and_jacobian(weights, rebuild, problem)
+    direction = jax.random.normal(jax.random.key(2), weights.shape)
+    step = 1e-5
+    ends = [
+        problem.misses(states_and_jacobian(weights + s * direction, rebuild, problem)[0])
+        for s in (step, -step)
+    ]
+    expected = (ends[0] - ends[1]) / (2.0 * step)
+    size = float(jnp.max(jnp.abs(expected)))
+    np.testing.assert_allclose(jacobian @ direction, expected, atol=1e-6 * size)
+    assert bool(jnp.all(jnp.isfinite(states)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("known", [0.0, MOBILITY])
+def test_a_flow_curve_alone_gives_the_mobility_that_made_it_and_nothing_that_is_known(known):
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": known}), 1.0, 1.0)
+    sindy = dc.TensorSINDy(base=base, library=LIBRARY).fit([flow_curve(NOISE)])
+    terms = {term.term: term for term in sindy.terms_}
+    if known:  # the control
+        assert not terms
+        return
+    assert list(terms) == ["sigma.sigma"]
+    low, high = terms["sigma.sigma"].ci95
+    assert low <= MOBILITY <= high
+    assert high - low < 0.05
