@@ -50,7 +50,8 @@ def draw_case(index: int, seed: int) -> tuple[str, str, PlantedCase]:
     noise = Noise(NOISE, CORRELATION if generator.random() < 1 / 3 else 0.0)
     # what the base law has already is not undeclared
     own = {"giesekus": "giesekus_mobility"}.get(law)
-    names = [name for name in named_effects() if name != own]
+    # nor is what the loop tries on request alone among its answers
+    names = [n for n, effect in named_effects().items() if n != own and not effect.on_request]
     while True:
         options = {"noise": noise, "seed": int(generator.integers(2**31))}
         size = float(np.exp(generator.uniform(np.log(SMALLEST), np.log(LARGEST))))

@@ -36,7 +36,11 @@ Bounds = Mapping[int, tuple[float, float]]
 
 
 def stage_of(
-    search: Search, name: str, bounds: Bounds, error: ErrorPair, by_mode: ConstantByMode | None
+    search: Search,
+    name: str,
+    bounds: tuple[Bounds, Bounds],
+    error: ErrorPair,
+    by_mode: ConstantByMode | None,
 ) -> Stage:
     """Return one effect of the final model, as a stage of the way to it.
 
@@ -47,7 +51,7 @@ def stage_of(
     name
         Name of the effect.
     bounds
-        Intervals of the final model.
+        Intervals given the effects of the final model, and over all explanations.
     error
         Errors once this effect was added.
     by_mode
@@ -56,7 +60,9 @@ def stage_of(
     model, fit = search.model, search.fit
     effect = next(e for e in model.effects if e.name == name)
     parameters = {
-        p.name: StageParameter(float(fit.theta[at]), bounds[at], p.unit)
+        p.name: StageParameter(
+            float(fit.theta[at]), bounds[1][at], p.unit, ci95_given_effects=bounds[0][at]
+        )
         for p, at in zip(effect.parameters, model.positions(name), strict=True)
     }
     if by_mode is not None:
@@ -79,7 +85,7 @@ def stage_of(
 
 
 def declared_parameters(
-    declared: DeclaredModel, fit: Fit, bounds: Bounds
+    declared: DeclaredModel, fit: Fit, bounds: tuple[Bounds, Bounds]
 ) -> dict[str, StageParameter]:
     """Return the fitted constants of the declared model, in their units.
 
@@ -87,8 +93,10 @@ def declared_parameters(
     ----------
     declared
         The declared model.
-    fit, bounds
-        The final fit and its intervals.
+    fit
+        The final fit.
+    bounds
+        Intervals given its effects, and over all explanations.
     """
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
     # of several modes only a common factor is fitted, which has no unit
@@ -101,13 +109,15 @@ def declared_parameters(
     }
     out: dict[str, StageParameter] = {}
     for at in declared.free_positions:
-        values = np.array([fit.theta[at], *bounds[at]])
+        values = np.array([fit.theta[at], *bounds[1][at], *bounds[0][at]])
         name, scale, unit = constants.get(at) or (named[at], 1.0, "")
         if at in constants:
             # fitted as the logarithm of a factor
             values = scale * np.exp(values)
-        value, low, high = (float(v) for v in values)
-        out[name] = StageParameter(value, (low, high), unit)
+        value, low, high, *given = (float(v) for v in values)
+        out[name] = StageParameter(
+            value, (low, high), unit, ci95_given_effects=(given[0], given[1])
+        )
     return out
 
 

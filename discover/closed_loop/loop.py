@@ -17,6 +17,7 @@ from discover.closed_loop.explanations import (
     carry,
     explain,
     next_tests,
+    over_explanations,
     with_band,
 )
 from discover.closed_loop.explanations.limits import names_of_limits
@@ -211,23 +212,25 @@ def run_loop(
     limits = names_of_limits(model, batch, fitted_runs, current, active)
     for name, other in limits.items():
         search.aliases[name] = (*search.aliases.get(name, ()), other)
+    side_by_side = Explanations()
+    if carried:
+        side_by_side = explain(
+            model, batch, carried, current, (fitted_runs, held_runs), held_batch, judgement,
+            min((one.criterion for one in times), default=np.inf),
+        )  # fmt: skip
+    over_all = over_explanations(bounds, model, current, carried, side_by_side)
     stages = tuple(
-        stage_of(search, name, bounds, errors_of(records, i), by_mode.get(name))
+        stage_of(search, name, (bounds, over_all), errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)
     )
     spikes = with_later_spikes(spikes, fitted_runs, judgement)
-    side_by_side, forms, following = Explanations(), (), NextTests()
+    forms, following = (), NextTests()
     if carried:
-        runs = (fitted_runs, held_runs)
         tried = [effect.name for effect in candidates if search.admitted(effect)]
         # what explains the fitted runs and not those held out lacks no curve of the fitted ones
         if judgement.structured and judgement.carries_over:
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
             forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
-        side_by_side = explain(
-            model, batch, carried, current, runs, held_batch, judgement,
-            min((one.criterion for one in times), default=np.inf),
-        )  # fmt: skip
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
@@ -260,7 +263,7 @@ def run_loop(
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
-        declared_parameters=declared_parameters(declared, current, bounds) | of_law,
+        declared_parameters=declared_parameters(declared, current, (bounds, over_all)) | of_law,
         declared_effects=declared_effects(model, current, bounds, by_mode),
         declared_law=None if differ & {*of_law} else declared_law(declared, current),
         explanations=side_by_side,

@@ -3,11 +3,13 @@
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry
 from discover.closed_loop.explanations.report import explain, with_band
 from discover.closed_loop.explanations.telling_apart import next_tests
+from discover.closed_loop.explanations.wider_intervals import over_explanations
 
 __all__ = [
     "BEAM_WIDTH",
     "carry",
     "explain",
     "next_tests",
+    "over_explanations",
     "with_band",
 ]

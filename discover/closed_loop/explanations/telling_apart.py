@@ -63,17 +63,17 @@ def next_tests(
     judgement
         Of what the search chose.
     """
-    contenders = _contenders(carried, explanations)
-    if len(contenders) < 2 or explanations.unexplained_probability > _NOT_BELIEVED:
+    weighed = contenders(carried, explanations)
+    if len(weighed) < 2 or explanations.unexplained_probability > _NOT_BELIEVED:
         return NextTests()
-    share = np.array([p for _, p in contenders])
+    share = np.array([p for _, p in weighed])
     share = share / np.sum(share)
-    varied = [_varied(model, one, batch) for one, _ in contenders]
+    varied = [_varied(model, one, batch) for one, _ in weighed]
     kept = [i for i, run in enumerate(runs) if run.protocol.control == "rate"]
-    summary = summarise(contenders[0][0].fit.residual, np.asarray(batch.weight))
+    summary = summarise(weighed[0][0].fit.residual, np.asarray(batch.weight))
     # what they leave of the fitted runs is not independent from sample to sample
     fresh = min(summary.effective_samples / sum(len(run) for run in runs), 1.0)
-    left = float(np.sqrt(np.mean(contenders[0][0].fit.run_errors ** 2)))
+    left = float(np.sqrt(np.mean(weighed[0][0].fit.run_errors ** 2)))
     noise = max(judgement.left.noise, left)
     longest = float(np.max(np.asarray(model.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
@@ -92,11 +92,11 @@ def next_tests(
             found.append(_weighed(test, seen, share, noise, fresh))
     told = [one for one in found if one is not None]
     told.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
-    names = tuple(one.effects for one, _ in contenders)
+    names = tuple(one.effects for one, _ in weighed)
     return NextTests(names, tuple(map(float, share)), noise, tuple(told))
 
 
-def _contenders(
+def contenders(
     carried: Sequence[Carried], explanations: Explanations
 ) -> list[tuple[Carried, float]]:
     """Return what may be the explanation, twins each by itself, and how probable each is."""

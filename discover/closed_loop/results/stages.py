@@ -1,6 +1,6 @@
 """What a closed loop added or found declared, stage by stage, and without each run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -10,11 +10,24 @@ Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal
 
 @dataclass(frozen=True)
 class StageParameter:
-    """A parameter of an effect as finally fitted, with its 95 % interval."""
+    """A parameter of an effect as finally fitted.
+
+    Attributes
+    ----------
+    value
+        That of the effects that were found.
+    ci95
+        95 % interval over all explanations that have the parameter.
+    unit
+        Of both.
+    ci95_given_effects
+        95 % interval if these effects are the right ones; None where only this one is known.
+    """
 
     value: float
     ci95: tuple[float, float]
     unit: str
+    ci95_given_effects: tuple[float, float] | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,72 @@
+"""Intervals of constants that hold whichever of the explanations is the right one."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.telling_apart import contenders
+from discover.closed_loop.results.explanation import Explanations
+from discover.forward import AugmentedModel
+from discover.forward.least_squares import Fit
+
+Bounds = Mapping[int, tuple[float, float]]
+
+_LEVELS = (0.025, 0.975)
+_HALF = float(norm.ppf(_LEVELS[1]))
+
+
+def over_explanations(
+    bounds: Bounds,
+    model: AugmentedModel,
+    fit: Fit,
+    carried: Sequence[Carried],
+    explanations: Explanations,
+) -> dict[int, tuple[float, float]]:
+    """Return 95 % intervals of constants over all explanations that have them.
+
+    An interval beside one set of effects takes that set for granted. With another, or with a twin
+    of one effect that leaves these records alike, the same constant often has another value. Each
+    explanation counts with its probability, and with the width of the interval that is given; the
+    given interval always lies within.
+
+    Parameters
+    ----------
+    bounds
+        Intervals by position, given the effects of the fit.
+    model, fit
+        With all candidates; what the search ended with.
+    carried, explanations
+        Sets of effects, and how probable each is.
+    """
+    weighed = contenders(carried, explanations)
+    found = dict(bounds)
+    own = {at: effect.name for effect in model.effects for at in model.positions(effect.name)}
+    for at, (low, high) in bounds.items():
+        having = [
+            (one.fit.theta[at], weight)
+            for one, weight in weighed
+            if at not in own or own[at] in one.effects
+        ]
+        value = float(fit.theta[at])
+        if having and low < value < high and np.isfinite([low, high]).all():
+            values, weights = np.array(having, dtype=float).T
+            ends = _ends(values, weights / np.sum(weights), value - low, high - value)
+            found[at] = (min(low, ends[0]), max(high, ends[1]))
+    return found
+
+
+def _ends(values, weights, below: float, above: float) -> tuple[float, float]:
+    """Return the ends of the interval of a mixture, each of two halves of a normal distribution."""
+
+    def share(x: float) -> float:
+        off = x - values
+        scaled = _HALF * off / np.where(off < 0.0, below, above)
+        return float(np.sum(weights * norm.cdf(scaled)))
+
+    far = 4.0 * max(below, above)
+    span = float(np.min(values)) - far, float(np.max(values)) + far
+    low, high = (brentq(lambda x, level=level: share(x) - level, *span) for level in _LEVELS)
+    return float(low), float(high)
