@@ -123,6 +123,31 @@ def _creep(table: Table) -> Run:
     )
 
 
+def read_over_time(
+    path: Path, kind: str
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return times in s and the material function of a table over time.
+
+    Parameters
+    ----------
+    path
+        Of the table.
+    kind
+        ``relaxation``, in Pa, or ``creep``, in 1/Pa.
+
+    Raises
+    ------
+    InputError
+        If it is wrong.
+    """
+    quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
+    table = read_table(path)
+    time, values = table.required(units.TIME), table.required(quantity)
+    _require_positive(table, time, "time")
+    order = np.argsort(time, kind="stable")  # clocks that are written short repeat themselves
+    return time[order], values[order]
+
+
 def _amplitude_sweep(table: Table) -> Run:
     strain, frequency = table.required(units.STRAIN), table.required(units.ANGULAR_FREQUENCY)
     _require_positive(table, strain, "strain")
