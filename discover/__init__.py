@@ -42,6 +42,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.protocols import in_flow as in_flow
     from discover.protocols import measured_rate as measured_rate
     from discover.protocols import oscillatory_shear as oscillatory_shear
+    from discover.protocols import sampled_rate as sampled_rate
     from discover.protocols import start_up as start_up
     from discover.protocols import step_rates as step_rates
     from discover.simulate import synthetic_dataset as synthetic_dataset
@@ -81,6 +82,7 @@ __all__ = [
     "register_importer",
     "register_law",
     "register_learner",
+    "sampled_rate",
     "start_up",
     "step_rates",
     "synthetic_dataset",
@@ -114,6 +116,7 @@ _PLACES = {
         "in_flow",
         "measured_rate",
         "oscillatory_shear",
+        "sampled_rate",
         "start_up",
         "step_rates",
     ),

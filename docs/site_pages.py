@@ -29,8 +29,8 @@ REFERENCE = {
     ),
     "flows": (
         "Flows",
-        "start_up step_rates oscillatory_shear measured_rate in_flow after_step_strain "
-        "after_alternation after_steady_flow",
+        "start_up step_rates oscillatory_shear measured_rate sampled_rate in_flow "
+        "after_step_strain after_alternation after_steady_flow",
     ),
     "laws": ("Fluids and laws", "laws make_law Fluid AbstractConstitutiveLaw"),
     "learners": ("Learners", "TensorSINDy TBNNUDE TensorDense load build_library ClosedForm"),

@@ -147,7 +147,7 @@ def shift(
         float | None, typer.Option("--reference", help="In °C; by default the middle one.")
     ] = None,
     vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli too, not only frequencies.")
+        bool, typer.Option("--vertical", help="Shift moduli too, not only time.")
     ] = False,
     between: Annotated[
         tuple[float, float] | None,
@@ -156,15 +156,13 @@ def shift(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Move linear sweeps at several temperatures to one, and say how well that holds."""
-    from discover.dataset.linear_agreement import linear_agreements
-    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
-    from discover.dataset.superposition import read_temperatures, shift_table, superpose
-    from discover.report.data.superposition import (
-        agreement_words,
-        superposition_page,
-        superposition_words,
-    )
+    """Move linear tests at several temperatures to one, and say how well that holds."""
+    from discover.dataset.linear_tests import read_linear_tests
+    from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
+    from discover.dataset.moving import move_tests
+    from discover.dataset.superposition import shift_table
+    from discover.report.data.linear_agreement import agreement_words
+    from discover.report.data.superposition import superposition_page, superposition_words
     from discover.study.atomic import make_folder, write_text
 
     if out is None:
@@ -173,36 +171,37 @@ def shift(
     root = next((place for place in places if (place / TESTS_FILE).is_file()), None)
     if root is None:
         raise InputError(
-            f"{folder} holds no {TESTS_FILE}, which lists sweeps at several temperatures. Import "
+            f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
             f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
         )
-    sweeps = read_temperatures(root)
-    if between is not None:
-        low, high = min(between), max(between)
-        sweeps = {degrees: one for degrees, one in sweeps.items() if low <= degrees <= high}
-    found = superpose(sweeps, reference, vertical)
+    moved = move_tests(read_linear_tests(root), reference, vertical, between)
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    if not overwrite and os.path.lexists(out / SWEEP_FILE):
-        raise InputError(f"{out} holds a {SWEEP_FILE} already. Use --overwrite, or another --out.")
+    there = [name for name in moved.files if os.path.lexists(out / name)]
+    if not overwrite and there:
+        raise InputError(f"{out} holds a {there[0]} already. Use --overwrite, or another --out.")
+    found = moved.found
     write_text(out / "shift_factors.csv", shift_table(found))
-    agreements = linear_agreements(root, sweeps)
-    text = superposition_page(found, root.resolve().name, agreements)
+    text = superposition_page(found, root.resolve().name, moved.agreements, moved.own)
     page = write_text(out / "report.html", text)
-    whole = found.verdict != "not_superposed"
-    if whole:
-        write_text(out / SWEEP_FILE, found.master.to_dataframe().to_csv(index=False))
-    else:
-        (out / SWEEP_FILE).unlink(missing_ok=True)
-    words = [*superposition_words(found), *agreement_words(agreements)]
+    for name, table in moved.files.items():
+        if table is None:
+            (out / name).unlink(missing_ok=True)
+        else:
+            write_text(out / name, table.to_dataframe().to_csv(index=False))
+    words = [*superposition_words(found, moved.own), *agreement_words(moved.agreements)]
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
         typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))
         return
     for sentence in words:
         say(sentence)
-    say(f"{out}: {'' if whole else f'no {SWEEP_FILE}; '}shift_factors.csv and {page} written.")
+    without = [name for name, table in moved.files.items() if table is None]
+    written = [name for name, table in moved.files.items() if table is not None]
+    lacking = f"no {' and no '.join(without)}; " if without else ""
+    listed = ", ".join([*written, "shift_factors.csv"])
+    say(f"{out}: {lacking}{listed} and {page} written.")
 
 
 @data_app.command("import")

@@ -1,51 +1,41 @@
-"""Whether a linear sweep predicts relaxation and creep, as one spectrum has to."""
+"""Whether linear tests predict one another, as one spectrum has to."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
-from scipy.special import exprel
 
-from discover.dataset import units
-from discover.dataset.linear_viscoelasticity import (
-    LinearSweep,
-    RelaxationSpectrum,
-    relaxation_spectrum,
-)
-from discover.dataset.load import TESTS_FILE
-from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
-from discover.dataset.table import read_table
+from discover.dataset.linear_spectra import predicted, spectrum_of
+from discover.dataset.linear_tests import SWEEP, LinearTest, Tests
+from discover.errors import InputError
 
 AGREES = 0.1
 """Root-mean-square relative error up to which two linear tests agree: two loadings and two kinds of
 test rarely differ by less than some per cent."""
 
-_QUANTITIES = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}
-_FEWEST = 3
-
-Values = Float[np.ndarray, " n"]
+_FEWEST = 4
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How well the modes of a sweep predict another linear test.
+    """How well the modes of one linear test predict another.
 
     Attributes
     ----------
+    source
+        The test that the modes come from: ``lve``, ``relaxation`` or ``creep``.
     test
-        ``relaxation`` or ``creep``.
+        The one predicted.
     celsius
         Temperature of both.
     error
-        Root-mean-square relative error of the prediction over the times that the sweep reaches.
+        Root-mean-square relative error of the prediction over the times that the source reaches.
     bias
         Mean relative error over them: a gain of one of the two shows here.
     times
-        First and last of those times, in s.
+        First and last of those times in s, 1/ω for a sweep.
     """
 
+    source: str
     test: str
     celsius: float
     error: float
@@ -63,63 +53,51 @@ class Agreement:
         return self.error <= AGREES
 
 
-def relaxation_modulus(spectrum: RelaxationSpectrum, time: Values) -> Values:
-    """Return G(t) = Σ G_k exp(−t/λ_k) in Pa at times in s."""
-    return np.exp(-time[:, None] / spectrum.relaxation_time) @ spectrum.modulus
+def linear_agreements(tests: Tests) -> list[Agreement]:
+    """Return how well each test predicts each other one at its temperature.
 
-
-def creep_compliance(spectrum: RelaxationSpectrum, time: Values) -> Values:
-    """Return J(t) in 1/Pa at times in s: the creep of Maxwell elements side by side.
-
-    Under a unit stress the stresses of the elements obey s_k' = −s_k/λ_k + g_k Σ s_j/λ_j, where
-    g_k = G_k/ΣG; scaled by (g_k λ_k)^½ the matrix is symmetric, and its modes are those of
-    retardation, one of them steady flow   [Ferry 1980, Viscoelastic Properties of Polymers, ch. 3].
-    """
-    total = float(np.sum(spectrum.modulus))
-    share = np.sqrt(spectrum.modulus / total / spectrum.relaxation_time)
-    rates, modes = np.linalg.eigh(np.outer(share, share) - np.diag(1 / spectrum.relaxation_time))
-    weights = (share @ modes) ** 2
-    # one rate is zero but for rounding
-    growth = time[:, None] * exprel(np.minimum(rates, 0.0) * time[:, None])
-    return (1.0 + growth @ weights) / total
-
-
-def linear_agreements(root: Path, sweeps: Mapping[float, LinearSweep]) -> list[Agreement]:
-    """Return how well each sweep predicts the relaxation and creep at its temperature.
-
-    Times from 1/ω of the largest to that of the smallest frequency are compared: the modes of a
-    sweep say nothing of others.
+    Times that both reach are compared, 1/ω of a frequency: the modes of a test say nothing of
+    others.
 
     Parameters
     ----------
-    root
-        Folder whose ``tests.csv`` lists the tests.
-    sweeps
-        By temperature in °C.
-
-    Raises
-    ------
-    InputError
-        If a file is wrong.
+    tests
+        By kind and temperature in °C, as measured or as moved to one.
     """
-    index = read_table(root / TESTS_FILE)
-    degrees = index.numbers("temperature_C")
+    spectra = {}
     found = []
-    for row, test in enumerate(index.columns["test"]):
-        celsius = float(degrees[row])
-        name = index.columns["file"][row]
-        if test not in _QUANTITIES or celsius not in sweeps or Path(name).name != name:
-            continue
-        table = read_table(root / name)
-        time, measured = table.required(units.TIME), table.required(_QUANTITIES[test])
-        omega = sweeps[celsius].angular_frequency
-        inside = (time >= 1.0 / omega[-1]) & (time <= 1.0 / omega[0]) & (measured > 0.0)
-        if np.sum(inside) < _FEWEST:
-            continue
-        spectrum = relaxation_spectrum(sweeps[celsius])
-        predict = relaxation_modulus if test == "relaxation" else creep_compliance
-        error = predict(spectrum, time[inside]) / measured[inside] - 1.0
-        size, bias = float(np.sqrt(np.mean(error**2))), float(np.mean(error))
-        ends = float(time[inside].min()), float(time[inside].max())
-        found.append(Agreement(test, celsius, size, bias, ends))
+    for source, test in ((a, b) for a in tests for b in tests if a != b):
+        for celsius in sorted(set(tests[source]) & set(tests[test])):
+            one, other = tests[source][celsius], tests[test][celsius]
+            inside = _shared(one, other)
+            if np.sum(inside) < _FEWEST:
+                continue
+            if (source, celsius) not in spectra:
+                spectra[source, celsius] = _modes(one)
+            spectrum = spectra[source, celsius]
+            if spectrum is None:
+                continue
+            argument = other.argument[inside]
+            error = predicted(spectrum, test, argument) / other.values[:, inside] - 1.0
+            size, bias = float(np.sqrt(np.mean(error**2))), float(np.mean(error))
+            seen = _times(other)[inside]
+            ends = float(seen.min()), float(seen.max())
+            found.append(Agreement(source, test, celsius, size, bias, ends))
     return found
+
+
+def _modes(test: LinearTest):
+    try:
+        return spectrum_of(test)
+    except InputError:  # too few samples, or moduli that no modes have
+        return None
+
+
+def _times(test: LinearTest) -> np.ndarray:
+    return 1.0 / test.argument if test.kind == SWEEP else test.argument
+
+
+def _shared(one: LinearTest, other: LinearTest) -> np.ndarray:
+    reached, times = _times(one), _times(other)
+    slack = 1.0 + 1e-9  # of 1/ω
+    return (times >= reached.min() / slack) & (times <= reached.max() * slack)

@@ -1,5 +1,6 @@
 """A linear frequency sweep, and a spectrum of relaxation modes from it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -174,6 +175,22 @@ def relaxation_spectrum(
     trials = [
         _fit(sweep, n, margin) for n in range(1, most_modes + 1) for margin in MARGINS[: 2 * n]
     ]
+    return fewest_modes(trials, tolerance)
+
+
+def fewest_modes(
+    trials: Sequence[tuple[np.ndarray, np.ndarray, float]],
+    tolerance: float = TOLERANCE,
+) -> RelaxationSpectrum:
+    """Return the spectrum with the fewest modes of those that fit nearly as well as any.
+
+    Parameters
+    ----------
+    trials
+        Moduli in Pa, relaxation times in s and relative error of each.
+    tolerance
+        How much worse than the best a spectrum may be, as a factor of 1 or more.
+    """
     best = min(error for _, _, error in trials)
     errors: dict[int, float] = {}
     for modulus, _, error in trials:

@@ -13,6 +13,7 @@ from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.run import Run
 from discover.dataset.table import Table, read_table
 from discover.errors import InputError
+from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import (
     imposed_stress,
     jumps_at_start,
@@ -20,7 +21,7 @@ from discover.protocols.control import (
     steady_rates,
 )
 from discover.protocols.history import after_step_strain
-from discover.protocols.protocol import in_flow, measured_rate, start_up
+from discover.protocols.protocol import in_flow, start_up
 
 LINEAR_STRAIN = 0.01
 """Strain as which a linear material function is looked at: terms beyond the linear ones are some
@@ -123,6 +124,31 @@ def _creep(table: Table) -> Run:
     )
 
 
+def read_over_time(
+    path: Path, kind: str
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return times in s and the material function of a table over time.
+
+    Parameters
+    ----------
+    path
+        Of the table.
+    kind
+        ``relaxation``, in Pa, or ``creep``, in 1/Pa.
+
+    Raises
+    ------
+    InputError
+        If it is wrong.
+    """
+    quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
+    table = read_table(path)
+    time, values = table.required(units.TIME), table.required(quantity)
+    _require_positive(table, time, "time")
+    order = np.argsort(time, kind="stable")  # clocks that are written short repeat themselves
+    return time[order], values[order]
+
+
 def _amplitude_sweep(table: Table) -> Run:
     strain, frequency = table.required(units.STRAIN), table.required(units.ANGULAR_FREQUENCY)
     _require_positive(table, strain, "strain")
@@ -221,5 +247,5 @@ def at_measured_rate(run: Run) -> Run:
             f"{run.name} is a creep test: its strain jumps with the stress, and no rate can be "
             "followed through a jump. discover close-loop fits it; leave it out here."
         )
-    protocol = in_flow(measured_rate(run.time, run.rate), run.flow)
+    protocol = in_flow(sampled_rate(run.time, run.rate), run.flow)
     return replace(run, protocol=protocol, rate_is_measured=True)

@@ -15,9 +15,10 @@ from discover.dataset.run_table import oscillation
 from discover.dataset.table import Table, read_table
 from discover.dataset.thinning import MOST_SAMPLES, thin
 from discover.errors import InputError
+from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
-from discover.protocols.protocol import FlowProtocol, in_flow, measured_rate, start_up
+from discover.protocols.protocol import FlowProtocol, in_flow, start_up
 
 INDEX_FILE = "runs.csv"
 
@@ -79,7 +80,7 @@ def read_run(
     if test.control == "stress" and strain is not None:
         protocol, derived, source = _imposed(name, time, stress), True, "what the fluid answered"
     elif derived:
-        protocol = measured_rate(time, rate)
+        protocol = sampled_rate(time, rate)
         source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
     else:
         # of a test at a given stress the rate is what the fluid answered
@@ -217,7 +218,9 @@ def _protocol(
     level = float(np.median(rate))
     if np.ptp(rate) <= _CONSTANT * abs(level):
         return start_up(level), "measured, constant" if rate_is_measured else "commanded, constant"
-    return measured_rate(time, rate), "read sample by sample, linear between samples"
+    protocol = sampled_rate(time, rate)
+    between = "a cubic spline" if len(protocol.table_times) > len(time) else "linear"
+    return protocol, f"read sample by sample, {between} between samples"
 
 
 def _metadata(index: Table, row: int) -> dict[str, float | str]:

@@ -1,71 +1,36 @@
-"""Time–temperature superposition: sweeps at several temperatures as one, and how well that holds.
+"""Time–temperature superposition: tests at several temperatures as one, and how well that holds.
 
-Neighbouring sweeps are laid over each other by log a_T, and log b_T if asked for, that make
-log G′ and log G″ agree best where they overlap; shifts add up from the reference temperature
-[Ferry 1980, Viscoelastic Properties of Polymers, ch. 11]. b_T divides moduli, a_T multiplies
-frequencies.
+Neighbouring tests are laid over each other by log a_T, and log b_T if asked for, that make the logs
+of their values agree best where they overlap; shifts add up from the reference temperature [Ferry
+1980, Viscoelastic Properties of Polymers, ch. 11]. b_T divides moduli and multiplies compliances,
+a_T multiplies frequencies and divides times. Sweeps lead where there are sweeps: they see the
+temperature in two curves, and a table over time in one.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from scipy.constants import R
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import curve_fit, least_squares
-from scipy.stats import t as student
+from scipy.stats import norm
 
+from discover.dataset.linear_tests import SWEEP, LinearTest, Tests, of_sweep
 from discover.dataset.linear_viscoelasticity import LinearSweep
-from discover.dataset.load import SWEEP_FILE, TESTS_FILE, read_sweep
-from discover.dataset.table import read_table
+from discover.dataset.overlap import lay_over, overlap_misfit
+from discover.dataset.shift_laws import ShiftLaw, fit_shift_laws
 from discover.errors import InputError
 
-_FEWEST = 4
-"""Samples of each of two neighbours in their overlap, below which they are not laid over."""
-
-_STEPS = 241
-
 SUPERPOSED, FAILED = 0.05, 0.1
-"""Root-mean-square relative misfit in an overlap up to which sweeps superpose, about what two
+"""Root-mean-square relative misfit in an overlap up to which tests superpose, about what two
 loadings of one sample differ by, and from which on they do not."""
 
-_FACTOR_TWO = 0.3
-
-
-@dataclass(frozen=True)
-class ShiftLaw:
-    """Shift factors as a function of temperature.
-
-    Attributes
-    ----------
-    name
-        ``WLF`` or ``Arrhenius``.
-    values
-        C1 and C2 in K, or the activation energy in J/mol, by name.
-    intervals
-        95 % interval of each; None where these shifts do not determine it.
-    error
-        Root-mean-square misfit of log10 a_T.
-    """
-
-    name: str
-    values: dict[str, float]
-    intervals: dict[str, tuple[float, float] | None]
-    error: float
-
-    def log_shift(
-        self, celsius: Float[np.ndarray, " n"], reference: float
-    ) -> Float[np.ndarray, " n"]:
-        """Return log10 a_T at temperatures in °C."""
-        return _LAWS[self.name][0](celsius, reference, *self.values.values())
+_TWO_SIDED = float(norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """Sweeps at several temperatures, moved to one.
+    """Tests at several temperatures, moved to one.
 
     Attributes
     ----------
@@ -73,225 +38,173 @@ class Superposition:
         In °C.
     celsius
         Temperatures, increasing, shape (n,).
-    sweeps
-        As measured, in this order.
+    tests
+        As measured, by kind and temperature.
+    leading
+        The kinds that the shifts were found from.
     log_shift, log_vertical
         log10 of a_T and b_T, shape (n,).
-    misfit
-        Root-mean-square relative misfit in the overlap of each temperature with the next,
-        shape (n − 1,).
+    error
+        Standard errors of both, shape (n, 2).
     laws
         WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
+    apart
+        Temperatures in °C whose tests share no kind with the others', and are not moved.
     """
 
     reference: float
     celsius: Float[np.ndarray, " n"]
-    sweeps: tuple[LinearSweep, ...]
+    tests: Tests
+    leading: tuple[str, ...]
     log_shift: Float[np.ndarray, " n"]
     log_vertical: Float[np.ndarray, " n"]
-    misfit: Float[np.ndarray, " pairs"]
+    error: Float[np.ndarray, "n 2"]
     laws: tuple[ShiftLaw, ...]
+    apart: tuple[float, ...] = ()
 
-    @property
-    def verdict(self) -> str:
-        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap."""
-        worst = float(np.max(self.misfit))
+    def moved(self, kind: str, celsius: float) -> LinearTest:
+        """Return the test at a temperature as it would be at the reference."""
+        at = int(np.flatnonzero(self.celsius == celsius)[0])
+        return self.tests[kind][celsius].moved(
+            float(self.log_shift[at]), float(self.log_vertical[at])
+        )
+
+    def misfits(self, kind: str) -> dict[tuple[float, float], float]:
+        """Return the root-mean-square relative misfit of neighbours where they overlap."""
+        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
+        found = {}
+        for cold, warm in pairwise(there):
+            misfit = overlap_misfit(self.moved(kind, cold), self.moved(kind, warm))
+            if misfit is not None:
+                found[cold, warm] = misfit
+        return found
+
+    def verdict_of(self, kind: str) -> str:
+        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind."""
+        worst = max(self.misfits(kind).values(), default=0.0)
         if worst <= SUPERPOSED:
             return "superposed"
         return "doubtful" if worst < FAILED else "not_superposed"
 
-    def moved(self, at: int) -> LinearSweep:
-        """Return the sweep at a temperature as it would be at the reference."""
-        sweep, factor = self.sweeps[at], 10.0 ** -self.log_vertical[at]
-        return LinearSweep(
-            sweep.angular_frequency * 10.0 ** self.log_shift[at],
-            sweep.storage_modulus * factor,
-            sweep.loss_modulus * factor,
-        )
-
     @property
-    def master(self) -> LinearSweep:
-        """All moved sweeps as one, sorted by frequency."""
-        moved = [self.moved(at) for at in range(len(self.sweeps))]
-        omega, storage, loss = (
-            np.concatenate([getattr(one, name) for one in moved])
-            for name in ("angular_frequency", "storage_modulus", "loss_modulus")
+    def verdict(self) -> str:
+        """The worst verdict of the kinds that the shifts were found from."""
+        found = {self.verdict_of(kind) for kind in self.leading}
+        ranked = ("not_superposed", "doubtful", "superposed")
+        return next(one for one in ranked if one in found)
+
+    def factors(self, at: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return a_T and b_T at a temperature, each with its 95 % interval."""
+        both = zip((self.log_shift[at], self.log_vertical[at]), self.error[at], strict=True)
+        a, b = (
+            tuple(float(10.0 ** (value + side * _TWO_SIDED * error)) for side in (0, -1, 1))
+            for value, error in both
         )
-        order = np.argsort(omega, kind="stable")
-        return LinearSweep(omega[order], storage[order], loss[order])
+        return a, b  # pyright: ignore[reportReturnType]
 
-
-def read_temperatures(root: Path) -> dict[float, LinearSweep]:
-    """Return the linear sweeps of a folder by temperature in °C, as ``tests.csv`` lists them.
-
-    Raises
-    ------
-    InputError
-        If the list is missing or wrong, or has fewer than two temperatures.
-    """
-    table = read_table(
-        root / TESTS_FILE, TESTS_FILE, "Sweeps at several temperatures are listed there; write one "
-        "with the columns file, test and temperature_C."
-    )  # fmt: skip
-    for column in ("file", "test", "temperature_C"):
-        if column not in table.columns:
-            raise InputError(
-                f"{TESTS_FILE} has no column {column!r}; it has {table.listed}. Add it."
-            )
-    degrees = table.numbers("temperature_C")
-    found: dict[float, LinearSweep] = {}
-    for row, (name, test) in enumerate(
-        zip(table.columns["file"], table.columns["test"], strict=True)
-    ):
-        if test.strip() != SWEEP_FILE.removesuffix(".csv"):
-            continue
-        if Path(name).name != name:
-            raise InputError(f"{TESTS_FILE} names {name!r}; put the file itself in the folder.")
-        if float(degrees[row]) in found:
-            raise InputError(f"{TESTS_FILE} has two sweeps at {degrees[row]:g} °C; keep one.")
-        found[float(degrees[row])] = read_sweep(root / name)
-    if len(found) < 2:
-        raise InputError(
-            f"{TESTS_FILE} lists {len(found)} linear sweeps; shifting needs two temperatures."
+    def master(self, kind: str) -> LinearTest | None:
+        """Return all moved tests of a kind as one; None where they do not become one."""
+        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
+        if not there or "not_superposed" in (self.verdict, self.verdict_of(kind)):
+            return None
+        moved = [self.moved(kind, celsius) for celsius in there]
+        argument = np.concatenate([one.argument for one in moved])
+        order = np.argsort(argument, kind="stable")
+        if kind != SWEEP:  # a table over time has no time twice
+            order = order[np.diff(argument[order], prepend=0.0) > 0.0]
+        return LinearTest(
+            kind,
+            argument[order],
+            np.concatenate([one.values for one in moved], axis=1)[:, order],
+            np.concatenate([one.spread for one in moved])[order],
         )
-    return found
 
 
 def superpose(
-    sweeps: Mapping[float, LinearSweep], reference: float | None = None, vertical: bool = False
+    tests: Tests | Mapping[float, LinearSweep],
+    reference: float | None = None,
+    vertical: bool = False,
 ) -> Superposition:
-    """Return sweeps at several temperatures moved to one of them.
+    """Return tests at several temperatures moved to one of them.
 
     Parameters
     ----------
-    sweeps
-        By temperature in °C.
+    tests
+        By kind and by temperature in °C; or sweeps by temperature.
     reference
         One of them; the middle one if None.
     vertical
-        Whether moduli too may be moved.
+        Whether moduli and compliances too may be moved.
 
     Raises
     ------
     InputError
-        If the reference is none of the temperatures, or neighbours share too few moduli.
+        If the reference is none of the temperatures, or neighbours share too few values.
     """
-    celsius = np.array(sorted(sweeps))
-    reference = float(celsius[len(celsius) // 2]) if reference is None else reference
-    if reference not in sweeps:
-        known = ", ".join(f"{t:g}" for t in celsius)
-        raise InputError(f"There is no sweep at {reference:g} °C. Take one of {known}.")
-    ordered = tuple(sweeps[float(t)] for t in celsius)
-    pairs = [
-        _lay(cold, warm, vertical, f"{celsius[i]:g} and {celsius[i + 1]:g} °C")
-        for i, (cold, warm) in enumerate(pairwise(ordered))
-    ]
-    shifts = np.concatenate([[[0.0, 0.0]], np.cumsum([pair[:2] for pair in pairs], axis=0)])
+    known = _by_kind(tests)
+    several = {kind: at for kind, at in known.items() if len(at) > 1}
+    if not several:
+        raise InputError("Shifting needs tests of one kind at two temperatures; got none.")
+    main = several.get(SWEEP) or next(iter(several.values()))
+    middle = sorted(main)[len(main) // 2]
+    reference = middle if reference is None else reference
+    every = sorted({celsius for at in known.values() for celsius in at})
+    if reference not in every:
+        listed = ", ".join(f"{t:g}" for t in every)
+        raise InputError(f"There is no test at {reference:g} °C. Take one of {listed}.")
+    found, leading = _walk(several, reference, vertical)
+    celsius = np.array(sorted(found))
+    shifts = np.array([found[t][0] for t in celsius])
+    errors = np.sqrt([np.diag(found[t][1]) for t in celsius])
     at = int(np.flatnonzero(celsius == reference)[0])
-    shifts = shifts - shifts[at]
-    laws = tuple(
-        law for name in _LAWS if (law := _fit_law(name, celsius, shifts[:, 0], at)) is not None
+    laws = fit_shift_laws(celsius, shifts[:, 0], at)
+    apart = tuple(t for t in every if t not in found)
+    return Superposition(
+        reference, celsius, known, leading, shifts[:, 0], shifts[:, 1], errors, laws, apart
     )
-    misfit = np.array([pair[2] for pair in pairs])
-    return Superposition(reference, celsius, ordered, shifts[:, 0], shifts[:, 1], misfit, laws)
 
 
-def _curves(sweep: LinearSweep) -> tuple[np.ndarray, np.ndarray]:
-    omega, first = np.unique(sweep.angular_frequency, return_index=True)
-    moduli = np.stack([sweep.storage_modulus, sweep.loss_modulus])[:, first]
-    return np.log10(omega), np.log10(moduli)
+def _by_kind(tests: Tests | Mapping[float, LinearSweep]) -> Tests:
+    sweeps = {t: of_sweep(one) for t, one in tests.items() if isinstance(one, LinearSweep)}
+    return {SWEEP: sweeps} if sweeps else tests  # pyright: ignore[reportReturnType]
 
 
-def _lay(
-    cold: LinearSweep, warm: LinearSweep, vertical: bool, where: str
-) -> tuple[float, float, float]:
-    """Return log a and log b that lay a sweep over its colder neighbour, and the misfit there."""
-    x, fixed = _curves(cold)
-    z, moving = _curves(warm)
-    if min(len(x), len(z)) < _FEWEST:
-        raise InputError(f"Shifting needs {_FEWEST} frequencies; a sweep at {where} has fewer.")
-    spline = PchipInterpolator(x, fixed, axis=1, extrapolate=False)
+def _walk(several: Tests, reference: float, vertical: bool):
+    """Return the sum of shifts and of their covariances by temperature, and the leading kinds.
 
-    def residual(shift: float, rows: np.ndarray) -> np.ndarray:
-        return moving[:, rows] - spline(z[rows] + shift)
-
-    def inside(shift: float) -> np.ndarray:
-        return (z + shift >= x[0]) & (z + shift <= x[-1])
-
-    def misfit(shift: float) -> float:
-        rows = inside(shift)
-        if np.sum(rows) < _FEWEST:
-            return np.inf
-        left = residual(shift, rows)
-        return float(np.sqrt(np.mean((left - (np.mean(left) if vertical else 0.0)) ** 2)))
-
-    trials = np.linspace(x[0] - z[-1], x[-1] - z[0], _STEPS)
-    best = trials[int(np.argmin([misfit(shift) for shift in trials]))]
-    if not misfit(best) < _FACTOR_TWO:
-        raise InputError(
-            f"No shift in time brings the sweeps at {where} within a factor of two of each other. "
-            "They share no moduli, or differ in more than time; measure between them, or leave "
-            "temperatures out with --between."
-        )
-    rows = inside(best)
-    spline = PchipInterpolator(x, fixed, axis=1)  # a sample may leave the overlap by a little
-
-    def left(free: np.ndarray) -> np.ndarray:
-        return (residual(free[0], rows) - (free[1] if vertical else 0.0)).ravel()
-
-    start = np.mean(residual(best, rows)) if vertical else 0.0
-    found = least_squares(left, [best, start][: 1 + vertical], x_scale=0.1).x
-    error = float(np.sqrt(np.mean((np.log(10.0) * left(found)) ** 2)))
-    return float(found[0]), float(found[1]) if vertical else 0.0, error
-
-
-def _wlf(celsius, reference, c1, c2):
-    return -c1 * (celsius - reference) / (c2 + celsius - reference)
-
-
-def _arrhenius(celsius, reference, energy):
-    return energy / R / np.log(10.0) * (1.0 / (celsius + 273.15) - 1.0 / (reference + 273.15))
-
-
-_LAWS = {
-    "WLF": (_wlf, {"C1": 10.0, "C2_K": 100.0}),
-    "Arrhenius": (_arrhenius, {"activation_energy_J_mol": 5e4}),
-}
-
-
-def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
-    """Return a law of the shifts; None with too few temperatures. The reference has no shift."""
-    law, start = _LAWS[name]
-    others = np.arange(len(celsius)) != at
-    if np.sum(others) <= len(start):
-        return None
-    reference = float(celsius[at])
-    coldest = reference - float(celsius[0])
-
-    def of(temperatures, *free):
-        return law(temperatures, reference, *free)
-
-    first = list(start.values())
-    first[-1] = max(first[-1], 1.5 * coldest) if name == "WLF" else first[-1]
-    try:
-        values, covariance = curve_fit(of, celsius[others], log_shift[others], p0=first)
-    except RuntimeError:  # no such law near these shifts
-        return None
-    left = log_shift[others] - of(celsius[others], *values)
-    wide = student.ppf(0.975, np.sum(others) - len(start)) * np.sqrt(np.diag(covariance))
-    intervals = {
-        key: (float(value - half), float(value + half)) if half < abs(value) else None
-        for key, value, half in zip(start, values, wide, strict=True)
-    }
-    known = {key: float(value) for key, value in zip(start, values, strict=True)}
-    return ShiftLaw(name, known, intervals, float(np.sqrt(np.mean(left**2))))
+    From the reference on, the next temperature is one that a sweep ties to those reached, then one
+    that any other test does, the nearest first.
+    """
+    reached = {reference: (np.zeros(2), np.zeros((2, 2)))}
+    leading: dict[str, None] = {}
+    links = [
+        (kind != SWEEP, warm - cold, cold, warm)
+        for kind, at in several.items()
+        for cold, warm in pairwise(sorted(at))
+    ]
+    while open_ := [link for link in links if (link[2] in reached) != (link[3] in reached)]:
+        table, _, cold, warm = min(open_)
+        kinds = [k for k in several if (k != SWEEP) == table and {cold, warm} <= set(several[k])]
+        leading.update(dict.fromkeys(kinds))
+        below, above = ({kind: several[kind][t] for kind in kinds} for t in (cold, warm))
+        laid = lay_over(below, above, vertical, f"{cold:g} and {warm:g} °C")
+        start, end, sign = (cold, warm, 1.0) if cold in reached else (warm, cold, -1.0)
+        shift, covariance = reached[start]
+        reached[end] = (shift + sign * laid.shift, covariance + laid.covariance)
+    return reached, tuple(leading)
 
 
 def shift_table(found: Superposition) -> str:
     """Return temperatures, shift factors and misfits as the text of ``shift_factors.csv``."""
-    rows = [("temperature_C", "a_T", "b_T", "misfit_to_next")]
+    head = ["temperature_C", "a_T", "a_T_low95", "a_T_high95", "b_T", "b_T_low95", "b_T_high95"]
+    misfits = {kind: found.misfits(kind) for kind in found.tests}
+    names = ["misfit_to_next" if kind == SWEEP else f"{kind}_misfit_to_next" for kind in misfits]
+    rows = [[*head, *names]]
     for i, degrees in enumerate(found.celsius):
-        misfit = f"{found.misfit[i]:.4g}" if i < len(found.misfit) else ""
-        a, b = 10.0 ** found.log_shift[i], 10.0 ** found.log_vertical[i]
-        rows.append((f"{degrees:g}", repr(float(a)), repr(float(b)), misfit))
+        off = [
+            next((f"{m:.4g}" for (cold, _), m in pairs.items() if cold == degrees), "")
+            for pairs in misfits.values()
+        ]
+        numbers = [repr(value) for factor in found.factors(i) for value in factor]
+        rows.append([f"{degrees:g}", *numbers, *off])
     return "\n".join(",".join(row) for row in rows) + "\n"

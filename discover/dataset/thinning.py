@@ -138,9 +138,15 @@ def thin_run(run: Run, most: int) -> Run:
     if "thinned" in run.metadata:  # when it was read, which may warn of what was lost
         text = f"{run.metadata['thinned']}; of these {text}"
     thinned = replace(run.window(keep), metadata={**run.metadata, "thinned": text})
-    sampled = np.array_equal(np.asarray(run.protocol.table_times), run.time)
-    if run.protocol.control == "rate" and sampled:
-        followed = measured_rate(*followed_rate(run.time, run.rate, keep))
+    times, rates = (np.asarray(run.protocol.table_times), np.asarray(run.protocol.table_rates))
+    # a smooth rate has knots between its samples
+    if run.protocol.control == "rate" and float(run.protocol.begins) == 0.0:
+        sampled = len(times) >= n and np.all(np.isin(run.time, times))
+    else:
+        sampled = False
+    if sampled:
+        kept = np.isin(times, run.time[keep])
+        followed = measured_rate(*followed_rate(times, rates, kept))
         thinned = replace(thinned, protocol=in_flow(followed, run.flow))
     return thinned
 

@@ -1,6 +1,7 @@
 """Protocols: the rate of deformation in time, the flow that has it, and what came before."""
 
 from discover import first_use as first_use  # double precision, before any array is made
+from discover.protocols.between_samples import another_between_samples, sampled_rate
 from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import (
     after_alternation,
@@ -17,7 +18,6 @@ from discover.protocols.protocol import (
     oscillatory_shear,
     recorded_at,
     shear_rates,
-    smooth_between_samples,
     stack_protocols,
     start_up,
     step_rates,
@@ -32,6 +32,7 @@ __all__ = [
     "after_alternation",
     "after_steady_flow",
     "after_step_strain",
+    "another_between_samples",
     "imposed_stress",
     "in_flow",
     "kinematics_of",
@@ -41,9 +42,9 @@ __all__ = [
     "paper_test_protocols",
     "paper_training_protocols",
     "recorded_at",
+    "sampled_rate",
     "settled",
     "shear_rates",
-    "smooth_between_samples",
     "stack_protocols",
     "start_up",
     "steady_rates",

@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.interpolate import PchipInterpolator
 
 from discover.errors import InputError
 from discover.programs import compiled
@@ -231,6 +230,8 @@ def measured_rate(
 ) -> FlowProtocol:
     """Return the piecewise-linear shear rate through measured points.
 
+    Of few samples a cycle straight lines cut the crests: `sampled_rate` does not.
+
     Parameters
     ----------
     times
@@ -252,39 +253,6 @@ def measured_rate(
             f"{t.size} times and {r.size} rates."
         )
     return _protocol(t, r)
-
-
-_FEWEST_KNOTS = 4
-_BETWEEN = 4  # points of a smooth rate for each sample of it
-
-
-def smooth_between_samples(protocol: FlowProtocol) -> FlowProtocol | None:
-    """Return a protocol whose rate, where it was read in samples, is a smooth curve through them.
-
-    Monotonic between samples, and not straight lines   [Fritsch & Carlson 1980, SIAM J. Numer.
-    Anal. 17, 238]: what that changes is what nobody knows of the rate. None where it was
-    commanded: constant, a wave, or steps.
-
-    Parameters
-    ----------
-    protocol
-        Any.
-    """
-    knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
-    # a jump at 0 ends what came before the record, which no sample holds
-    jump = np.flatnonzero((np.diff(knots) <= 0.0) & (knots[1:] == 0.0))
-    first = int(jump[-1]) + 1 if jump.size and float(protocol.begins) < 0.0 else 0
-    read = knots[first:]
-    if protocol.control != "rate" or len(read) < _FEWEST_KNOTS or np.any(np.diff(read) <= 0.0):
-        return None
-    places = np.arange(_BETWEEN * (len(read) - 1) + 1) / _BETWEEN
-    dense = np.interp(places, np.arange(len(read)), read)
-    smooth = np.asarray(PchipInterpolator(read, rates[first:])(dense))
-    return replace(
-        protocol,
-        table_times=jnp.asarray(np.concatenate([knots[:first], dense])),
-        table_rates=jnp.asarray(np.concatenate([rates[:first], smooth])),
-    )
 
 
 def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:

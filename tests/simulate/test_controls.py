@@ -157,9 +157,9 @@ def test_a_jump_of_stress_is_a_jump_and_a_wave_is_none():
 
 
 def test_a_protocol_of_samples_that_impose_no_rate_is_not_smoothed():
-    from discover.protocols import smooth_between_samples
+    from discover.protocols import another_between_samples
 
     run = at_stress(TIMES, 5.0 * np.sin(TIMES))
-    assert smooth_between_samples(run.protocol) is None
+    assert another_between_samples(run.protocol) is None
     rates = replace(run, protocol=start_up(1.0)).protocol
     assert rates.control == "rate"

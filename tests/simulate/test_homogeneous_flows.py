@@ -14,13 +14,13 @@ from discover.protocols import (
     after_alternation,
     after_steady_flow,
     after_step_strain,
+    another_between_samples,
     in_flow,
     kinematics_of,
     measured_rate,
     oscillatory_shear,
     recorded_at,
     shear_rates,
-    smooth_between_samples,
     start_up,
     step_rates,
 )
@@ -124,7 +124,7 @@ def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(k
     sampled = in_flow(measured_rate(times, rates), kind)
     begun = after_steady_flow(sampled, 2.0, 3.0)
     for protocol in (sampled, begun):
-        smooth = smooth_between_samples(protocol)
+        smooth = another_between_samples(protocol)
         assert smooth is not None
         assert smooth.flow == kind
         assert float(smooth.begins) == float(protocol.begins)

@@ -95,7 +95,8 @@ def _distribution(
         columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
         variance = variance + np.sum(columns**2, axis=0)
     samples = np.maximum(np.count_nonzero(seen, axis=1), 1)
-    size = np.sqrt(np.sum(np.where(seen, recorded, 0.0) ** 2, axis=1) / samples)[:, None]
+    # of a flow curve or sweep each sample has the noise that it is weighted by
+    size = np.where(seen, 1.0 / (scale * np.sqrt(samples)[:, None]), 0.0)
     mean = np.where(seen, residual[0] / scale + recorded, 0.0)
     return mean, np.sqrt(variance + (left * size) ** 2)
 

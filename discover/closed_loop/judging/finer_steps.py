@@ -11,7 +11,7 @@ from discover.effects import AbstractEffect, SeriesElement
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, make_batch
 from discover.forward.least_squares import Fit
-from discover.protocols import smooth_between_samples
+from discover.protocols import another_between_samples
 
 _STRAIN_STEP = 0.05
 
@@ -55,7 +55,7 @@ def change_on_finer_steps(
     runs: Sequence[Run],
     theta: np.ndarray,
     active: Sequence[str],
-    smooth_rates: bool = False,
+    other_rates: bool = False,
 ) -> Float[np.ndarray, "runs n"]:
     """Return how weighted residuals would change on steps a fifth as long.
 
@@ -65,10 +65,9 @@ def change_on_finer_steps(
         The model, and the runs as a batch and as they are.
     theta, active
         Parameters, and the effects among them that are in the model.
-    smooth_rates
-        Whether a rate that was read in samples is a smooth curve through them on the finer steps,
-        monotonic between samples, and not straight lines   [Fritsch & Carlson 1980, SIAM J. Numer.
-        Anal. 17, 238]: what that changes is what nobody knows of the rate.
+    other_rates
+        Whether a rate that was read in samples is another curve through them on the finer steps
+        (`another_between_samples`): what that changes is what nobody knows of the rate.
 
     Returns
     -------
@@ -82,7 +81,7 @@ def change_on_finer_steps(
     values[:shared] = theta[:shared]
     for effect in effects:
         values[small.positions(effect.name)] = theta[model.positions(effect.name)]
-    finer = [_with_smooth_rate(run) for run in runs] if smooth_rates else runs
+    finer = [_with_another_rate(run) for run in runs] if other_rates else runs
     try:
         fine_batch = make_batch(finer, strain_step=_STRAIN_STEP)
     except InputError:
@@ -96,7 +95,7 @@ def _in_use(model: AugmentedModel, active: Sequence[str]) -> list[AbstractEffect
     return [effect for effect in model.effects if effect.name in names]
 
 
-def _with_smooth_rate(run: Run) -> Run:
-    """Return a run whose rate, where it was read in samples, is a smooth curve through them."""
-    smooth = smooth_between_samples(run.protocol)
+def _with_another_rate(run: Run) -> Run:
+    """Return a run whose rate, where it was read in samples, is another curve through them."""
+    smooth = another_between_samples(run.protocol, run.time)
     return run if smooth is None else replace(run, protocol=smooth)

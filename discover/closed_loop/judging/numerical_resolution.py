@@ -76,7 +76,7 @@ class NumericalResolution:
         key = np.asarray(theta).tobytes()
         if key not in self._known:
             self._known[key] = change_on_finer_steps(
-                self.model, self.batch, self.runs, theta, active, smooth_rates=True
+                self.model, self.batch, self.runs, theta, active, other_rates=True
             )
         return self._known[key]
 

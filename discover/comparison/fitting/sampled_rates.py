@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
 from discover.laws.multimode import Fluid
-from discover.protocols import smooth_between_samples
+from discover.protocols import another_between_samples
 
 LARGEST = 5e-3
 """A larger relative misfit is not put down to arithmetic, as in the closed loop: a rate read 24
@@ -19,8 +19,8 @@ def left_by_sampled_rates(
 ) -> float:
     """Return the relative misfit of σ12 that the rate between the samples may leave.
 
-    The root-mean-square change of the prediction where the rate is a smooth curve through its
-    samples and not straight lines, over that of the measurement, mean over the training runs. Zero
+    The root-mean-square change of the prediction where the rate is another curve through its
+    samples, over that of the measurement, mean over the training runs. Zero
     where the rate was commanded, and where the misfit is too large to be put down to it.
 
     Parameters
@@ -46,7 +46,7 @@ def left_by_sampled_rates(
         measured, prediction = flow.measured, predictions[flow.key]
         if flow.kind != "training" or measured is None or prediction is None:
             continue
-        smooth = smooth_between_samples(flow.protocol)
+        smooth = another_between_samples(flow.protocol, flow.times)
         other = None if smooth is None else predict(fluid, replace(flow, protocol=smooth))
         change = 0.0
         if other is not None:

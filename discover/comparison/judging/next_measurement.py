@@ -13,7 +13,7 @@ from discover.identify.design.next_experiment import Proposal, propose_experimen
 from discover.identify.rivals.bands import PredictionBand, prediction_bands
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
-from discover.protocols import smooth_between_samples
+from discover.protocols import another_between_samples
 from discover.study.schema import NextExperiment
 
 LEAST_NOISE = 0.01
@@ -182,10 +182,10 @@ def _with_sampled_rates(
 ) -> list[PredictionBand]:
     """Return bands that hold for rates that are known at the samples only, too.
 
-    Each limit gives way by twice the most that changes along the run where the rate is a smooth
-    curve through its samples and not straight lines: at which sample nobody knows.
+    Each limit gives way by twice the most that changes along the run where the rate is another
+    curve through its samples: at which sample nobody knows.
     """
-    made = ((i, smooth_between_samples(flow.protocol)) for i, flow in enumerate(flows))
+    made = ((i, another_between_samples(flow.protocol, flow.times)) for i, flow in enumerate(flows))
     smooth = {i: protocol for i, protocol in made if protocol is not None}
     found = list(bands)
     if not smooth:

@@ -1,9 +1,14 @@
-"""The page on time–temperature superposition: whether sweeps became one, and by which shifts."""
+"""The page on time–temperature superposition: whether tests became one, and by which shifts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from discover.dataset.linear_agreement import Agreement
-from discover.dataset.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
+from discover.dataset.linear_tests import NAMES, SWEEP
+from discover.dataset.shift_laws import ShiftLaw
+from discover.dataset.superposition import FAILED, SUPERPOSED, Superposition
+from discover.report.data.linear_agreement import agreement_lines, agreement_words
 from discover.report.page import render
 from discover.report.parts import attempt
 from discover.report.plots.superposition import superposition_pictures
@@ -12,35 +17,90 @@ from discover.report.wording import percent
 _DESCRIBES = 0.1
 """Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
 
+_UNKNOWN = 0.3
+"""Standard error in decades from which on a shift factor is said not to be determined: 95 % would
+span a factor of four either way."""
+
 _SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("E", "J/mol")}
+_PLURALS = {kind: f"{name}s" for kind, name in NAMES.items()} | {"relaxation": "relaxation moduli"}
 
 
-def superposition_words(found: Superposition) -> list[str]:
+def superposition_words(
+    found: Superposition, own: Mapping[str, Superposition] | None = None
+) -> list[str]:
     """Return what can be said of a superposition, a sentence each.
 
     Parameters
     ----------
     found
-        Sweeps and shifts.
+        Tests and shifts.
+    own
+        What tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
     """
-    at = int(found.misfit.argmax())
-    worst = percent(float(found.misfit[at]))
-    where = f"{found.celsius[at]:g} and {found.celsius[at + 1]:g} °C"
-    first = {
-        "superposed": f"The sweeps superpose: the worst overlap, of {where}, is off by {worst}.",
-        "doubtful": (
-            f"Whether the sweeps superpose is doubtful: those at {where} are off by {worst} where "
-            "they overlap, more than two loadings of one sample usually are "
+    said = [_verdict(found, kind) for kind in found.leading]
+    if found.verdict == "not_superposed":
+        return said
+    others = [kind for kind in found.tests if kind not in found.leading]
+    said += [_verdict(found, kind, led=True) for kind in others if found.misfits(kind)]
+    said += [_own_words(found, one, kind) for kind, one in (own or {}).items()]
+    open_ = [
+        f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
+    ]
+    if open_:
+        said.append(
+            f"At {', '.join(open_)} °C these data do not determine the shift factors: where the "
+            "curves overlap they are straight lines, which slide along themselves."
+        )
+    if found.apart:
+        degrees = ", ".join(f"{t:g}" for t in found.apart)
+        said.append(
+            f"The tests at {degrees} °C are not moved: nothing of their kind is beside them."
+        )
+    return [*said, *(_law_words(law, found) for law in found.laws)]
+
+
+def _verdict(found: Superposition, kind: str, led: bool = False) -> str:
+    misfits = found.misfits(kind)
+    (cold, warm), size = max(misfits.items(), key=lambda item: item[1])
+    worst, where = percent(size), f"{cold:g} and {warm:g} °C"
+    moved = f" with the shifts of the {_PLURALS[found.leading[0]]}" if led else ""
+    what = _PLURALS[kind]
+    verdict = found.verdict_of(kind)
+    if verdict == "superposed":
+        return f"The {what} superpose{moved}: the worst overlap, of {where}, is off by {worst}."
+    if verdict == "doubtful":
+        return (
+            f"Whether the {what} superpose{moved} is doubtful: those at {where} are off by {worst} "
+            "where they overlap, more than two loadings of one sample usually are "
             f"({percent(SUPERPOSED)})."
-        ),
-        "not_superposed": (
-            f"The sweeps do not superpose: those at {where} are off by {worst} where they overlap "
-            f"({percent(FAILED)} or more). No single sweep stands for them; leave temperatures out "
-            "with --between, or allow a shift of the moduli with --vertical."
-        ),
-    }[found.verdict]
-    laws = () if found.verdict == "not_superposed" else found.laws
-    return [first, *(_law_words(law, found) for law in laws)]
+        )
+    one = "sweep" if kind == SWEEP else "table"
+    return (
+        f"The {what} do not superpose{moved}: those at {where} are off by {worst} where they "
+        f"overlap ({percent(FAILED)} or more). No single {one} stands for them; leave temperatures "
+        "out with --between, or allow a shift of the moduli with --vertical."
+    )
+
+
+def _own_words(found: Superposition, own: Superposition, kind: str) -> str:
+    """Return whether tables by themselves ask for the shifts that the sweeps gave."""
+    other = []
+    for i, degrees in enumerate(found.celsius):
+        j = np.flatnonzero(own.celsius == degrees)
+        if not len(j) or degrees == found.reference:
+            continue
+        apart = abs(own.log_shift[j[0]] - found.log_shift[i])
+        if apart > 1.96 * float(np.hypot(own.error[j[0], 0], found.error[i, 0])):
+            theirs, ours = own.factors(int(j[0]))[0], found.factors(i)[0]
+            other.append(f"at {degrees:g} °C {_factor(theirs)} and not {_factor(ours)}")
+    if not other:
+        return f"The {_PLURALS[kind]} by themselves ask for the same a_T, within the intervals."
+    return f"The {_PLURALS[kind]} by themselves ask for another a_T: {'; '.join(other)}."
+
+
+def _factor(factor: tuple[float, float, float]) -> str:
+    value, low, high = factor
+    return f"{value:.3g} (95 %: {low:.3g} to {high:.3g})"
 
 
 def _law_words(law: ShiftLaw, found: Superposition) -> str:
@@ -65,61 +125,57 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
     )
 
 
-def agreement_words(agreements: Sequence[Agreement]) -> list[str]:
-    """Return whether sweeps predict relaxation and creep, a sentence each.
-
-    Parameters
-    ----------
-    agreements
-        One for each test.
-    """
-    said = []
-    for one in agreements:
-        where = f"{one.times[0]:.3g} to {one.times[1]:.3g} s"
-        what = "the relaxation modulus" if one.test == "relaxation" else "the creep compliance"
-        if one.agrees:
-            text = f"the sweep predicts {what} to {percent(one.error)} (root mean square, {where})."
-        else:
-            side = "above" if one.bias > 0.0 else "below"
-            text = (
-                f"the sweep does not predict {what}: it lies {percent(abs(one.bias))} {side} what "
-                f"was measured, on average over {where}; divided by one factor "
-                f"{percent(one.left)} would be left."
-            )
-        said.append(f"At {one.celsius:g} °C {text}")
-    return said
-
-
 def superposition_page(
-    found: Superposition, name: str, agreements: Sequence[Agreement] = ()
+    found: Superposition,
+    name: str,
+    agreements: Sequence[Agreement] = (),
+    own: Mapping[str, Superposition] | None = None,
 ) -> str:
     """Return the page.
 
     Parameters
     ----------
     found
-        Sweeps and shifts.
+        Tests and shifts.
     name
         Of the data.
     agreements
-        Of the sweeps with other linear tests.
+        Of linear tests with one another.
+    own
+        What tables over time ask for by themselves.
     """
     pictures = attempt("The pictures", lambda: superposition_pictures(found))
+    kinds = [kind for kind in found.tests if found.misfits(kind)]
+    misfits = {kind: found.misfits(kind) for kind in kinds}
     return render(
         "superposition.html",
         name=name,
-        words=superposition_words(found),
+        words=superposition_words(found, own),
         agreements=agreement_words(agreements),
+        agreement_lines=agreement_lines(agreements),
         doubtful=found.verdict != "superposed",
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
+        kinds=[_PLURALS[kind] for kind in kinds],
         lines=[
             {
                 "temperature": f"{degrees:g}",
-                "a": f"{10.0 ** found.log_shift[i]:.4g}",
-                "b": f"{10.0 ** found.log_vertical[i]:.4g}",
-                "misfit": percent(float(found.misfit[i])) if i < len(found.misfit) else "",
+                "a": _table_factor(found, i, 0),
+                "b": _table_factor(found, i, 1),
+                "misfits": [
+                    next((percent(m) for (cold, _), m in pairs.items() if cold == degrees), "")
+                    for pairs in misfits.values()
+                ],
             }
             for i, degrees in enumerate(found.celsius)
         ],
     )
+
+
+def _table_factor(found: Superposition, at: int, which: int) -> str:
+    value, low, high = found.factors(at)[which]
+    if low == high:
+        return f"{value:.4g}"
+    if found.error[at, which] > _UNKNOWN:
+        return "not determined"
+    return f"{value:.4g} ({low:.4g} to {high:.4g})"

@@ -102,7 +102,7 @@ def _draw_run(panel, run: Run) -> None:
         # in the middle, so that it hides neither end of what was recorded
         other.set_ylim(high - size, high + size)
         other.set_yticks([high], [f"{high:.3g}"])
-    if runs_through_decades(run.time, np.ones(1) if given_stress else run.rate):
+    if runs_through_decades(run.time, np.ones_like(run.time) if given_stress else run.rate):
         make_logarithmic(panel.xaxis)
     if float(np.max(np.abs(run.recorded))) > THOUSANDS:
         panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k

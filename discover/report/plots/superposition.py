@@ -1,7 +1,11 @@
 """Pictures of time–temperature superposition: the overlap, van Gurp's plot, and the shifts."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from discover.dataset.linear_spectra import predicted, spectrum_of
+from discover.dataset.linear_tests import CREEP, RELAXATION, SWEEP
 from discover.dataset.superposition import Superposition
 from discover.report.plots.style import (
     BEFORE,
@@ -16,6 +20,7 @@ from discover.report.plots.style import (
 
 _MARKERS = "os^vD<>ph*"
 _POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.8}
+_TABLES = {RELAXATION: ("G/b_T (Pa)", NETWORK), CREEP: ("J b_T (1/Pa)", SPARSE)}
 _LINES = {"WLF": ("-", NETWORK), "Arrhenius": ("--", SPARSE)}
 
 
@@ -25,9 +30,12 @@ def superposition_pictures(found: Superposition) -> list[Picture]:
     Parameters
     ----------
     found
-        Sweeps and shifts.
+        Tests and shifts.
     """
-    return [_overlap(found), _van_gurp(found), _shifts(found)]
+    pictures = [_overlap(found), _van_gurp(found)] if SWEEP in found.tests else []
+    if any(kind != SWEEP for kind in found.tests):
+        pictures.append(_over_time(found))
+    return [*pictures, _shifts(found)]
 
 
 def _labels(found: Superposition) -> list[tuple[str, str]]:
@@ -36,10 +44,17 @@ def _labels(found: Superposition) -> list[tuple[str, str]]:
     ]
 
 
+def _marked(found: Superposition, kind: str) -> Iterator[tuple[float, str, str]]:
+    """Yield temperature, label and marker of the moved tests of a kind."""
+    for degrees, (label, marker) in zip(found.celsius.tolist(), _labels(found), strict=True):
+        if degrees in found.tests[kind]:
+            yield degrees, label, marker
+
+
 def _overlap(found: Superposition) -> Picture:
     with figure(1, 2, width=10.0, height=3.8) as (drawing, axes):
-        for at, (label, marker) in enumerate(_labels(found)):
-            moved = found.moved(at)
+        for degrees, label, marker in _marked(found, SWEEP):
+            moved = found.moved(SWEEP, degrees).sweep
             for panel, values, colour in (
                 (axes[0, 0], moved.storage_modulus, NETWORK),
                 (axes[0, 1], moved.loss_modulus, SPARSE),
@@ -58,8 +73,8 @@ def _overlap(found: Superposition) -> Picture:
 
 def _van_gurp(found: Superposition) -> Picture:
     with figure(1, 2, width=10.0, height=3.4) as (drawing, axes):
-        for sweep, (_, marker) in zip(found.sweeps, _labels(found), strict=True):
-            storage, loss = sweep.storage_modulus, sweep.loss_modulus
+        for degrees, _, marker in _marked(found, SWEEP):
+            storage, loss = found.tests[SWEEP][degrees].values
             style = {**_POINTS, "marker": marker, "color": NETWORK}
             axes[0, 0].plot(np.hypot(storage, loss), np.degrees(np.arctan2(loss, storage)), **style)
             axes[0, 1].plot(storage, loss, **style)
@@ -74,11 +89,49 @@ def _van_gurp(found: Superposition) -> Picture:
         return picture(drawing, "van_gurp", caption)
 
 
+def _over_time(found: Superposition) -> Picture:
+    kinds = [kind for kind in found.tests if kind != SWEEP]
+    with figure(1, len(kinds), width=10.0, height=3.8) as (drawing, axes):
+        for panel, kind in zip(axes[0], kinds, strict=True):
+            symbol, colour = _TABLES[kind]
+            for degrees, label, marker in _marked(found, kind):
+                moved = found.moved(kind, degrees)
+                style = {**_POINTS, "marker": marker, "color": colour}
+                panel.plot(moved.argument, moved.values[0], label=label, **style)
+            _predictions(found, kind, panel)
+            panel.set(yscale="log", xlabel="t/a_T (s)", ylabel=symbol)
+            make_logarithmic(panel.xaxis)
+        if len(found.celsius) <= 10:
+            handles, labels = axes[0, 0].get_legend_handles_labels()
+            drawing.legend(handles, labels, loc="outside upper center", ncols=5)
+        caption = (
+            f"Tables over time as at {found.reference:g} °C, averages evenly spaced in log time, a "
+            "mark for each temperature."
+        )
+        if found.master(SWEEP) is not None:
+            caption += " The line is what the modes of the moved sweeps predict."
+        return picture(drawing, "over_time", caption)
+
+
+def _predictions(found: Superposition, kind: str, panel) -> None:
+    """Draw what the modes of the moved sweeps say, over the times that they reach."""
+    master = found.master(SWEEP)
+    if master is None:
+        return
+    times = np.geomspace(1.0 / master.argument[-1], 1.0 / master.argument[0], 200)
+    measured = [found.moved(kind, degrees).argument for degrees, *_ in _marked(found, kind)]
+    ends = min(one[0] for one in measured), max(one[-1] for one in measured)
+    times = times[(times >= ends[0]) & (times <= ends[1])]
+    values = predicted(spectrum_of(master), kind, times)[0]
+    panel.plot(times, values, color=BEFORE, lw=1.2, label="from the sweeps")
+
+
 def _shifts(found: Superposition) -> Picture:
     with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
         panel = axes[0, 0]
-        style = {**_POINTS, "ms": 5, "marker": "o", "color": BEFORE}
-        panel.plot(found.celsius, found.log_shift, label="a_T", **style)
+        style = {"ms": 5, "mfc": "none", "mew": 0.8, "marker": "o", "color": BEFORE}
+        half = 1.96 * found.error[:, 0]
+        panel.errorbar(found.celsius, found.log_shift, half, label="a_T", lw=1.0, ls="", **style)
         dense = np.linspace(found.celsius[0], found.celsius[-1], 200)
         for law in found.laws:
             line, colour = _LINES[law.name]
@@ -86,4 +139,4 @@ def _shifts(found: Superposition) -> Picture:
             panel.plot(dense, values, color=colour, ls=line, lw=1.2, label=law.name)
         panel.set(xlabel="temperature (°C)", ylabel="log₁₀ a_T")
         legend_above(drawing, axes)
-        return picture(drawing, "shifts", "Shift factors, and the laws fitted to them.")
+        return picture(drawing, "shifts", "Shift factors, with 95 %, and the laws fitted to them.")

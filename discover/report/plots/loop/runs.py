@@ -40,7 +40,7 @@ THOUSANDS = 1e4
 def through_decades(record: RunRecord) -> bool:
     """Return whether a run goes through decades of time, as start-ups do."""
     at_rest = record.control == "stress"  # in creep the stress is constant, and not the rate
-    return runs_through_decades(record.time, np.ones(1) if at_rest else record.rate)
+    return runs_through_decades(record.time, np.ones_like(record.time) if at_rest else record.rate)
 
 
 def symbol_of(records: Sequence[RunRecord]) -> str:
@@ -136,7 +136,7 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     marked, shown
         Which samples are marked as measured, and between which the models are drawn.
     """
-    if record.band is not None and record.is_transient:
+    if record.band is not None:
         low, high = record.band[:, shown]
         shade_between(
             panel, along[shown], low, high, alpha=0.18, lw=0,
