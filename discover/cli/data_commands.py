@@ -15,7 +15,7 @@ from discover.errors import InputError
 if TYPE_CHECKING:  # --help needs no data
     from discover.dataset import Dataset
 
-data_app = typer.Typer(help="Look at data folders.", no_args_is_help=True)
+data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_help=True)
 
 FolderArgument = Annotated[
     str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
@@ -59,7 +59,9 @@ def show(
     name: FolderArgument,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder for a page with every test drawn, and a study."),
+        typer.Option(
+            "--out", "-o", help="Folder for a page with all tests drawn, and a study to start from."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -113,11 +115,14 @@ def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
 def check(
     folder: FolderArgument,
     clock_factor: Annotated[
-        str | None, typer.Option("--clock-factor", help="Column of runs.csv to check as well.")
+        str | None,
+        typer.Option(
+            "--clock-factor", help="Column of runs.csv with a clock factor, to check as well."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say everything that is wrong or doubtful about a data folder; exit code 2 on errors."""
+    """List everything that is wrong or doubtful in a data folder; exit code 2 on errors."""
     from dataclasses import asdict
 
     from discover.dataset.checking.finding import Severity
@@ -144,19 +149,22 @@ def shift(
     folder: FolderArgument,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     reference: Annotated[
-        float | None, typer.Option("--reference", help="In °C; by default the middle one.")
+        float | None,
+        typer.Option(
+            "--reference", help="Temperature to shift to, in °C; default: the middle one."
+        ),
     ] = None,
     vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli too, not only frequencies.")
+        bool, typer.Option("--vertical", help="Shift moduli as well as frequencies.")
     ] = False,
     between: Annotated[
         tuple[float, float] | None,
-        typer.Option("--between", help="Only temperatures from one to the other, in °C."),
+        typer.Option("--between", help="Use only temperatures in this range, in °C."),
     ] = None,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    """Shift linear sweeps to one temperature, and say how well they superpose."""
     from discover.dataset.linear_agreement import linear_agreements
     from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.dataset.superposition import read_temperatures, shift_table, superpose
@@ -209,7 +217,7 @@ def shift(
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Exports, one or more tests in each.")
+        list[Path] | None, typer.Argument(help="Exported files, with one or more tests in each.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     mapping: Annotated[
@@ -230,43 +238,43 @@ def import_data(
         ),
     ] = None,
     lve: Annotated[
-        Path | None, typer.Option("--lve", help="Export of a linear frequency sweep.")
+        Path | None, typer.Option("--lve", help="File with the linear frequency sweep.")
     ] = None,
     block: Annotated[
-        list[int] | None, typer.Option("--block", min=1, help="Only these blocks of a file.")
+        list[int] | None, typer.Option("--block", min=1, help="Import only these blocks of a file.")
     ] = None,
     test: Annotated[
         list[str] | None,
         typer.Option(
             "--test",
-            help="What a block is, if it is taken for something else: melt.txt:2=creep; "
+            help="Kind of test in a block, if it is misread: melt.txt:2=creep; "
             "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none.",
         ),
     ] = None,
     temperature: Annotated[
         float | None,
-        typer.Option("--temperature", help="In °C, of several the one that is imported."),
+        typer.Option("--temperature", help="Temperature to import, in °C, if there are several."),
     ] = None,
     start_time: Annotated[
         float | None,
-        typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
+        typer.Option("--start-time", help="Clock reading when the flow started, in s."),
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--format", help="Importer of your own; by default by suffix, else text."),
+        typer.Option("--format", help="Importer of your own; default: by suffix, else text."),
     ] = None,
     delimiter: Annotated[
         str | None, typer.Option("--delimiter", help="tab, semicolon or comma.")
     ] = None,
     decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign, . or ,")] = None,
     header_row: Annotated[
-        int | None, typer.Option("--header-row", min=1, help="Line with the names of columns.")
+        int | None, typer.Option("--header-row", min=1, help="Line with the column names.")
     ] = None,
     encoding: Annotated[str | None, typer.Option("--encoding", help="Such as cp1252.")] = None,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Make a data folder from exports of a rheometer: tables, spreadsheets, RepTate, your own."""
+    """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
     from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder
