@@ -79,7 +79,9 @@ def show(
         content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
         typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
         return
-    say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
+    linear = f"a linear sweep with {n_sweep} points" if n_sweep else "no linear sweep"
+    runs = "1 run" if len(rows) == 1 else f"{len(rows)} runs"
+    say(f"{dataset.name}: {runs}, {linear}")
     typer.echo(
         f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
     )
@@ -91,9 +93,10 @@ def show(
             f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {words}"
         )
     if page is None:
-        say("Drawn, on a page, with a study to start from: add --out DIR.")
+        say("For a page with all tests drawn, and a study to start from, add --out DIR.")
     else:
         say(f"Page: {page}")
+        say(f"A study to start from: discover close-loop {page.with_name('study.toml')}")
 
 
 def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
