@@ -13,8 +13,9 @@
 # %% [markdown]
 # # Many studies
 #
-# How much noise does a closed loop bear? One study for each level of noise answers that, and one of
-# them cannot run at all. From a terminal the same is `discover batch studies/*.toml --out results`.
+# How much noise can a closed loop stand? One study for each level of noise answers that. One study
+# is broken on purpose and cannot run. From a terminal, the same is `discover batch studies/*.toml
+# --out results`.
 
 # %%
 import tempfile
@@ -48,8 +49,9 @@ studies = [studies[0], broken, *studies[1:]]
 # %% [markdown]
 # ## It is stopped half-way
 #
-# Somebody presses Ctrl-C, the lights go out, the cluster's time is up. Here the progress function,
-# which hears what is going on and the fraction done, stops the batch once two studies have ended.
+# Somebody presses Ctrl-C, the power fails, or the cluster's time is up. Here the progress function,
+# which is told what is going on and what fraction is done, stops the batch once two studies have
+# ended.
 
 
 # %%
@@ -66,13 +68,13 @@ except KeyboardInterrupt:
 pd.read_csv(out / "table.csv")[["study", "outcome", "reason"]]
 
 # %% [markdown]
-# The page and the table are kept up to date while studies run. The failed study says what to mend,
+# The page and the table are kept up to date while studies run. The failed study says what to fix,
 # and the rest went on without it.
 #
-# ## It goes on
+# ## It resumes
 #
-# The same call again. What is finished is not touched (`complete`), the rest is done now, and the
-# results are byte for byte those of a batch that nobody disturbed.
+# Make the same call again. Finished studies are not touched (`complete`), the rest are run now, and
+# the results are the same, byte for byte, as those of an undisturbed batch.
 
 # %%
 before = (out / "noise_01" / "loop.json").stat().st_mtime_ns
@@ -86,7 +88,7 @@ for study in result.studies:
 #
 # One line for each study. `result.index` is a page that sorts by any column; `table.csv` can be read
 # without this software. Studies that compare two learners fill further columns: the terms of each,
-# its errors, what every rule for choosing a law took, rivals, and what is not determined.
+# its errors, which law every rule chose, rivals, and what is not determined.
 
 # %%
 result
@@ -96,9 +98,9 @@ table = pd.read_csv(out / "table.csv")
 table.loc[table["outcome"] == "failed", ["study", "reason"]]
 
 # %% [markdown]
-# From here on it is pandas. With more noise the error that is left on the held-out runs is the noise
-# itself; what the loop adds to the declared Maxwell fluid is visible as long as the first stands
-# above the second.
+# From here on it is pandas. With more noise, the remaining error on the held-out runs is the noise
+# itself. What the loop adds to the declared Maxwell fluid is visible as long as the error before it
+# is above the error after it.
 
 # %%
 done = table[table["outcome"] == "result"].set_index("study")
@@ -126,5 +128,5 @@ law.sympy()
 
 # %% [markdown]
 # `run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
-# that a cluster has room for; `docs/batches.md` says how to get one under SLURM. A worker that dies
-# loses nothing either.
+# that a cluster has room for; `docs/batches.md` says how to set one up under SLURM. Nothing is lost
+# if a worker dies.

@@ -14,9 +14,9 @@
 # # Closing the loop
 #
 # A fluid is declared to be upper convected Maxwell. It is not: the data come from a Giesekus fluid.
-# The loop looks at the residual, scores what the model may lack, in the fluid and in the
-# instrument, adds the best, and judges it on runs that no fit saw. First on data where the answer is
-# known, then on a measured melt.
+# The loop looks at the residual, scores the effects that the model may lack, in the fluid and in
+# the instrument, adds the best one, and judges it on runs that no fit saw. This notebook does that
+# first on data where the answer is known, then on a measured melt.
 
 # %%
 import matplotlib.pyplot as plt
@@ -41,7 +41,7 @@ result = run_loop(
 result
 
 # %% [markdown]
-# ## Why this effect: all candidates, and what each would have brought
+# ## Why this effect: all candidates, and what each would have gained
 #
 # `score` is the share of the residual that the effect's signature explains to first order,
 # `left_out_error` the error on each run left out in turn after a refit. `aliases` are effects that
@@ -57,7 +57,7 @@ for stage in result.stages:
 # %% [markdown]
 # ## The augmented law
 #
-# It can be read back, simulated and handed on.
+# It can be read back, simulated and exported.
 
 # %%
 result.sympy()
@@ -82,9 +82,10 @@ plt.show()
 # ## On measured data
 #
 # Start-up of a polyisoprene melt, declared as upper convected Maxwell with the spectrum of its own
-# linear sweep. Up to a strain of 0.4 linear theory should hold, and yet the fast runs are missed by
-# half. The loop sees the runs at −10 °C; those at −23 °C judge. The data are not part of this
-# project: without `DISCOVER_DATA` this part is skipped. More on them in `docs/polyisoprene.md`.
+# linear sweep. Up to a strain of 0.4 linear theory should hold, and yet it misses the fast runs by
+# half. The loop fits the runs at −10 °C; those at −23 °C are held out as a test. The data are not
+# part of this project: without `DISCOVER_DATA` this part is skipped. More on them in
+# `docs/polyisoprene.md`.
 
 # %%
 from discover.dataset import load_dataset, relaxation_spectrum
@@ -117,9 +118,9 @@ if melt is not None:
 found
 
 # %% [markdown]
-# What is missing is in the instrument, one short time for all runs. The fluid leaves as it was
-# declared. Whether the rate comes up late or the transducer lags, these five runs cannot tell: each
-# is an alias of the other. All eleven favour the rate.
+# What is missing is in the instrument: one short time for all runs. The fluid stays as it was
+# declared. These five runs cannot tell whether the rate rises late or the transducer lags: each is
+# an alias of the other. All eleven runs favour the rate.
 
 # %%
 if found is not None:

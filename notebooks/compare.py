@@ -55,7 +55,7 @@ network = TBNNUDE(quick=True).fit(data.runs)
 network.result_
 
 # %% [markdown]
-# Put into words (projected on the library), its law is an expression like the other's.
+# Projected onto the library, its law is an expression like the other one.
 
 # %%
 network.result_.sympy()

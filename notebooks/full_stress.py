@@ -13,9 +13,10 @@
 # %% [markdown]
 # # Full-stress data with pysindy
 #
-# A simulation, or a rheometer that measures N1 and N2 too, gives every component of the stress. Then
-# no unseen stress has to be integrated: the law is a regression of dσ/dt on σ and γ̇, which pysindy
-# solves by itself. The tensor library adds what a general polynomial lacks: frame invariance.
+# A simulation, or a rheometer that measures N1 and N2 too, gives every component of the stress.
+# Then there is no unmeasured stress to integrate: the law is a regression of dσ/dt on σ and γ̇,
+# which pysindy solves by itself. The tensor library adds what a general polynomial lacks: frame
+# invariance.
 #
 # The data: a Giesekus fluid, α = 0.3, in two oscillations and a start-up, made by scipy, with 0.5 %
 # noise. Stress is in units of the modulus, time in units of the relaxation time.
@@ -71,9 +72,9 @@ free.fit(stresses, t=times, u=controls, feature_names=names)
 free.print(precision=2)
 
 # %% [markdown]
-# Three equations that know nothing of each other. In a Giesekus law one α stands in all of them; here
-# the coefficients of σ12² in the first two equations, and of σ11 σ12 and σ22 σ12 in the last, are four
-# numbers. A law in which they differ depends on the axes of whoever writes it down.
+# These are three independent equations. In a Giesekus law the same α appears in all of them; here
+# the coefficients of σ12² in the first two equations, and of σ11 σ12 and σ22 σ12 in the last, are
+# four different numbers. A law in which they differ depends on the choice of axes.
 
 # %%
 places = {"11: σ12²": (0, "s12^2"), "22: σ12²": (1, "s12^2")}
@@ -92,10 +93,10 @@ pd.Series(mobilities(free), name="should all be −0.3").round(3).to_frame()
 # ## Frame invariance as constraints
 #
 # The upper convected production and the tensors of the library span all polynomials of this degree
-# that do not depend on the observer (and do not vanish in shear). Whatever is orthogonal to them must
-# vanish: equality constraints on the coefficients. One inequality more says that the coefficient of
-# σ·σ cannot be positive, as a mobility is not negative. For inequalities pysindy needs cvxpy:
-# `pip install "discover-rheology[cvxpy]"`.
+# that do not depend on the observer (and do not vanish in shear). Whatever is orthogonal to them
+# must vanish: equality constraints on the coefficients. One further inequality says that the
+# coefficient of σ·σ cannot be positive, as a mobility is not negative. For inequalities pysindy
+# needs cvxpy: `pip install "discover-rheology[cvxpy]"`.
 
 # %%
 from discover.precision import enable_x64
@@ -156,8 +157,9 @@ plt.show()
 # %% [markdown]
 # ## The same without constraints
 #
-# Shorter, and what `discover` does: regress on the tensors themselves, all components in one column.
-# A coefficient is then one number for all equations, and any pysindy optimiser will do.
+# A shorter way, which `discover` also uses, is to regress on the tensors themselves, with all
+# components in one column. A coefficient is then one number for all equations, and any pysindy
+# optimiser will do.
 
 # %%
 differentiate = settings["differentiation_method"]

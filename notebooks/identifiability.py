@@ -13,7 +13,7 @@
 # %% [markdown]
 # # What shear stress can and cannot tell
 #
-# Ten minutes, five questions, one fluid. The data are σ12 of a Johnson–Segalman fluid in four
+# Five questions about one fluid, in ten minutes. The data are σ12 of a Johnson–Segalman fluid in four
 # oscillatory flows, with 2 % noise. Nothing else was measured.
 
 # %%
@@ -45,7 +45,7 @@ library = TermLibrary((*build_library().terms, *map(parse_term, extra)))
 # ## 1. Before any fit: what could these flows tell?
 #
 # The sensitivities of σ12 to every coefficient of the library have null directions: combinations
-# that no datum can ever see, however small the noise.
+# that no measurement in these flows can ever see, however small the noise.
 
 # %%
 structure = analyse_structure(list(data), library)
@@ -59,7 +59,7 @@ for law in structure.laws:
 # %% [markdown]
 # ## 2. The fit, with intervals
 #
-# The interval respects that residuals may remember their past; here they do not.
+# The interval allows for residuals that are correlated in time; here they are not.
 
 # %%
 model = TensorSINDy(library, max_terms=3).fit(data)
@@ -90,7 +90,8 @@ find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 # %% [markdown]
 # ## 5. What to measure next
 #
-# The experiment expected to separate the laws that remain, at the noise at hand; then we run it.
+# The proposed experiment is the one expected to separate the remaining laws at this noise. Then we
+# run it.
 
 # %%
 from discover.identify.design.experiment_outcome import judge_laws
@@ -135,4 +136,4 @@ axes[0].legend()
 plt.show()
 
 # %% [markdown]
-# σ12 agrees for both laws. N2 tells them apart at a glance: that is what had to be measured.
+# σ12 agrees for both laws. N2 tells them apart at a glance, so that is what has to be measured.

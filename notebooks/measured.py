@@ -13,13 +13,14 @@
 # %% [markdown]
 # # Measured data: loop, comparison, loop
 #
-# Start-ups of a polyisoprene melt at two temperatures, with a linear sweep of its own. Three runs at
-# −10 °C are fitted, two at −23 °C only judge. At small strain a loop asks what the *instrument* does;
-# with that known, a comparison asks which *law* the melt has; where no law does, a second loop says
-# what is missing from the best one.
+# The data are start-ups of a polyisoprene melt at two temperatures, with a linear sweep of its own.
+# Three runs at −10 °C are fitted; two at −23 °C are held out as a test. At small strain a loop asks
+# what the *instrument* does. With that known, a comparison asks which *law* the melt has. Since no
+# law describes it, a second loop says what is missing from the best one.
 #
-# The data are not part of this project: without `DISCOVER_DATA` every part is skipped. These are five
-# of eleven runs, thinned, so that all of it takes a minute; `docs/polyisoprene.md` has the whole set.
+# The data are not part of this project: without `DISCOVER_DATA` every part is skipped. These are
+# five of eleven runs, thinned, so that the notebook takes a minute; `docs/polyisoprene.md` has the
+# whole set.
 
 # %%
 from dataclasses import replace
@@ -51,7 +52,8 @@ except dc.InputError as error:
 # %% [markdown]
 # ## First loop: the instrument
 #
-# Up to a strain of 0.4 the melt is nearly linear, so what linear theory misses there is not the law.
+# Up to a strain of 0.4 the melt is nearly linear, so an error of linear theory there is not due to
+# the law.
 
 # %%
 small = None
@@ -70,8 +72,8 @@ small
 # %% [markdown]
 # ## Comparison: which law
 #
-# What the first loop found is now known. Sparse regression on the tensors with constant coefficients,
-# and the classical laws beside it, on strains to 25.
+# What the first loop found now counts as known. Sparse regression on the tensors with constant
+# coefficients, and the classical laws, are fitted to strains up to 25.
 
 # %%
 comparison, known = None, {}
@@ -93,8 +95,8 @@ if melt is not None:
 comparison.terms_table() if comparison else None
 
 # %% [markdown]
-# Errors of σ12 in percent: over all fitted runs, and on each run that only judges. A constant in
-# brackets stands at the end of its range, where it is no finding.
+# Errors of σ12 in per cent: over all fitted runs, and on each held-out run. A constant in brackets
+# is at the end of its range, so it is not a finding.
 
 
 # %%
@@ -116,8 +118,8 @@ pd.DataFrame(rows).T.fillna("")
 # %% [markdown]
 # ## Second loop: what the best of these laws lacks
 #
-# The classical law with the lowest criterion becomes the declared one, its constant is fitted along,
-# and the instrument stays known. Candidates are ways in which a melt loses or gains network.
+# The classical law with the lowest criterion becomes the declared one, its constant is fitted
+# again, and the instrument stays known. Candidates are ways in which a melt loses or gains network.
 
 # %%
 found = None
@@ -147,14 +149,16 @@ if found is not None:
 # %% [markdown]
 # ## What was found, and what was not
 #
-# - **The instrument** is the surest finding: one short time in which the rate comes up, fitted at
-#   −10 °C, takes most of the error at −23 °C. Whether it is that, a lag of the transducer or a delay,
-#   small strains do not say.
-# - **The law is not determined by these data.** None of the classical laws describes the fitted runs to
-#   better than a sixth of their stress; Giesekus's mobility goes to the end of its range. The laws
-#   that fit about as well differ in runs that they did not see, and neither N1 nor N2 follows from σ12.
-# - **What is missing** is a loss of network with strain: the second loop takes most of the error on the
-#   fitted runs and on the slower judge, makes the faster one worse, and so ends in *unexplained*. An effect that fits and
-#   does not carry over is a description of these runs, not a mechanism.
-# - **What would settle it**: runs at −10 °C as fast, on the chains' own time, as those at −23 °C, and N1
-#   from an instrument stiff enough to measure it.
+# - **The instrument** is the surest finding: one short rise time of the rate, fitted at −10 °C,
+#   removes most of the error at −23 °C. Small strains do not say whether it is that, a lag of the
+#   transducer or a delay.
+# - **The law is not determined by these data.** None of the classical laws describes the fitted
+#   runs to better than a sixth of their stress; Giesekus's mobility goes to the end of its range.
+#   The laws that fit about as well differ in runs that they did not see, and neither N1 nor N2
+#   follows from σ12.
+# - **What is missing** is a loss of network with strain: the second loop removes most of the error
+#   on the fitted runs and on the slower held-out run, makes the faster one worse, and so ends in
+#   *unexplained*. An effect that fits but does not carry over describes these runs; it is not a
+#   mechanism.
+# - **What would settle it**: runs at −10 °C as fast, on the chains' own time, as those at −23 °C,
+#   and N1 from an instrument stiff enough to measure it.

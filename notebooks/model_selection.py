@@ -15,7 +15,7 @@
 #
 # A library holds many laws, and several fit. This notebook follows the choice: the best law of
 # every size, four rules for choosing among them, the laws that the data cannot rule out, what noise
-# does to all that, and what no choice can mend.
+# does to all that, and what no rule can decide.
 #
 # The data are σ12 in four oscillatory flows of a linear Phan-Thien–Tanner fluid, ε = 0.2, whose
 # term is tr(σ)σ, with 5 % noise. Eleven terms may be chosen.
@@ -82,10 +82,10 @@ plt.show()
 #
 # `bic` asks how well a law fits for its size, `held_out` how well it predicts other runs,
 # `stability` whether its terms are chosen again from halves of the data. `pysindy` is the sparse
-# optimiser left to itself, at its default threshold. Where they agree, the choice does not hang on
-# the rule; where they do not, none is to be trusted alone, and the reason is worth knowing. Here
-# `held_out` keeps the empty law, four times as far off: it asks a t-test over the runs for more
-# terms, and four runs that differ in flow give that test next to no power.
+# optimiser on its own, at its default threshold. If they agree, the choice does not depend on the
+# rule. If they do not, trust none of them alone, and find out why they differ. Here `held_out`
+# keeps the empty law, which is four times as far off: it adds terms only if a t-test over the runs
+# supports them, and with four runs in different flows that test has next to no power.
 
 # %%
 model.result_.selectors_table()
@@ -93,8 +93,8 @@ model.result_.selectors_table()
 # %% [markdown]
 # ## The law
 #
-# It shows itself; `.table()`, `.sympy()` and `.latex()` are the same as a DataFrame, for further
-# algebra and for a paper.
+# The notebook displays the law. `.table()` gives it as a DataFrame, `.sympy()` for further algebra
+# and `.latex()` for a paper.
 
 # %%
 model.result_
@@ -108,8 +108,8 @@ print(model.result_.latex())
 # %% [markdown]
 # ## Rivals
 #
-# To be chosen is not to be alone. Every law that the search fitted is tested against the chosen one
-# on the residuals: can the data tell the two apart at 5 %?
+# The chosen law is not the only one that fits. Every law that the search fitted is tested against
+# the chosen one on the residuals: can the data tell the two apart at 5 %?
 
 # %%
 chosen = model.path_[model.result_.details["chosen"]]
@@ -118,9 +118,9 @@ find_rivals(model.search_, chosen)
 # %% [markdown]
 # ## What noise does
 #
-# The same flows at other noise. First the interval widens, then rivals come up that the data do not
-# rule out, and in the end another law than the true one fits best, with the true one among its
-# rivals. From there on the data have no law to give, only a list.
+# The same flows at other noise. First the interval widens, then rivals appear that the data do not
+# rule out, and in the end a law other than the true one fits best, with the true one among its
+# rivals. From there on the data give no single law, only a list.
 
 # %%
 lines = []
@@ -147,9 +147,9 @@ pd.DataFrame(lines)
 # %% [markdown]
 # ## Not determined by these data
 #
-# No rule and no amount of data helps where two laws give the same σ12 in these flows. That is known
-# before anything is measured: combinations of terms that no datum sees, and whether they move the
-# normal stresses.
+# No rule and no amount of data helps where two laws give the same σ12 in these flows. This can be
+# known before anything is measured: which combinations of terms no measurement sees, and whether
+# they change the normal stresses.
 
 # %%
 law = LawTerms({term.term: term.coefficient for term in model.terms_})
@@ -161,5 +161,6 @@ structure.laws[-1]
 
 # %% [markdown]
 # So the choice among laws that σ12 tells apart is a matter of noise, and the rules above settle it
-# or say that they cannot. What lies along an unseen combination is a matter of what was measured:
-# more σ12 will never settle it, one run of N2 may. The notebook `identifiability` goes on from here.
+# or say that they cannot. The choice along an unseen combination is a matter of what was measured:
+# more σ12 will never settle it; one run with N2 may. The notebook `identifiability` goes on from
+# here.

@@ -18,8 +18,8 @@ from discover.cli.study_commands import batch, close_loop, compare, demo
 
 app = typer.Typer(
     name="discover",
-    help="Find the constitutive equation of a viscoelastic fluid from shear rheometry, and say "
-    "what the data can and cannot tell. Start with: discover demo",
+    help="Find the constitutive equation of a viscoelastic fluid from rheometer data, and say "
+    "what the data can and cannot tell. To begin: discover demo",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -37,7 +37,7 @@ def _print_version(wanted: bool) -> bool:
 def _root(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Print the version and leave.", callback=_print_version),
+        typer.Option("--version", help="Print the version and exit.", callback=_print_version),
     ] = False,
 ) -> None:
     del version

@@ -15,7 +15,7 @@ from discover.errors import InputError
 if TYPE_CHECKING:  # --help needs no data
     from discover.dataset import Dataset
 
-data_app = typer.Typer(help="Look at data folders.", no_args_is_help=True)
+data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_help=True)
 
 FolderArgument = Annotated[
     str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
@@ -59,7 +59,9 @@ def show(
     name: FolderArgument,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder for a page with every test drawn, and a study."),
+        typer.Option(
+            "--out", "-o", help="Folder for a page with all tests drawn, and a study to start from."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -77,7 +79,9 @@ def show(
         content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
         typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
         return
-    say(f"{dataset.name}: {len(rows)} runs, linear sweep with {n_sweep} points")
+    linear = f"a linear sweep with {n_sweep} points" if n_sweep else "no linear sweep"
+    runs = "1 run" if len(rows) == 1 else f"{len(rows)} runs"
+    say(f"{dataset.name}: {runs}, {linear}")
     typer.echo(
         f"{'run':<32}{'samples':>8}{'duration s':>12}{'rate 1/s':>11}{'stress Pa':>11}  flow"
     )
@@ -89,9 +93,10 @@ def show(
             f"{row['largest_rate_1_s']:>11.3g}{row['largest_stress_Pa']:>11.3g}  {words}"
         )
     if page is None:
-        say("Drawn, on a page, with a study to start from: add --out DIR.")
+        say("For a page with all tests drawn, and a study to start from, add --out DIR.")
     else:
         say(f"Page: {page}")
+        say(f"A study to start from: discover close-loop {page.with_name('study.toml')}")
 
 
 def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
@@ -113,11 +118,14 @@ def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
 def check(
     folder: FolderArgument,
     clock_factor: Annotated[
-        str | None, typer.Option("--clock-factor", help="Column of runs.csv to check as well.")
+        str | None,
+        typer.Option(
+            "--clock-factor", help="Column of runs.csv with a clock factor, to check as well."
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say everything that is wrong or doubtful about a data folder; exit code 2 on errors."""
+    """List everything that is wrong or doubtful in a data folder; exit code 2 on errors."""
     from dataclasses import asdict
 
     from discover.dataset.checking.finding import Severity
@@ -144,14 +152,17 @@ def shift(
     folder: FolderArgument,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     reference: Annotated[
-        float | None, typer.Option("--reference", help="In °C; by default the middle one.")
+        float | None,
+        typer.Option(
+            "--reference", help="Temperature to shift to, in °C; default: the middle one."
+        ),
     ] = None,
     vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli too, not only time.")
+        bool, typer.Option("--vertical", help="Shift moduli as well as times and frequencies.")
     ] = False,
     between: Annotated[
         tuple[float, float] | None,
-        typer.Option("--between", help="Only temperatures from one to the other, in °C."),
+        typer.Option("--between", help="Use only temperatures in this range, in °C."),
     ] = None,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
@@ -208,7 +219,7 @@ def shift(
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Exports, one or more tests in each.")
+        list[Path] | None, typer.Argument(help="Exported files, with one or more tests in each.")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     mapping: Annotated[
@@ -229,43 +240,43 @@ def import_data(
         ),
     ] = None,
     lve: Annotated[
-        Path | None, typer.Option("--lve", help="Export of a linear frequency sweep.")
+        Path | None, typer.Option("--lve", help="File with the linear frequency sweep.")
     ] = None,
     block: Annotated[
-        list[int] | None, typer.Option("--block", min=1, help="Only these blocks of a file.")
+        list[int] | None, typer.Option("--block", min=1, help="Import only these blocks of a file.")
     ] = None,
     test: Annotated[
         list[str] | None,
         typer.Option(
             "--test",
-            help="What a block is, if it is taken for something else: melt.txt:2=creep; "
+            help="Kind of test in a block, if it is misread: melt.txt:2=creep; "
             "frequency_sweep, amplitude_sweep, flow_curve, relaxation, creep, run or none.",
         ),
     ] = None,
     temperature: Annotated[
         float | None,
-        typer.Option("--temperature", help="In °C, of several the one that is imported."),
+        typer.Option("--temperature", help="Temperature to import, in °C, if there are several."),
     ] = None,
     start_time: Annotated[
         float | None,
-        typer.Option("--start-time", help="Reading of the clock, in s, when the flow started."),
+        typer.Option("--start-time", help="Clock reading when the flow started, in s."),
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--format", help="Importer of your own; by default by suffix, else text."),
+        typer.Option("--format", help="Importer of your own; default: by suffix, else text."),
     ] = None,
     delimiter: Annotated[
         str | None, typer.Option("--delimiter", help="tab, semicolon or comma.")
     ] = None,
     decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign, . or ,")] = None,
     header_row: Annotated[
-        int | None, typer.Option("--header-row", min=1, help="Line with the names of columns.")
+        int | None, typer.Option("--header-row", min=1, help="Line with the column names.")
     ] = None,
     encoding: Annotated[str | None, typer.Option("--encoding", help="Such as cp1252.")] = None,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Make a data folder from exports of a rheometer: tables, spreadsheets, RepTate, your own."""
+    """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
     from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder

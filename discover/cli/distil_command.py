@@ -27,10 +27,12 @@ PAPER_PAIRS = (
 def distil(
     teacher: Annotated[
         str | None,
-        typer.Option("--teacher", help="Law with parameters, such as giesekus:alpha=0.2."),
+        typer.Option(
+            "--teacher", help="Law to imitate, with parameters, such as giesekus:alpha=0.2."
+        ),
     ] = None,
     student: Annotated[
-        str | None, typer.Option("--student", help="Law to teach, such as ucm.")
+        str | None, typer.Option("--student", help="Law to fit, such as ucm.")
     ] = None,
     penalty: Annotated[float, typer.Option("--penalty", help="Weight of the paper's penalty.")] = (
         0.01
@@ -38,7 +40,7 @@ def distil(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Teach one law to another by shear stress alone; without options, the paper's pairs."""
+    """Fit one law to the shear stress of another; without options, for the paper's pairs."""
     if (teacher is None) != (student is None):
         raise InputError("Give --teacher and --student together, or neither for the paper's pairs.")
     from discover.compilation_cache import enable_compilation_cache

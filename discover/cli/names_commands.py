@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # --help needs no tables
 
 @guarded
 def laws(as_json: JsonOption = False) -> None:
-    """List the laws that a study can name, yours among them, with their parameters."""
+    """List the laws that a study can name, including your own, with their parameters."""
     from discover.laws import laws_table
 
     _show(laws_table(), ("title",), as_json)
@@ -24,7 +24,7 @@ def laws(as_json: JsonOption = False) -> None:
 
 @guarded
 def effects(as_json: JsonOption = False) -> None:
-    """List the effects that a loop can add, yours among them, with their parameters."""
+    """List the effects that a loop can add, including your own, with their parameters."""
     from discover.effects import effects_table
 
     _show(effects_table(), ("kind",), as_json)

@@ -8,16 +8,18 @@ import typer
 StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
 OutOption = Annotated[
     Path | None,
-    typer.Option("--out", "-o", help="Folder for the results; by default results/STUDY."),
+    typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY."),
 ]
 SeedOption = Annotated[
     int | None,
     typer.Option(
-        "--seed", min=0, max=2**32 - 1, help="Seed of noise and learners, instead of the study's."
+        "--seed", min=0, max=2**32 - 1, help="Seed of noise and learners, in place of the study's."
     ),
 ]
-QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary.")]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Start afresh instead of going on where a run stopped.")
+    bool, typer.Option("--overwrite", help="Start again instead of resuming.")
 ]

@@ -28,7 +28,7 @@ def compare(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Run both learners on identical data and write a comparison report."""
+    """Run both learners on the same data and write a comparison report."""
     from discover.batch.tasks import run_compare
 
     _run_task(run_compare, study, out, seed, quiet, as_json, overwrite)
@@ -43,7 +43,7 @@ def close_loop(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Fit, find what the model lacks, add it, and judge on runs that no fit saw."""
+    """Fit a model, find what it lacks, add that, and test the result on held-out runs."""
     from discover.batch.tasks import run_close_loop
 
     _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite)
@@ -52,9 +52,12 @@ def close_loop(
 @guarded
 def batch(
     studies: Annotated[list[Path], typer.Argument(help="Study files.", show_default=False)],
-    out: OutOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for the results; default: results/batch."),
+    ] = None,
     workers: Annotated[
-        int, typer.Option("--workers", min=1, max=1024, help="Processes on this machine.")
+        int, typer.Option("--workers", min=1, max=1024, help="Number of processes on this machine.")
     ] = 1,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Address of a dask scheduler, host:port.")
@@ -64,7 +67,7 @@ def batch(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Run many studies; those that fail are listed with their reason while the rest go on."""
+    """Run many studies; one that fails is listed with its reason and does not stop the rest."""
     from discover.batch.run import run_batch
 
     folder = out or Path("results") / "batch"
@@ -91,7 +94,7 @@ def demo(
     quiet: QuietOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Show everything on small synthetic data, in about two minutes."""
+    """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
     from discover.batch.demo import run_demo
 
     with progress_bar(quiet) as report:

@@ -63,7 +63,7 @@ def outcome_equation(
         known,
         # without a known part in the way, the terms keep their intervals
         terms=combined(known.terms + found) if known.terms else found,
-        title=f"Law found by {who} in the study {study}.",
+        title=f"Law found by {who} in the study '{study}'.",
         notes=(_PROJECTION,) if outcome.learner == "tbnn_ude" else (),
         tested=tested,
     )

@@ -16,13 +16,16 @@ def reference_page() -> str:
     lines = [
         "# The dictionary of effects",
         "",
-        "Written by `python -m discover.effects.reference > docs/effects.md`; a test holds the",
-        "two together. What follows is what the closed loop may add to a declared law. The first",
-        "parameter of an effect is its amplitude: at zero it changes nothing. A parameter has the",
-        "range that it can have in a laboratory; one that a fit drives to the end of it, or leaves",
-        "open over decades, is no finding, and the effect is not named. Any term of the",
-        "tensor library, such as `tr(sigma)*sigma`, is a candidate too. An effect of your own is",
-        "one file: see [adding an effect](adding-an-effect.md).",
+        "These are the effects that the closed loop may add to a declared law. The first",
+        "parameter of an effect is its amplitude: at zero the effect changes nothing. The range",
+        "of a parameter is the range that it can have in a laboratory. If a fit drives a",
+        "parameter to the end of its range, or leaves it open over decades, that is not a",
+        "finding, and the effect is not named. Any term of the tensor library, such as",
+        "`tr(sigma)*sigma`, is a candidate too. An effect of your own is one file: see [adding",
+        "an effect](adding-an-effect.md).",
+        "",
+        "This page is written by `python -m discover.effects.reference > docs/effects.md`; a",
+        "test checks it against the code.",
     ]
     for kind, title in _WHERE.items():
         lines += ["", f"## {title}"]
@@ -38,7 +41,7 @@ def _entry(effect: AbstractEffect) -> list[str]:
         "",
         f"$${effect.equation}$$",
         "",
-        "| parameter | symbol | unit | physical range | because |",
+        "| parameter | symbol | unit | physical range | reason for the range |",
         "|---|---|---|---|---|",
         *(
             f"| `{parameter.name}` | ${parameter.symbol}$ | {parameter.unit or '–'} "
@@ -46,8 +49,8 @@ def _entry(effect: AbstractEffect) -> list[str]:
             for parameter in effect.parameters
         ),
         "",
-        *(["- Candidate where a study asks for it by name."] if effect.on_request else []),
-        f"- Shows from: {effect.visible}",
+        *(["- A candidate only if a study asks for it by name."] if effect.on_request else []),
+        f"- Visible from: {effect.visible}",
         f"- To confirm: {effect.check}",
         f"- Source: {effect.source.rstrip('.')}.",
     ]

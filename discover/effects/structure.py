@@ -96,8 +96,8 @@ INVERSE_STRESS = EffectParameter(
     high=100.0,
     scale="inverse_stress",
     first_trial=0.3,
-    range_source="half of a structure is broken at the critical stress: at a hundredth of the "
-    "stress recorded it is broken throughout",
+    range_source="half of a structure is broken at the critical stress; if that is a hundredth of "
+    "the recorded stress, the structure is broken throughout",
     range_scale="inverse_stress",
 )
 """Amplitude of what the stress breaks."""
@@ -110,7 +110,7 @@ BUILD_UP_TIME = EffectParameter(
     high=1e6,
     scale="run_time",
     first_trial=0.3,
-    range_source="as that of thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
+    range_source="as for thixotropy, from some milliseconds to never (Mewis & Wagner 2009)",
     ends=("high",),
 )
 
@@ -120,8 +120,9 @@ EXPONENT = EffectParameter(
     low=0.1,
     high=4.0,
     first_trial=1.0,
-    range_source="1 in most models of thixotropy, others in some (Mewis & Wagner 2009), 2/3 in "
-    "Cross's equation for dispersions; beyond 4 a structure breaks at one rate or stress at once",
+    range_source="1 in most models of thixotropy, other values in some (Mewis & Wagner 2009), 2/3 "
+    "in Cross's equation for dispersions; beyond 4 the whole structure breaks at one rate or "
+    "stress",
 )
 
 SLOWNESS = EffectParameter(
@@ -130,8 +131,8 @@ SLOWNESS = EffectParameter(
     low=2.0,
     high=1e4,
     first_trial=30.0,
-    range_source="structure times closer than twofold are hardly two (those of Wei, Solomon & "
-    "Larson 2018 spread over decades)",
+    range_source="structure times less than a factor of two apart count as one (those of Wei, "
+    "Solomon & Larson 2018 spread over decades)",
 )
 """The slow structure time over the fast one."""
 
@@ -141,5 +142,5 @@ SLOW_SHARE = EffectParameter(
     low=0.01,
     high=0.99,
     first_trial=0.1,
-    range_source="with less than one part in a hundred of either there are no two structures",
+    range_source="with less than one part in a hundred of either there is only one structure",
 )

@@ -7,6 +7,7 @@ import numpy as np
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.labelled_arrays import xarray_module
 from discover.learners.runs import as_runs
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
     variables = {"coefficient": (("chain", "draw", "term"), values[None])}
     variables |= {name: (("chain", "draw"), column[None]) for name, column in inner.items()}
     coordinates = {"chain": [0], "draw": np.arange(len(values)), "term": terms}
-    return _xarray().Dataset(variables, coordinates, {"given": given, **_source(estimator)})
+    return xarray_module().Dataset(variables, coordinates, {"given": given, **_source(estimator)})
 
 
 def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":
@@ -80,7 +81,7 @@ def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Data
         "run": ("sample", np.concatenate([[run.name] * len(run) for run in followed])),
         "time_s": ("sample", np.concatenate([run.time for run in followed])),
     }
-    return _xarray().Dataset(variables, coordinates, _source(estimator))
+    return xarray_module().Dataset(variables, coordinates, _source(estimator))
 
 
 def _of_a_sparse_law(
@@ -109,13 +110,3 @@ def _of_a_sparse_law(
 def _source(estimator: Any) -> dict[str, str]:
     found = estimator.provenance_
     return {"learner": estimator.learner, "data": found.data, "runs": ", ".join(found.runs)}
-
-
-def _xarray():
-    try:
-        import xarray
-    except ImportError:
-        raise InputError(
-            'This needs xarray; install it with: pip install "discover-rheology[xarray]".'
-        ) from None
-    return xarray

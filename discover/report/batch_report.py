@@ -88,7 +88,8 @@ def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
     for i, (term, value, inner) in enumerate(terms):
         sign = "<mo>−</mo>" if value < 0 else "<mo>+</mo>" if i else ""
         parts.append(f"{sign}{_term(term, inner, abs(value))}")
-    return f"<math><mrow>{''.join(parts)}</mrow></math>" if parts else "no term"
+    # each term stands alone, so that a long law goes on in the next line
+    return " ".join(f"<math><mrow>{part}</mrow></math>" for part in parts) or "no term"
 
 
 def _support(terms: Sequence[str] | None) -> str:

@@ -19,6 +19,8 @@ from discover.closed_loop.explanations.discrepancy import posterior
 from discover.closed_loop.explanations.mixture import quantile
 from discover.closed_loop.explanations.weighing import unexplained_probability
 from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.run_record import RunRecord
 from discover.errors import InputError
 from discover.report.predictions import loop_predictions
@@ -79,6 +81,32 @@ def test_the_band_holds_as_many_samples_as_it_says(giesekus):
     )
 
 
+def test_named_dimensions_hold_what_the_loop_holds(giesekus):
+    pytest.importorskip("xarray")
+    labelled = giesekus.to_xarray()
+    told = giesekus.explanations
+    assert float(labelled["probability"].sum()) == pytest.approx(1.0)
+    assert labelled["probability"].sel(explanation="unexplained") == told.unexplained_probability
+    assert set(labelled["effect"].values) == set(told.inclusion)
+    alpha = labelled.sel(constant="giesekus_mobility.alpha")
+    (found,) = [s.parameters["alpha"] for s in giesekus.stages if s.effect == "giesekus_mobility"]
+    assert (alpha["constant_low95"], alpha["constant_high95"]) == found.ci95
+    # planted: 0.3, of which a noise of 1 % leaves some 0.01 open
+    assert alpha["constant_by_explanation"].sel(explanation="giesekus_mobility") == pytest.approx(
+        0.3, abs=0.03
+    )
+    assert alpha["unit"] == "1"
+    table = loop_predictions(giesekus)
+    last = table[table["source"] == table["source"].iloc[-1]]
+    for ours, theirs in (("found", "value"), ("low95", "low95"), ("measured", "measured")):
+        np.testing.assert_array_equal(labelled[ours], last[theirs], err_msg=ours)
+    assert list(labelled["run"].values) == list(last["run"])
+    # the likeliest explanation is what was found, fitted anew; none of them predicts nothing
+    likeliest, unexplained = labelled["predicted"][0], labelled["predicted"][-1]
+    np.testing.assert_allclose(likeliest, labelled["found"], atol=NOISE * MODULUS)
+    assert np.all(np.isnan(unexplained))
+
+
 def test_nothing_is_the_explanation_of_the_declared_fluid(tmp_path):
     loop = explained(
         tmp_path, UpperConvectedMaxwell(MODULUS, TIME), ["giesekus_mobility", "stress_gain"]
@@ -101,6 +129,14 @@ def test_twins_share_one_probability(tmp_path):
     assert inclusion["non_affine_motion"] == pytest.approx(inclusion["tr(sigma)*gammadot"])
     assert first.parameters[first.effects[0]]
     assert adds_up(loop)
+
+
+def test_named_dimensions_are_there_where_nothing_was_explained():
+    pytest.importorskip("xarray")
+    nothing = ErrorPair(0.5, None)
+    empty = LoopResult("no_signal", nothing, nothing, 0.5, (), {}).to_xarray()
+    assert empty["probability"].to_series().to_dict() == {"unexplained": 1.0}
+    assert empty.sizes["constant"] == empty.sizes["effect"] == 0
 
 
 def test_what_no_candidate_holds_is_left_to_none_of_them(tmp_path):

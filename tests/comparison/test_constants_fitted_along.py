@@ -7,6 +7,7 @@ import pytest
 from planted_instrument import MOBILITY, oscillations
 
 from discover.comparison.instrument import FittedAlong, corrected
+from discover.comparison.outcomes.constant import in_words
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tensor_sindy import TensorSINDy
@@ -101,3 +102,11 @@ def test_a_factor_on_the_modulus_does_as_well_as_a_gain(weak):
 def test_two_constants_that_do_the_same_are_refused(weak):
     with pytest.raises(InputError, match="cannot tell modulus_Pa from the other constants"):
         learned(weak, {"stress_gain": "fit"}, free=("modulus_Pa",))
+
+
+def test_a_constant_of_one_mode_is_a_modulus_and_of_several_a_factor():
+    assert in_words("modulus_Pa", "Pa") == "modulus"
+    assert in_words("modulus_Pa", "") == "factor on all moduli"
+    assert in_words("relaxation_time_s", "s") == "relaxation time"
+    # an effect's constant is named by its effect, with or without a unit
+    assert in_words("stress_gain.gain_error", "") == "stress gain (gain error)"

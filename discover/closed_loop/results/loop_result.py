@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -45,6 +45,9 @@ from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
 from discover.words import percent_of
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -254,6 +257,28 @@ class LoopResult(PageView, HasEquation, NotebookView):
     def to_dataframe(self) -> pd.DataFrame:
         """Return `table`: the effects that were added, one line for each of their parameters."""
         return self.table()
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return explanations, constants and predictions with named dimensions, for xarray.
+
+        Along ``explanation``, the likeliest first and ``unexplained`` last: ``probability``,
+        ``error_fit``, ``error_held_out``, ``constant_by_explanation`` and ``predicted``. Along
+        ``effect``: ``inclusion``. Along ``constant``, spelled ``effect.parameter``: the model that
+        was found, ``constant_found`` with ``constant_low95`` and ``constant_high95``, in the units
+        of the coordinate ``unit``. Along ``sample``, with ``run``, ``role``, ``quantity``,
+        ``time_s``, ``strain`` and ``rate_1_s``: ``measured``, ``declared``, ``found``, and the
+        band of all explanations, ``low95`` to ``high95``, in Pa, or strains where the strain was
+        recorded. What is unknown is NaN. Explanations are no draws from a posterior: weigh them by
+        their probability.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed (extra ``xarray``).
+        """
+        from discover.closed_loop.results.labelled import labelled_loop
+
+        return labelled_loop(self)
 
     def ranking_table(self, stage: int = 0) -> pd.DataFrame:
         """Return the candidates at one stage, counted from 0, the best first.

@@ -26,14 +26,21 @@ class Constant:
     raw: float
 
 
-def in_words(name: str) -> str:
-    """Return the name of a constant in words."""
+def in_words(name: str, unit: str) -> str:
+    """Return the name of a constant in words; without a unit it is a factor on those of all modes.
+
+    Parameters
+    ----------
+    name, unit
+        Of a `Constant`.
+    """
     if "." in name:
         effect, parameter = name.split(".", 1)
         own, whose = (text.replace("_", " ") for text in (parameter, effect))
         return f"{whose} ({own})"
     words = {
-        "modulus_Pa": "modulus, or factor on all moduli",
-        "relaxation_time_s": "relaxation time, or factor on all times",
+        "modulus_Pa": ("modulus", "factor on all moduli"),
+        "relaxation_time_s": ("relaxation time", "factor on all relaxation times"),
     }
-    return words.get(name, name)
+    one, factor = words.get(name, (name, name))
+    return one if unit else factor

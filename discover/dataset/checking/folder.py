@@ -131,7 +131,7 @@ def check_folder(
     for table in tables.values():
         kind = str(run_line(table)["flow"])
         what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
-        text = f"{what}, {len(table)} samples: it judges, unless the study says that it is fitted."
+        text = f"{what}, {len(table)} samples: it tests the law, unless the study fits it."
         findings.append(Finding("note", "tables", table.name, text))
     for name, reason in aside.items():
         findings.append(Finding("warning", "tables", name, f"{name} is set aside: {reason}."))

@@ -35,7 +35,7 @@ EFFECT = ConvectiveConstraintRelease(
             high=1.0,
             first_trial=0.01,
             range_source="1/3 is the law of Likhtman & Graham without stretch, in which the flow "
-            "leaves the length of the chains as it is; three times that is no such flow any more",
+            "does not change the length of the chains; at three times that it would have to",
         ),
         EffectParameter(
             "beta",

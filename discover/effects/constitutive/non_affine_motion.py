@@ -27,8 +27,8 @@ EFFECT = NonAffineMotion(
             high=1.0,
             first_trial=0.01,
             range_source="Johnson & Segalman 1977: from the upper (0) to the lower (2) convected "
-            "derivative; shear stress and N1 see ξ(2 − ξ) alone, so ξ and 2 − ξ are one, of which "
-            "the one that agrees with small measured −N2/N1 = ξ/2 is named",
+            "derivative; shear stress and N1 depend on ξ(2 − ξ) alone and cannot tell ξ from 2 − "
+            "ξ; the smaller one is named, since measured −N2/N1 = ξ/2 is small",
         ),
     ),
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",

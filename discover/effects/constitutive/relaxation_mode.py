@@ -33,8 +33,9 @@ EFFECT = RelaxationMode(
             scale="run_time",
             first_trial=0.1,
             range_source="a mode that is a millionth of a run long cannot be told from a solvent, "
-            "one that is 30 runs long not from a spring (Davies & Anderssen 1997, J. Non-Newtonian "
-            "Fluid Mech. 73, 163: records determine times little beyond their own window)",
+            "nor one that is 30 runs long from a spring (Davies & Anderssen 1997, J. "
+            "Non-Newtonian Fluid Mech. 73, 163: records determine times little beyond their own "
+            "window)",
             range_scale="run_time",
         ),
     ),

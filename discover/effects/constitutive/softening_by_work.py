@@ -23,9 +23,9 @@ EFFECT = SofteningByWork(
             high=10.0,
             scale="inverse_stress",
             first_trial=0.01,
-            range_source="the work 1/b, σ times a strain, deforms by more than 10 %: networks of "
-            "chains, of which softening by work is known, are linear up to there (Treloar 1975, "
-            "The Physics of Rubber Elasticity, ch. 5)",
+            range_source="the work 1/b, σ times a strain, takes a deformation of more than 10 %: "
+            "networks of chains, which are known to soften by work, are linear up to there "
+            "(Treloar 1975, The Physics of Rubber Elasticity, ch. 5)",
             range_scale="inverse_stress",
         ),
         EffectParameter(
@@ -36,8 +36,8 @@ EFFECT = SofteningByWork(
             high=1e6,
             scale="run_time",
             first_trial=0.3,
-            range_source="as the build-up of thixotropy, from milliseconds to never: rubber stays "
-            "as soft as its first stretch made it (Mullins 1969)",
+            range_source="like the build-up time of thixotropy, from milliseconds to never: "
+            "rubber stays as soft as its first stretch made it (Mullins 1969)",
             ends=("high",),
         ),
     ),
@@ -47,7 +47,8 @@ EFFECT = SofteningByWork(
     ),
     source="Mullins 1969, Rubber Chem. Technol. 42, 339, and Ogden & Roxburgh 1999, Proc. R. Soc. "
     "A 455, 2861 for softening by work; that it shortens times, as heat would, is an assumption",
-    check="Repeat a weak flow after a strong one, at once and after rests; the temperature stays.",
+    check="Repeat a weak flow after a strong one, at once and after rests; the temperature does "
+    "not change.",
     visible="b times the work done per volume within t_r of about 0.05.",
     complexity=3,
 )

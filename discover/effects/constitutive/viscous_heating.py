@@ -47,8 +47,8 @@ EFFECT = ViscousHeating(
             scale="run_time",
             first_trial=0.3,
             range_source="H²/(π² a) with the diffusivity of heat of liquids, a = 1e-7 m²/s, and a "
-            "gap H from 10 µm on; walls that insulate, and times shifted to another temperature, "
-            "make it longer without end (Winter 1977)",
+            "gap H from 10 µm on; insulating walls, and times shifted to another temperature, "
+            "lengthen it without limit (Winter 1977)",
             ends=("high",),
         ),
     ),

@@ -23,8 +23,8 @@ EFFECT = RateRiseTime(
             high=10.0,
             scale="sampling_time",
             first_trial=0.5,
-            range_source="motors answer in 0.01 to 0.1 s; a loop that holds the rate of a "
-            "stress-controlled instrument, badly tuned, needs seconds",
+            range_source="motors answer in 0.01 to 0.1 s; a badly tuned loop that controls the "
+            "rate of a stress-controlled instrument needs seconds",
         ),
     ),
     equation=(

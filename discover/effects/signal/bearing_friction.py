@@ -26,7 +26,7 @@ EFFECT = BearingFriction(
             high=1.0,
             scale="stress",
             first_trial=0.01,
-            range_source="with more friction than stress in most records they are records of the "
+            range_source="with more friction than stress, most records would be records of the "
             "bearing",
             range_scale="stress",
         ),

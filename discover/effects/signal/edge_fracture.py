@@ -39,8 +39,8 @@ EFFECT = EdgeFracture(
             high=10.0,
             scale="strain",
             first_trial=0.3,
-            range_source="an edge that is whole at the largest strain of all shows nothing; it may "
-            "be broken from the start",
+            range_source="an edge that is still whole at the largest strain has no effect; it may "
+            "also be broken from the start",
             range_scale="strain",
             ends=("low",),
         ),

@@ -44,7 +44,8 @@ EFFECT = InstrumentInertia(
             first_trial=0.01,
             range_source="2 J H/(πR⁴) of motor and tool with J = 1e-4 N m s², plates of R = 4 mm "
             "and H = 1 mm give 120; a correction for it can be wrong by its whole size, either "
-            "way: J is determined empirically, and its precision rarely said (Klemuk & Titze 2009)",
+            "way: J is determined empirically, and its precision is rarely stated (Klemuk & Titze "
+            "2009)",
         ),
     ),
     equation=r"\sigma_\mathrm{rec} = \sigma + I\,\frac{d\dot\gamma_\mathrm{tool}}{dt}",

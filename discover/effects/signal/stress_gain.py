@@ -23,7 +23,7 @@ EFFECT = StressGain(
             high=4.0,
             first_trial=0.01,
             range_source="a factor of five either way: the stress goes as 1/R³, and 25 mm entered "
-            "for plates of 40 mm make a factor of four (Macosko 1994, ch. 5)",
+            "for plates of 40 mm gives a factor of four (Macosko 1994, ch. 5)",
         ),
     ),
     equation=r"\sigma_\mathrm{rec} = (1 + g)\,\sigma",

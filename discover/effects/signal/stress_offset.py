@@ -24,8 +24,8 @@ EFFECT = StressOffset(
             high=1.0,
             scale="stress",
             first_trial=0.01,
-            range_source="with more offset than stress in most records, what is recorded is the "
-            "zero of the transducer",
+            range_source="with more offset than stress, most records would show only the zero of "
+            "the transducer",
             range_scale="stress",
         ),
     ),

@@ -30,7 +30,7 @@ EFFECT = TimeDelay(
             scale="sampling_time",
             first_trial=0.5,
             range_source="channels read one after another differ by a millisecond, and programs "
-            "that average over a point by the seconds of that average",
+            "that average each point over seconds delay it by as much",
         ),
     ),
     equation=r"\sigma_\mathrm{rec}(t) = \sigma(t - \delta)",

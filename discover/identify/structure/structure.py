@@ -362,7 +362,7 @@ def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdic
     if unfelt:
         text = (
             f"No combination of the {n_terms} terms changes {quantity} and leaves {what} as it "
-            f"is, but:{unfelt}"
+            f"is. But{unfelt[:2].lower()}{unfelt[2:]}"
         )
         return QuantityVerdict(quantity, "assumed", text)
     text = (

@@ -103,7 +103,7 @@ def first_study(dataset: Dataset, folder: str) -> str:
     lines = ["[data]", f"folder = {_quoted(folder)}"]
     if len(dataset) >= _ENOUGH_TO_HOLD_OUT:
         fastest = max(dataset, key=lambda run: float(np.max(np.abs(run.rate))))
-        lines.append(f"held_out = [{_quoted(fastest.name)}]  # no fit sees it: it judges")
+        lines.append(f"held_out = [{_quoted(fastest.name)}]  # not fitted: it tests the law found")
     for kind in dataset.material_functions:
         role = "judge" if len(dataset) else "fit"
         lines.append(f'{kind} = "{role}"  # or "{"fit" if role == "judge" else "judge"}"')
