@@ -64,6 +64,8 @@ class LackOfFit:
         What speaks against noise where `probability` is small, in words.
     changing
         Relative size of what changes from sample to sample; None where the noise is given.
+    rest
+        Of a model that explains the records: what is left, as a predicate.
     """
 
     verdict: FitVerdict
@@ -77,6 +79,7 @@ class LackOfFit:
     outlier_samples: tuple[tuple[int, ...], ...] = ()
     pattern: str = PATTERN
     changing: float | None = None
+    rest: str = "is noise"
 
     @property
     def noise_unsure(self) -> bool:
@@ -149,19 +152,19 @@ def what_is_left(
     long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
     pattern = PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
+    rest = "is noise"
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
         reason = f"what is left ({percent_of(misfit)} of the records) is noise, and nearly all"
     elif explained and probability is None:
-        reason = (
-            f"what is left ({percent_of(misfit)}) is no larger than noise; there are too few "
-            "samples to look for a pattern in it"
-        )
+        rest = "is no larger than noise; there are too few samples to look for a pattern in it"
+        reason = f"what is left ({percent_of(misfit)}) {rest}"
     elif explained and probability is not None and probability > SIGNIFICANCE:
-        reason = f"what is left ({percent_of(misfit)}) is noise"
+        reason = f"what is left ({percent_of(misfit)}) {rest}"
     elif explained:
         given = "the noise given" if expectation.noise is not None else "the linear data's error"
-        reason = f"what is left ({percent_of(misfit)}) has a pattern no larger than {given}"
+        rest = f"has a pattern no larger than {given}"
+        reason = f"what is left ({percent_of(misfit)}) {rest}"
     elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
         reason = (
             f"what is left ({percent_of(misfit)}) is more than changes from sample to sample "
@@ -187,6 +190,7 @@ def what_is_left(
         outliers,
         pattern,
         float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
+        rest,
     )
 
 

@@ -177,9 +177,9 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
 
 
-def test_the_comparison_refuses_what_its_learners_cannot_follow(tmp_path):
-    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
-    with pytest.raises(InputError, match=r"is a flow curve, .* discover close-loop fits it"):
+def test_the_comparison_refuses_creep_that_its_learners_cannot_follow(tmp_path):
+    folder = write(tmp_path, {"creep.csv": TABLES["creep.csv"]})
+    with pytest.raises(InputError, match=r"is a creep test: .* discover close-loop fits it"):
         compare(study(folder))
 
 
@@ -189,12 +189,13 @@ def test_the_comparison_refuses_moduli(tmp_path):
         compare(study(folder))
 
 
-def test_an_estimator_refuses_a_flow_curve_and_follows_the_rate_of_a_given_stress(tmp_path):
+def test_an_estimator_takes_a_flow_curve_as_it_is_and_follows_the_rate_of_a_given_stress(tmp_path):
     from discover.learners.runs import as_runs
 
     curve = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
-    with pytest.raises(InputError, match="is a flow curve"):
-        as_runs([curve])
+    (taken,) = as_runs([curve])
+    assert taken.protocol.control == "steady"
+    np.testing.assert_array_equal(taken.stress, curve.stress)
     times = np.linspace(0.1, 6.0, 60)
     rows = [f"{t},{np.sin(t)},{1.0 - np.cos(t)}" for t in times]
     files = {"runs.csv": "file,control\nwave.csv,stress\n"}

@@ -125,5 +125,5 @@ def _left(
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"
-        return replace(found, verdict="explained", reason=reason)
+        return replace(found, verdict="explained", reason=reason, rest="is arithmetic")
     return found

@@ -176,10 +176,15 @@ def _pair(first: np.ndarray, second: np.ndarray) -> float:
 def squared_distance(
     difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
 ) -> float:
-    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix (Woodbury)."""
-    inner = np.eye(len(factor)) + factor @ factor.T
-    reduced = difference - factor.T @ np.linalg.solve(inner, factor @ difference)
-    return float(difference @ reduced)
+    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
+
+    By singular values: draws that nearly run away spread so far that the k × k matrix of Woodbury's
+    identity is singular to rounding.
+    """
+    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
+    along = rows @ difference
+    beside = difference - along @ rows
+    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))
 
 
 def spread_of(group: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "k n"]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
@@ -49,12 +50,7 @@ def _found(comparison: Comparison) -> str:
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
         verb = "explains" if len(explanation.by) == 1 else "explain"
-        sizes = " and ".join(percent(left[name].misfit) for name in explanation.by)
-        rest = "what is left" if len(explanation.by) == 1 else "what each leaves"
-        noise = "is noise"
-        if all(left[name].probability is None for name in explanation.by):
-            noise = "is no larger than noise; there are too few samples to look for a pattern in it"
-        parts.append(f"explained: {names} {verb} the data, and {rest} ({sizes}) {noise}")
+        parts.append(f"explained: {names} {verb} the data, and {_rests(explanation)}")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
@@ -84,6 +80,19 @@ def _found(comparison: Comparison) -> str:
     elif network is not None and "tbnn_ude" in explanation.by:
         parts.append("put into words, the neural network found no term")
     return sentence([*parts, *_where_usable(comparison)])
+
+
+def _rests(explanation: Explanation) -> str:
+    """Return what the laws that explain the data leave of them."""
+    told = [explanation.lack_of_fit[name] for name in explanation.by]
+    if len({one.rest for one in told}) > 1:
+        each = [
+            f"what {_law_of(name)} leaves ({percent(one.misfit)}) {one.rest}"
+            for name, one in zip(explanation.by, told, strict=True)
+        ]
+        return listed(each)
+    left = "what is left" if len(told) == 1 else "what each leaves"
+    return f"{left} ({' and '.join(percent(one.misfit) for one in told)}) {told[0].rest}"
 
 
 def _of_projection(network: LearnerOutcome) -> str:

@@ -26,6 +26,7 @@ from discover.report.plots.style import (
 from discover.report.wording import FIGURE_SYMBOLS, percent
 
 _STRONGEST = 0.55  # more would drown the number in the cell
+_TOLD = 10.0  # a larger relative error is no more than that in a cell
 _LOWEST, _HIGHEST = 1e-4, 1.0
 """Relative errors at which the colour of a cell begins and ends."""
 
@@ -112,6 +113,8 @@ def _draw_cells(panel, cells: Cells, colour: str) -> None:
         strength = 0.0 if value is None else _strength(value)
         panel.bar(x, 1.0, 1.0, y - 0.5, color=colour, alpha=strength * _STRONGEST, linewidth=0)
         text = "∞" if value == np.inf else percent(value).replace(" %", "")
+        if value is not None and _TOLD < value < np.inf:
+            text = f"> {100 * _TOLD:.0f}"  # a rival on its way to running away
         panel.text(x, y - 0.12, text, ha="center", va="center", fontsize=8, color=INK)
     panel.set_xticks(range(len(deborah)), [f"{v:g}" for v in deborah])
     panel.set_yticks(range(len(weissenberg)), [f"{v:g}" for v in weissenberg])
