@@ -179,9 +179,8 @@ def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
 def _constants_found(sparse: LearnerOutcome) -> list[str]:
     said = []
     for constant in sparse.constants.values():
-        text = (
-            f"{in_words(constant.name, constant.unit)} is {estimate(constant.value, constant.ci95)}"
-        )
+        name = in_words(constant.name, one_mode=bool(constant.unit))
+        text = f"{name} is {estimate(constant.value, constant.ci95)}"
         text += f" {constant.unit}" if constant.unit else ""
         said.append(f"{text} (95 % interval {interval(constant.ci95)})")
     return [f"fitted along with it, {' and '.join(said)}"] if said else []
