@@ -55,7 +55,8 @@ def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:
     if fixed:
         text += f", {', '.join(fixed)}"
     if known.along is not None:
-        names = ", ".join(map(in_words_of, known.along.positions))
+        one_mode = len(model.modulus) == 1
+        names = ", ".join(in_words_of(name, one_mode) for name in known.along.positions)
         text += f"; fitted along with each learner: {names}"
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 

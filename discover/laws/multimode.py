@@ -91,7 +91,8 @@ class Fluid(eqx.Module):
         modes = f"{self.n_modes} mode{'s' if self.n_modes > 1 else ''}"
         if not isinstance(self.relaxation_time, Tracer) and self.n_modes:
             times = np.asarray(self.relaxation_time)
-            modes += f" from {times.min():.3g} to {times.max():.3g} s"
+            low, high = f"{times.min():.3g}", f"{times.max():.3g}"
+            modes += f" of {low} s" if low == high else f" from {low} to {high} s"
         return f"<Fluid: {type(self.law).__name__}, {modes}>"
 
     @classmethod

@@ -105,8 +105,8 @@ def test_two_constants_that_do_the_same_are_refused(weak):
 
 
 def test_a_constant_of_one_mode_is_a_modulus_and_of_several_a_factor():
-    assert in_words("modulus_Pa", "Pa") == "modulus"
-    assert in_words("modulus_Pa", "") == "factor on all moduli"
-    assert in_words("relaxation_time_s", "s") == "relaxation time"
-    # an effect's constant is named by its effect, with or without a unit
-    assert in_words("stress_gain.gain_error", "") == "stress gain (gain error)"
+    assert in_words("modulus_Pa", one_mode=True) == "modulus"
+    assert in_words("modulus_Pa", one_mode=False) == "factor on all moduli"
+    assert in_words("relaxation_time_s", one_mode=True) == "relaxation time"
+    # an effect's constant is named by its effect, however many modes there are
+    assert in_words("stress_gain.gain_error", one_mode=False) == "stress gain (gain error)"

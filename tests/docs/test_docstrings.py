@@ -64,7 +64,7 @@ def without_shape_or_unit(public) -> list[str]:
     return [n for n in arrays if not (UNITS.search(said[n]) and SHAPES.search(said[n]))]
 
 
-@pytest.mark.parametrize(("name", "public"), callables())
+@pytest.mark.parametrize(("name", "public"), list(callables()))
 def test_every_parameter_is_described_arrays_with_shape_and_unit(name, public):
     assert (inspect.getdoc(public) or "").strip(), name
     assert not silent_about(public), name

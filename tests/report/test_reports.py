@@ -185,7 +185,7 @@ def test_the_verdict_says_what_was_found_and_what_is_not_known(comparison):
     assert following.startswith("Measure σ12 and N2 in ")
     assert "rule out the one rival law" in following
     wrong = replace(comparison, truth=())
-    assert "too many: σ·σ" in comparison_verdict(wrong)[0]
+    assert "superfluous: σ·σ" in comparison_verdict(wrong)[0]
 
 
 def test_without_a_rival_the_verdict_still_says_what_to_measure(comparison):

@@ -26,13 +26,15 @@ class Constant:
     raw: float
 
 
-def in_words(name: str, unit: str) -> str:
-    """Return the name of a constant in words; without a unit it is a factor on those of all modes.
+def in_words(name: str, one_mode: bool) -> str:
+    """Return the name of a constant in words.
 
     Parameters
     ----------
-    name, unit
-        Of a `Constant`.
+    name
+        As of a `Constant`.
+    one_mode
+        Whether the fluid has one mode; of several a common factor is fitted.
     """
     if "." in name:
         effect, parameter = name.split(".", 1)
@@ -43,4 +45,4 @@ def in_words(name: str, unit: str) -> str:
         "relaxation_time_s": ("relaxation time", "factor on all relaxation times"),
     }
     one, factor = words.get(name, (name, name))
-    return one if unit else factor
+    return one if one_mode else factor

@@ -116,18 +116,14 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     fitted range apart from those beyond it.
     """
     placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
-    constants_of = (outcome.constants for outcome in comparison.outcomes.values())
-    units = {one.name: one.unit for found in constants_of for one in found.values()}
+    one_mode = comparison.known is None or len(comparison.known.modulus) == 1
     rows = []
     for fit in comparison.classical:
         constants = ", ".join(
             f"{name} = {significant(value, 3)}"
             for name, value in (
                 *((readable(name), value) for name, value in fit.parameters.items()),
-                *(
-                    (constant_in_words(name, units.get(name, "")), value)
-                    for name, value in fit.along.items()
-                ),
+                *((constant_in_words(name, one_mode), value) for name, value in fit.along.items()),
             )
         )
         rows.append(
@@ -149,7 +145,7 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
             {
                 "law": learner_title(name),
                 "constants": ", ".join(
-                    f"{constant_in_words(c.name, c.unit)} = {significant(c.value, 3)}"
+                    f"{constant_in_words(c.name, one_mode)} = {significant(c.value, 3)}"
                     for c in outcome.constants.values()
                 ),
                 "number": sum(1 + len(t.inner) for t in outcome.terms) + len(outcome.constants)
@@ -196,7 +192,7 @@ def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the constants that were fitted along, one line for each learner."""
     rows = [
         {
-            "constant": constant_in_words(constant.name, constant.unit),
+            "constant": constant_in_words(constant.name, bool(constant.unit)),
             "learner": learner_title(name),
             "value": constant.value,
             "ci95": constant.ci95,

@@ -74,11 +74,11 @@ def _found(comparison: Comparison) -> str:
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         parts.append(
-            f"put into words, the neural network's largest term is "
+            f"projected onto the library, the neural network's largest term is "
             f"{significant(largest.coefficient)} {readable(largest.term)}{_of_projection(network)}"
         )
     elif network is not None and "tbnn_ude" in explanation.by:
-        parts.append("put into words, the neural network found no term")
+        parts.append("projected onto the library, the neural network has no term")
     return sentence([*parts, *_where_usable(comparison)])
 
 
@@ -101,7 +101,9 @@ def _of_projection(network: LearnerOutcome) -> str:
     if missed is None:
         return ""
     n = len(network.terms)
-    return f" ({n} term{'s' if n > 1 else ''} miss{'' if n > 1 else 'es'} {percent(missed)} of it)"
+    return (
+        f" (its {n} term{'s' if n > 1 else ''} miss{'' if n > 1 else 'es'} {percent(missed)} of it)"
+    )
 
 
 _LIMITS = {
@@ -165,9 +167,11 @@ def _terms_found(comparison: Comparison, sparse: LearnerOutcome) -> str:
     found = {t.term for t in sparse.terms}
     if found == wanted:
         return f"{text}, exactly the terms of the law that made the data"
-    missing = ", ".join(map(readable, sorted(wanted - found))) or "nothing"
-    extra = ", ".join(map(readable, sorted(found - wanted))) or "nothing"
-    return f"{text}, against the law that made the data missing: {missing}, and too many: {extra}"
+    missing = ", ".join(map(readable, sorted(wanted - found))) or "none"
+    extra = ", ".join(map(readable, sorted(found - wanted))) or "none"
+    return (
+        f"{text} (terms of the law that made the data not found: {missing}, superfluous: {extra})"
+    )
 
 
 def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
@@ -188,9 +192,8 @@ def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
 def _constants_found(sparse: LearnerOutcome) -> list[str]:
     said = []
     for constant in sparse.constants.values():
-        text = (
-            f"{in_words(constant.name, constant.unit)} is {estimate(constant.value, constant.ci95)}"
-        )
+        name = in_words(constant.name, one_mode=bool(constant.unit))
+        text = f"{name} is {estimate(constant.value, constant.ci95)}"
         text += f" {constant.unit}" if constant.unit else ""
         said.append(f"{text} (95 % interval {interval(constant.ci95)})")
     return [f"fitted along with it, {' and '.join(said)}"] if said else []
@@ -270,7 +273,7 @@ def _determined(comparison: Comparison) -> list[str]:
         return parts
     if names:
         parts.append(
-            f"not determined by these data: {names}, shown as the choice of the law that fits"
+            f"not determined by these data: {names} (shown is the choice of the law that fits)"
         )
     if decided := [s.title for s in comparison.statements if not s.undetermined]:
         parts.append(
