@@ -80,10 +80,28 @@ def contested(
         quantity: (
             f"The two learners, trained on the same σ12, disagree on {_SHOWN[quantity]} beyond "
             f"their bands, by {percent_of(gap.size)} {_of(quantity)} in {gap.flow.title}: at least "
-            "one of them is wrong there, and these data do not say which."
+            f"one of them is wrong there{_which(sparse, network, gap.flow, quantity)}."
         )
         for quantity, gap in found.items()
     }
+
+
+def _which(sparse: LearnerOutcome, network: LearnerOutcome, flow: Flow, quantity: str) -> str:
+    """Return which of the two is wrong, where the quantity was measured."""
+    measured = flow.reference.get(quantity)
+    if measured is None or flow.is_truth:
+        return ", and these data do not say which"
+    size = float(np.linalg.norm(measured)) or 1.0
+    missed = []
+    for who in (sparse, network):
+        predicted = who.predictions.get(flow.key)
+        if predicted is None:  # a law that runs away; the page says that elsewhere
+            return ""
+        missed.append(float(np.linalg.norm(predicted[quantity] - measured)) / size)
+    return (
+        f": sparse regression misses what was measured by {percent_of(missed[0])}, the network by "
+        f"{percent_of(missed[1])}"
+    )
 
 
 def open_where_contested(
