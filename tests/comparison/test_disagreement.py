@@ -57,7 +57,7 @@ def test_where_it_was_measured_the_measurement_says_who_is_wrong():
     measured = replace(FLOW, reference={"N1": CURVES["N1"]})
     said = contested(outcomes, [measured], band(0.01))["N1"]
     assert said.endswith(
-        "wrong there: sparse regression misses what was measured by 0 %, the network by 16 %."
+        "where sparse regression misses what was measured by 0 % and the network by 16 %."
     )
     # a truth that no rheometer gave is not among the data, nor is what was not measured
     for unknown in (replace(measured, is_truth=True), FLOW):
