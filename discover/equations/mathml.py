@@ -116,29 +116,37 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
     return f"<math>{term_mathml(name, inner)}</math>"
 
 
+_SIGN = "<mo form='infix'>{}</mo>"
+"""Of a summand that begins an element of its own, where it would be spaced as a prefix."""
+
+
 def law_element(
     terms: Sequence[TermLike], linear_relaxation: bool, named: NamedPart | None = None
 ) -> str:
-    """Return the whole dimensionless law as a displayed `math` element."""
+    """Return the whole dimensionless law, displayed; a long one goes on in the next line.
+
+    Browsers do not break a `math` element, so each summand is one of its own.
+    """
     stress, rate = _TENSORS["sigma"], _TENSORS["gammadot"]
     convected = f"<mover><mrow>{stress}</mrow><mo style='font-size:70%'>▽</mo></mover>"
     relaxation = f"<mo>−</mo>{stress}" if linear_relaxation else ""
-    extra = "".join(
-        f"<mo>{'−' if t.coefficient >= 0 else '+'}</mo>"
+    extra = [
+        _SIGN.format("−" if t.coefficient >= 0 else "+")
         + term_mathml(t.term, t.inner, abs(t.coefficient))
         for t in terms
-    )
-    where = ""
+    ]
+    where = []
     if named is not None:
         notation, function = MathmlNotation(), named.function
         letters = {n: notation.letter(n) for n in (*function.constants, *function.where)}
         defined, summands = function.spell(notation, letters)
-        extra = "".join(f"<mo>−</mo>{one}" for one in summands) + extra
+        extra = [_SIGN.format("−") + one for one in summands] + extra
         first = named.constants[0]
         fixed = [(n, number(first[n])) for n in first if n not in named.differing]
-        where = "".join(
+        where = [
             f"<mo>,</mo><mspace width='1em'/>{letters[n]}<mo>=</mo>{value}"
             for n, value in [*defined, *fixed]
-        )
-    right = f"<mo>=</mo>{rate}{relaxation}{extra}{where}"
-    return f'<math display="block"><mrow>{convected}{right}</mrow></math>'
+        ]
+    parts = [f"{convected}<mo>=</mo>{rate}{relaxation}", *extra, *where]
+    law = " ".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)
+    return f'<div class="law" style="text-align:center;margin:.6em 0">{law}</div>'

@@ -86,7 +86,9 @@ def _cells(row: Any, learners: Sequence[str]) -> list[dict[str, Any]]:
 def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
     parts = []
     for i, (term, value, inner) in enumerate(terms):
-        sign = "<mo>−</mo>" if value < 0 else "<mo>+</mo>" if i else ""
+        sign = "−" if value < 0 else "+" if i else ""
+        if sign:
+            sign = f"<mo form='{'infix' if i else 'prefix'}'>{sign}</mo>"
         parts.append(f"{sign}{_term(term, inner, abs(value))}")
     # each term stands alone, so that a long law goes on in the next line
     return " ".join(f"<math><mrow>{part}</mrow></math>" for part in parts) or "no term"

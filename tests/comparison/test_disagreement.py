@@ -1,5 +1,7 @@
 """What is said where members, or learners, disagree; the curves are written by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,23 @@ def test_learners_that_exclude_each_other_are_named_with_quantity_flow_and_size(
     assert FLOW.title in found["N1"]
     assert "13 %" in found["N1"]  # 1.16 × 0.98 − 1.01
     assert found["N1"] in disagreements(outcomes, [FLOW], band(0.01))
+
+
+def test_where_it_was_measured_the_measurement_says_who_is_wrong():
+    outcomes = {
+        "tensor_sindy": outcome("tensor_sindy"),
+        "tbnn_ude": outcome("tbnn_ude", n1=1.16, half_width=0.02),
+    }
+    measured = replace(FLOW, reference={"N1": CURVES["N1"]})
+    said = contested(outcomes, [measured], band(0.01))["N1"]
+    assert said.endswith(
+        "where sparse regression misses what was measured by 0 % and the network by 16 %."
+    )
+    # a truth that no rheometer gave is not among the data, nor is what was not measured
+    for unknown in (replace(measured, is_truth=True), FLOW):
+        assert contested(outcomes, [unknown], band(0.01))["N1"].endswith(
+            "these data do not say which."
+        )
 
 
 def test_learners_within_their_bands_are_not_contested():
