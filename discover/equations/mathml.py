@@ -148,5 +148,5 @@ def law_element(
             for n, value in [*defined, *fixed]
         ]
     parts = [f"{convected}<mo>=</mo>{rate}{relaxation}", *extra, *where]
-    law = " ".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)
+    law = "<wbr/>".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)
     return f'<div class="law" style="text-align:center;margin:.6em 0">{law}</div>'

@@ -91,7 +91,7 @@ def _law(terms: Sequence[tuple[str, float, Mapping[str, float]]]) -> str:
             sign = f"<mo form='{'infix' if i else 'prefix'}'>{sign}</mo>"
         parts.append(f"{sign}{_term(term, inner, abs(value))}")
     # each term stands alone, so that a long law goes on in the next line
-    return " ".join(f"<math><mrow>{part}</mrow></math>" for part in parts) or "no term"
+    return "<wbr/>".join(f"<math><mrow>{part}</mrow></math>" for part in parts) or "no term"
 
 
 def _support(terms: Sequence[str] | None) -> str:
