@@ -86,7 +86,7 @@ class FlowBatch(eqx.Module):
             parts.append((changed, grids))
         return FlowBatch(tuple(parts), self.rows)
 
-    def some(self, first: Int[Array, ""] | int, count: int) -> "FlowBatch":
+    def some(self, first: Int[Array, ""] | np.int32 | int, count: int) -> "FlowBatch":
         """Return so many runs from the first on; all must be of one control."""
         (part,) = self.parts
         chosen = jax.tree.map(lambda leaf: jax.lax.dynamic_slice_in_dim(leaf, first, count), part)

@@ -113,7 +113,9 @@ def test_the_json_follows_the_contract(planted_mobility, tmp_path):
     stage = contents["stages"][0]
     assert {"effect", "kind", "parameters", "aliases", "error"} <= set(stage)
     assert set(stage["error"]) == {"fit", "held_out"}
-    assert set(stage["parameters"]["alpha"]) == {"value", "ci95", "unit"}
+    assert set(stage["parameters"]["alpha"]) == {
+        "value", "ci95", "unit", "ci95_given_effects",
+    }  # fmt: skip
     assert contents["error_after"]["fit"] == stage["error"]["fit"]
 
 

@@ -36,14 +36,14 @@ def compared(runs, **options):
 
 
 @pytest.mark.slow
-def test_a_flow_curve_alone_gives_a_law_and_leaves_its_normal_stresses_open():
+def test_a_flow_curve_alone_gives_a_law_and_leaves_its_second_normal_stress_open():
     found = compared([curve(Giesekus(MOBILITY))])
     assert found.explanation.verdict == "explained"
     terms = {term.term: term for term in found.outcomes["tensor_sindy"].terms}
     low, high = terms["sigma.sigma"].ci95
     assert low <= MOBILITY <= high
-    # one number a rate: laws with another N1 or N2 fit as well
-    assert {"N1", "N2"} <= set(found.undetermined)
+    # N1 follows where the law is in the library; N2 has twins in it that give the same curve
+    assert "N2" in found.undetermined
     table = comparison_predictions(found)
     sparse = table[(table["source"] == "tensor_sindy") & (table["quantity"] == "sigma12")]
     np.testing.assert_allclose(sparse["rate_1_s"], RATES)

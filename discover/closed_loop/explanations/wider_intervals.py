@@ -1,6 +1,7 @@
 """Intervals of constants that hold whichever of the explanations is the right one."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -68,5 +69,5 @@ def _ends(values, weights, below: float, above: float) -> tuple[float, float]:
 
     far = 4.0 * max(below, above)
     span = float(np.min(values)) - far, float(np.max(values)) + far
-    low, high = (brentq(lambda x, level=level: share(x) - level, *span) for level in _LEVELS)
-    return float(low), float(high)
+    ends: Any = [brentq(lambda x, level=level: share(x) - level, *span) for level in _LEVELS]
+    return float(ends[0]), float(ends[1])

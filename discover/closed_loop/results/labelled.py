@@ -13,15 +13,19 @@ if TYPE_CHECKING:
     import xarray
 
     from discover.closed_loop.results.explanation import Explanation
-    from discover.closed_loop.results.loop_result import LoopResult
     from discover.closed_loop.results.run_record import RunRecord
 
 _UNEXPLAINED = "unexplained"
 _DECLARED = "declared"
 
 
-def labelled_loop(result: "LoopResult") -> "xarray.Dataset":
+def labelled_loop(result: Any) -> "xarray.Dataset":
     """Return explanations, constants and predictions of a loop; see `LoopResult.to_xarray`.
+
+    Parameters
+    ----------
+    result
+        A `LoopResult`.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def labelled_loop(result: "LoopResult") -> "xarray.Dataset":
     return xarray_module().Dataset(variables, coordinates, attributes)
 
 
-def _found(result: "LoopResult") -> Iterator[tuple[str, tuple[float, Any]]]:
+def _found(result: Any) -> Iterator[tuple[str, tuple[float, Any]]]:
     """Yield the name of each constant of the model that was found, its value and its interval."""
     for name, one in result.declared_parameters.items():
         yield f"{_DECLARED}.{name}", (one.value, one.ci95)
@@ -84,7 +88,7 @@ def _constants(explanation: "Explanation") -> dict[str, float]:
     }
 
 
-def _units(result: "LoopResult", explanations: Sequence["Explanation"]) -> dict[str, str]:
+def _units(result: Any, explanations: Sequence["Explanation"]) -> dict[str, str]:
     """Return the unit of each constant; an effect given as an object is known by its stage alone.
 
     What is dimensionless has the unit 1.

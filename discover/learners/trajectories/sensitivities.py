@@ -97,14 +97,15 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
 
 def _steady_run(problem, active, coefficients, inner, protocol, grid):
     """Return what `_solve_run` does of steady states, by the implicit function."""
-    numbers = coefficients, inner
 
     def at(time):
-        def recorded(numbers):
-            state = _steady_modes(problem, active, *numbers, protocol, time)
+        def recorded(coefficients, inner):
+            state = _steady_modes(problem, active, coefficients, inner, protocol, time)
             return _observed(problem, protocol, time, state)
 
-        return jnp.concatenate([recorded(numbers)[:, None], *jax.jacfwd(recorded)(numbers)], axis=1)
+        value = recorded(coefficients, inner)
+        columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
+        return jnp.concatenate([value[:, None], *columns], axis=1)
 
     return jax.vmap(at)(grid.times[grid.sample_index])
 
