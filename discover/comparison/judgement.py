@@ -20,6 +20,7 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
+from discover.comparison.judging.modes_error import modes_taken_for_exact
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
@@ -136,6 +137,7 @@ def judge(
         classical = _classical(study, known, independent)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
+    apart = disagreements(outcomes, judged, bands)
     if known.along is not None and known.along.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     return Judgement(
@@ -146,8 +148,20 @@ def judge(
         statements,
         replace(following, bands=claimed(bands, statements, flows)),
         classical,
-        () if silent_records else tuple(disagreements(outcomes, judged, bands)),
+        () if silent_records else (*_of_modes(chosen, explanation, expectation), *apart),
     )
+
+
+def _of_modes(
+    chosen: LearnerOutcome | None, explanation: Explanation, expectation: Expectation
+) -> tuple[str, ...]:
+    """Return what the sweep's error leaves open of a sparse law that explains the runs."""
+    if chosen is None or not explanation.in_library:
+        return ()
+    misfit = explanation.lack_of_fit["tensor_sindy"].misfit
+    path = chosen.details.get("path", ())
+    said = modes_taken_for_exact(path, len(chosen.terms), misfit, expectation.linear_error)
+    return (said,) if said else ()
 
 
 _MODES_NOT_IN_BANDS = (

@@ -1,0 +1,47 @@
+"""What the modes' own misfit of the sweep leaves open of a law that was found beside them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from discover.words import percent_of
+
+_SHOWS = 0.1
+"""An error of the modes below this share of what the law leaves hardly moves its constants."""
+
+
+def modes_taken_for_exact(
+    path: Sequence[Mapping[str, Any]], n_terms: int, misfit: float, linear_error: float
+) -> str:
+    """Return what is to be said of intervals that take the modes for exact; empty for nothing.
+
+    The learners hold the modes to the values that fit a sweep, which has noise of its own: a term
+    may stand for what these are wrong by.
+
+    Parameters
+    ----------
+    path
+        The best law of each size: ``size`` and relative ``misfit``.
+    n_terms, misfit
+        Of the law found.
+    linear_error
+        By which the modes miss the sweep, relative.
+    """
+    if not n_terms or linear_error <= _SHOWS * misfit:
+        return ""
+    said = (
+        f"The modes miss the sweep by {percent_of(linear_error)}, and the intervals of the sparse "
+        "law take them for exact"
+    )
+    for row in sorted(path, key=lambda row: row["size"]):
+        if not 0 < row["size"] < n_terms:
+            continue
+        apart = float(np.sqrt(max(row["misfit"] ** 2 - misfit**2, 0.0)))
+        if apart <= linear_error:
+            terms = "one term" if row["size"] == 1 else f"{row['size']} terms"
+            return (
+                f"{said}; the best law of {terms} fits worse by {percent_of(apart)} of the data, "
+                "which their error may make up: these data cannot tell the two apart."
+            )
+    return f"{said}."
