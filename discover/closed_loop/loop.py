@@ -34,6 +34,12 @@ from discover.closed_loop.judging.before_after import (
     errors_of,
     record_runs,
 )
+from discover.closed_loop.judging.between_samples import (
+    change_between_samples,
+    coarse_rates,
+    judged_with,
+    wider_bands,
+)
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
 from discover.closed_loop.judging.judgement import Judgement, Silence, judge
@@ -190,6 +196,11 @@ def run_loop(
         records += judging
     summary = summarise(current.residual, np.asarray(batch.weight))
     bounds = intervals(model, batch, current)
+    share = float(np.mean(current.run_errors))
+    unknown = change_between_samples(model, batch, fitted_runs, current.theta, active, share)
+    coarse = None
+    if unknown is not None:
+        coarse, bounds = coarse_rates(model, batch, fitted_runs, current, bounds, unknown)
     by_mode = constants_by_mode(model, batch, current, bounds, search.degrees, search.prior)
     differ = {name for name, found in by_mode.items() if found.degree}
     of_law = {p.name: by_mode[p.name] for p in declared.free_parameters if p.name in by_mode}
@@ -205,6 +216,7 @@ def run_loop(
     if not silent and fluid_is_silent(model, batch, current, active):
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
+    judgement = judged_with(judgement, coarse)
     times = other_times(search, carried, judgement) if carried else []
     judgement, instead = held_against_times(judgement, active, carried, times)
     for name in instead:
@@ -228,12 +240,21 @@ def run_loop(
     if carried:
         tried = [effect.name for effect in candidates if search.admitted(effect)]
         # what explains the fitted runs and not those held out lacks no curve of the fitted ones
-        if judgement.structured and judgement.carries_over:
+        # and what the rate did between its samples is a function of nothing else
+        known_rates = coarse is None or not coarse.is_coarse
+        if judgement.structured and judgement.carries_over and known_rates:
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
             forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
+        told = wider_bands(records[: len(fitted_runs)], batch, unknown)
+        if held_batch is not None:
+            unseen_rates = change_between_samples(
+                model, held_batch, held_runs, current.theta, active, share
+            )
+            told += wider_bands(records[len(fitted_runs) :], held_batch, unseen_rates)
+        records = told
     fluid = augmented_fluid(model, current, [*active, *known])
     return LoopResult(
         verdict=judgement.verdict,
@@ -250,6 +271,7 @@ def run_loop(
             "outlier_times_s": spikes,
             "probability": judgement.left.probability,
             "resolution": judgement.resolution,
+            "sampled_rate": {} if coarse is None else coarse.to_json(),
             "noise_known": judgement.noise_known,
             "carries_over": judgement.carries_over,
             "without_fluid": silence is not None,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
+from discover.comparison.fitting.sampled_rates import with_sampled_rates
 from discover.comparison.fitting.training import train
 from discover.comparison.instrument import Learned
 from discover.comparison.instrument.known import Known
@@ -81,11 +81,8 @@ class Learning:
         flows = frame.flows
         outcome = replace(LearnerOutcome.of(result, fluid, flows), constants=constants)
         if not part:
-            outcome = replace(
-                outcome,
-                physics=physics_of(fluid, flows),
-                resolution=left_by_sampled_rates(fluid, flows, outcome.predictions),
-            )
+            outcome = replace(outcome, physics=physics_of(fluid, flows))
+            outcome = with_sampled_rates(outcome, fluid, frame.model.fluid, flows)
         if store is not None:
             store.save(part or learner, outcome.to_state())
             # the same route as after an interruption, so that both give the same files

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from discover.dataset.run import SLOWEST_RATE, Run
@@ -72,7 +73,19 @@ def _oscillating(run: Run) -> str:
 
 def oscillation(run: Run) -> tuple[float, float] | None:
     """Return frequency (rad/s) and amplitude (1/s) of a rate that alternates about zero."""
-    time, rate = run.time, run.rate
+    return wave_of(run.time, run.rate)
+
+
+def wave_of(
+    time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
+) -> tuple[float, float] | None:
+    """Return frequency (rad/s) and amplitude (1/s) of a rate in samples, if it alternates.
+
+    Parameters
+    ----------
+    time, rate
+        In s and 1/s.
+    """
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)
     if turns.size < 2:

@@ -26,8 +26,9 @@ wave read five times a cycle it leaves 0.22, of four times 0.44, of a corner 0.6
 _REACH = 3
 """Samples on each side that judge whether the curve is smooth at one."""
 
-_STRAIGHT = 1e-3
-"""Of the largest rate: as near to the curve as straight lines between its knots have to lie."""
+_STRAIGHT, _NEARLY = 1e-3, 3e-4
+"""Of the largest rate: as near to the curve as straight lines between its knots have to lie, and
+those between samples that need no knot between them: of a wave read 130 times a cycle."""
 
 _MOST_BETWEEN = 16
 _BETWEEN = 4  # points of another curve through the same samples, for each sample
@@ -94,18 +95,28 @@ def another_between_samples(
     read, known = _samples(knots[first:], rates[first:], times)
     if protocol.control != "rate" or len(read) < 4 or np.any(np.diff(read) <= 0.0):
         return None
-    places = np.arange(_BETWEEN * (len(read) - 1) + 1) / _BETWEEN
-    dense = np.union1d(np.interp(places, np.arange(len(read)), read), knots[first:])
-    other = np.asarray(PchipInterpolator(read, known)(dense))
-    for start, end in _smooth_stretches(read, known):
-        inside = (dense >= read[start]) & (dense <= read[end - 1])
-        curve = make_interp_spline(read[start:end], known[start:end], k=5)
-        other[inside] = curve(dense[inside])
+    other_knots, other = _knots(read, known, another=True)
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([knots[:first], dense])),
+        table_times=jnp.asarray(np.concatenate([knots[:first], other_knots])),
         table_rates=jnp.asarray(np.concatenate([rates[:first], other])),
     )
+
+
+def unknown_between_samples(protocol: FlowProtocol, times: Samples | None = None) -> float:
+    """Return by how much another curve through the samples differs, over the size of the rate.
+
+    Root mean square of both; 0 where the rate was commanded. Arguments as in
+    `another_between_samples`.
+    """
+    other = another_between_samples(protocol, times)
+    if other is None:
+        return 0.0
+    knots, rates = np.asarray(other.table_times), np.asarray(other.table_rates)
+    inside = knots >= 0.0
+    own = np.interp(knots, np.asarray(protocol.table_times), np.asarray(protocol.table_rates))
+    change, size = (float(np.sum(v[inside] ** 2)) for v in (rates - own, own))
+    return float(np.sqrt(change / size)) if size > 0.0 else 0.0
 
 
 def _samples(
@@ -127,25 +138,53 @@ def _samples(
     return read, known
 
 
-def _knots(times: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots whose straight lines lie on the curve."""
-    near = _STRAIGHT * float(np.max(np.abs(rates)))
+def _knots(
+    times: np.ndarray, rates: np.ndarray, another: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return knots whose straight lines lie on the curve, and have its area in each interval.
+
+    Parameters
+    ----------
+    times, rates
+        Of the samples.
+    another
+        Whether it is the other curve through them.
+    """
+    stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
-    for start, end in _smooth_stretches(times, rates):
+    if another:
+        straight = np.ones(len(times) - 1, dtype=bool)
+        for start, end in stretches:
+            straight[start : end - 1] = False
+        parts = np.where(straight, _BETWEEN, 1)
+        _fill(times, PchipInterpolator(times, rates), parts, knots, values)
+    largest = max(float(np.max(np.abs(rates))), np.finfo(float).tiny)
+    for start, end in stretches:
         t = times[start:end]
-        curve = CubicSpline(t, rates[start:end])
-        width = np.diff(t)
-        bend = np.max(np.abs([curve(t[:-1], 2), curve(t[1:], 2)]), axis=0)
-        parts = np.ceil(width * np.sqrt(bend / (8.0 * near))) if near > 0.0 else np.ones(len(width))
-        parts = np.clip(parts, 1, _MOST_BETWEEN).astype(int)
-        for count in np.unique(parts[parts > 1]):
-            shares = np.arange(1, count) / count
-            some = (t[:-1][parts == count, None] + width[parts == count, None] * shares).ravel()
-            knots.append(some)
-            values.append(curve(some))
+        cubic = CubicSpline(t, rates[start:end])
+        bend = np.max(np.abs([cubic(t[:-1], 2), cubic(t[1:], 2)]), axis=0)
+        missed = np.diff(t) ** 2 * bend / (8.0 * largest)
+        least = np.where(missed > _NEARLY, 2, 1)
+        parts = np.clip(np.ceil(np.sqrt(missed / _STRAIGHT)), least, _MOST_BETWEEN).astype(int)
+        curve = make_interp_spline(t, rates[start:end], k=5) if another else cubic
+        _fill(t, curve, parts, knots, values)
     found = np.concatenate(knots)
     order = np.argsort(found, kind="stable")
     return found[order], np.concatenate(values)[order]
+
+
+def _fill(t: np.ndarray, curve, parts: np.ndarray, knots: list, values: list) -> None:
+    """Add the knots that divide each interval of a curve into so many parts."""
+    width, area = np.diff(t), np.diff(curve.antiderivative()(t))
+    for count in np.unique(parts[parts > 1]):
+        here = parts == count
+        places = t[:-1][here, None] + width[here, None] * np.arange(count + 1) / count
+        rate = curve(places)
+        # the strain is kept: else straight lines would lose some of every crest
+        lost = area[here] - np.trapezoid(rate, places, axis=1)
+        rate = rate + (lost / width[here] * count / (count - 1))[:, None]
+        knots.append(places[:, 1:-1].ravel())
+        values.append(rate[:, 1:-1].ravel())
 
 
 def _smooth_stretches(times: np.ndarray, rates: np.ndarray) -> list[tuple[int, int]]:

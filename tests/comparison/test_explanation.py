@@ -7,7 +7,7 @@ import pytest
 from independent import Giesekus, PomPom, oscillation
 from independent.noise import correlated, white
 
-from discover.comparison.fitting.sampled_rates import left_by_sampled_rates
+from discover.comparison.fitting.sampled_rates import with_sampled_rates
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.judging.statements import IN_LIBRARY, check_band, claimed, make_statements
@@ -122,12 +122,16 @@ def test_a_rate_that_is_known_at_the_samples_only_is_allowed_for(responses):
     # data without noise, read ten times a second: straight lines between the samples show
     assert strict.verdict == "unexplained"
     assert 1e-4 < strict.lack_of_fit["tensor_sindy"].misfit < 5e-3
-    allowed = left_by_sampled_rates(fluid, read, one.predictions)
-    assert explain({"tensor_sindy": replace(one, resolution=allowed)}, read, Expectation()).by
+    declared = Fluid.dimensionless(make_law("ucm"))
+
+    def told(outcome, flows):
+        return with_sampled_rates(outcome, fluid, declared, flows)
+
+    assert explain({"tensor_sindy": told(one, read)}, read, Expectation()).by
     # a rate that was commanded leaves nothing open, and a larger misfit is no matter of samples
-    assert left_by_sampled_rates(fluid, exact, one.predictions) == 0.0
+    assert told(one, exact).resolution == 0.0
     other = {f.key: {"sigma12": row} for f, row in zip(read, responses["near"], strict=True)}
-    assert left_by_sampled_rates(fluid, read, other) == 0.0
+    assert told(replace(one, predictions=other), read).resolution == 0.0
 
 
 def test_a_law_that_runs_away_in_a_training_run_explains_nothing(responses):

@@ -56,6 +56,7 @@ def change_on_finer_steps(
     theta: np.ndarray,
     active: Sequence[str],
     other_rates: bool = False,
+    strain_step: float = _STRAIN_STEP,
 ) -> Float[np.ndarray, "runs n"]:
     """Return how weighted residuals would change on steps a fifth as long.
 
@@ -68,6 +69,8 @@ def change_on_finer_steps(
     other_rates
         Whether a rate that was read in samples is another curve through them on the finer steps
         (`another_between_samples`): what that changes is what nobody knows of the rate.
+    strain_step
+        Largest strain of one of the finer steps.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def change_on_finer_steps(
         values[small.positions(effect.name)] = theta[model.positions(effect.name)]
     finer = [_with_another_rate(run) for run in runs] if other_rates else runs
     try:
-        fine_batch = make_batch(finer, strain_step=_STRAIN_STEP)
+        fine_batch = make_batch(finer, strain_step=strain_step)
     except InputError:
         return np.zeros(np.shape(batch.recorded))
     change = small.residuals([values], fine_batch)[0] - small.residuals([values], batch)[0]

@@ -1,4 +1,4 @@
-"""What a misfit may owe to a rate that is known at the samples only."""
+"""What a law may owe to a rate that is known at the samples only."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,54 +6,144 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.dataset.coarse_rates import CoarseRates, of_json, samples_a_cycle, worth_a_look
+from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
-from discover.protocols import another_between_samples
+from discover.learners.recovered_term import RecoveredTerm
+from discover.protocols import another_between_samples, unknown_between_samples
 
 LARGEST = 5e-3
 """A larger relative misfit is not put down to arithmetic, as in the closed loop: a rate read 24
 times a cycle errs by this."""
 
+_STEP = 1e-3
+"""Relative step of a coefficient, and least step, for what it changes."""
 
-def left_by_sampled_rates(
-    fluid: Fluid, flows: Sequence[Flow], predictions: Mapping[str, Stresses | None]
-) -> float:
-    """Return the relative misfit of σ12 that the rate between the samples may leave.
+KEY = "sampled_rate"
+"""Under which it stands among the details of an outcome."""
 
-    The root-mean-square change of the prediction where the rate is another curve through its
-    samples, over that of the measurement, mean over the training runs. Zero
-    where the rate was commanded, and where the misfit is too large to be put down to it.
+
+def with_sampled_rates(
+    outcome: LearnerOutcome, fluid: Fluid, declared: Fluid, flows: Sequence[Flow]
+) -> LearnerOutcome:
+    """Return an outcome whose intervals, and what its misfit may be, allow for rates in samples.
+
+    What another curve through the samples changes in σ12 is told under `KEY` of its details;
+    coefficients with an interval get it wider by what that would do to them.
 
     Parameters
     ----------
+    outcome
+        Of a learner, with its predictions.
     fluid
         The law found.
+    declared
+        The known part.
     flows
         The flows of the comparison.
-    predictions
-        Of the fluid, by the key of the flow.
     """
-    misfits, changes = [], []
-    for flow in flows:
-        measured, prediction = flow.measured, predictions[flow.key]
-        if flow.kind != "training" or measured is None:
-            continue
-        if prediction is None or not np.any(measured):
-            return 0.0
-        misfits.append(_relative(prediction["sigma12"] - measured, measured))
-    if not misfits or float(np.mean(misfits)) > LARGEST:
-        return 0.0
-    for flow in flows:
-        measured, prediction = flow.measured, predictions[flow.key]
-        if flow.kind != "training" or measured is None or prediction is None:
-            continue
-        smooth = another_between_samples(flow.protocol, flow.times)
-        other = None if smooth is None else predict(fluid, replace(flow, protocol=smooth))
-        change = 0.0
-        if other is not None:
-            change = _relative(other["sigma12"] - prediction["sigma12"], measured)
-        changes.append(change)
-    return float(np.mean(changes))
+    training = [flow for flow in flows if flow.kind == "training" and flow.measured is not None]
+    if not training or any(not np.any(flow.measured) for flow in training):
+        return outcome
+    found = [outcome.predictions[flow.key] for flow in training]
+    own = [one for one in found if one is not None]
+    if len(own) < len(training):
+        return outcome
+    left = _mean_relative([_off(p, f) for p, f in zip(own, training, strict=True)], training)
+    unknown = [unknown_between_samples(flow.protocol, flow.times) for flow in training]
+    if not worth_a_look(unknown, left):
+        return outcome
+    pairs = zip(training, own, strict=True)
+    changes = [_changed(fluid, flow, prediction) for flow, prediction in pairs]
+    change = _mean_relative(changes, training)
+    terms, shifts = outcome.terms, {}
+    if any(term.ci95 is not None for term in terms):
+        terms, shifts, changes = _taken_up(terms, declared, training, changes)
+    sizes = [_relative(one, flow) for one, flow in zip(changes, training, strict=True)]
+    runs = {
+        flow.name: samples_a_cycle(flow.times, flow.rate)
+        for flow, size in zip(training, sizes, strict=True)
+        if size > 0.5 * max(sizes)
+    }
+    coarse = CoarseRates(_mean_relative(changes, training), left, shifts, runs)
+    return replace(
+        outcome,
+        terms=terms,
+        resolution=change if left <= LARGEST else 0.0,
+        details={**outcome.details, KEY: coarse.to_json()},
+    )
 
 
-def _relative(difference: np.ndarray, measured: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(difference**2) / np.mean(measured**2)))
+def coarse_rates_of(outcome: LearnerOutcome) -> CoarseRates | None:
+    """Return what rates read in too few samples leave open of a law; None where that is small."""
+    found = outcome.details.get(KEY)
+    coarse = None if found is None else of_json(found)
+    return coarse if coarse is not None and coarse.is_coarse else None
+
+
+def _changed(fluid: Fluid, flow: Flow, prediction: Stresses) -> np.ndarray:
+    """Return what another rate changes in σ12; zero where it was commanded, or runs away."""
+    other = another_between_samples(flow.protocol, flow.times)
+    found = None if other is None else predict(fluid, replace(flow, protocol=other))
+    if found is None or not np.all(np.isfinite(found["sigma12"])):
+        return np.zeros(len(flow.times))
+    return found["sigma12"] - prediction["sigma12"]
+
+
+def _taken_up(
+    terms: Sequence[RecoveredTerm],
+    declared: Fluid,
+    flows: Sequence[Flow],
+    changes: Sequence[np.ndarray],
+) -> tuple[tuple[RecoveredTerm, ...], Mapping[str, float], list[np.ndarray]]:
+    """Return terms with wider intervals, shifts over half-widths, and what is left of changes."""
+    values = {term.term: term.coefficient for term in terms}
+    inner = {name: value for term in terms for name, value in term.inner.items()}
+    steps = {name: max(abs(value), 1.0) * _STEP for name, value in values.items()}
+    laws = [Contender("found", values, inner)]
+    laws += [Contender(n, {**values, n: values[n] + steps[n]}, inner) for n in values]
+    protocols, times = [flow.protocol for flow in flows], [flow.times for flow in flows]
+    predicted = predict_laws(fluid_of(laws, declared), protocols, times)[..., 0]
+    scale = np.concatenate([np.full(len(f.times), 1.0 / _size(f)) for f in flows])
+    rows = [
+        np.concatenate([one[i, : len(flow.times)] for i, flow in enumerate(flows)])
+        for one in predicted
+    ]
+    design = np.stack([(row - rows[0]) / steps[n] for n, row in zip(values, rows[1:], strict=True)])
+    kept = np.concatenate(changes)
+    if not np.all(np.isfinite(design)):
+        return tuple(terms), {}, list(changes)
+    moved = np.linalg.lstsq((design * scale).T, -kept * scale, rcond=None)[0]
+    kept = kept + moved @ design
+    wider, shifts = [], {}
+    for term, shift in zip(terms, np.abs(moved), strict=True):
+        if term.ci95 is None:
+            wider.append(term)
+            continue
+        below, above = term.coefficient - term.ci95[0], term.ci95[1] - term.coefficient
+        shifts[term.term] = float(shift / max(0.5 * (below + above), np.finfo(float).tiny))
+        limits = (
+            term.coefficient - float(np.hypot(below, shift)),
+            term.coefficient + float(np.hypot(above, shift)),
+        )
+        wider.append(replace(term, ci95=limits))
+    ends = np.cumsum([len(flow.times) for flow in flows])[:-1]
+    return tuple(wider), shifts, np.split(kept, ends)
+
+
+def _off(prediction: Stresses, flow: Flow) -> np.ndarray:
+    return prediction["sigma12"] - flow.measured
+
+
+def _size(flow: Flow) -> float:
+    return float(np.sqrt(np.mean(np.asarray(flow.measured) ** 2)))
+
+
+def _relative(difference: np.ndarray, flow: Flow) -> float:
+    return float(np.sqrt(np.mean(difference**2))) / _size(flow)
+
+
+def _mean_relative(differences: Sequence[np.ndarray], flows: Sequence[Flow]) -> float:
+    each = [_relative(one, flow) for one, flow in zip(differences, flows, strict=True)]
+    return float(np.mean(each))

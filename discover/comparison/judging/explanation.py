@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import BANDS_ONLY
@@ -126,4 +127,8 @@ def _left(
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"
         return replace(found, verdict="explained", reason=reason, rest="is arithmetic")
+    coarse = coarse_rates_of(outcome)
+    if found.verdict == "explained" and coarse is not None and coarse.hides:
+        reason = "what the rate did between its samples hides as much"
+        return replace(found, verdict="unexplained", reason=reason)
     return found

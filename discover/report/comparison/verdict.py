@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates
 from discover.identify.exact.relations import spell_briefly
 from discover.report.wording import (
     SYMBOLS,
@@ -205,6 +207,8 @@ def _how_sure(comparison: Comparison) -> str:
     parts = [part for name in comparison.outcomes for part in _unseen(comparison, name)]
     if not parts:
         parts.append("nothing was held out, so no prediction was put to the test")
+    if (coarse := _coarse(comparison)) is not None:
+        parts.append(coarse.sentence.rstrip("."))
     parts += _determined(comparison)
     for name, report in comparison.physics.items():
         failed = [c["name"] for c in (report or {}).get("checks", ()) if c["passed"] is False]
@@ -214,6 +218,12 @@ def _how_sure(comparison: Comparison) -> str:
                 f"soundness ({', '.join(failed)})"
             )
     return " ".join(sentence([part]) for part in parts)
+
+
+def _coarse(comparison: Comparison) -> CoarseRates | None:
+    """Return what rates read in too few samples leave open of the first law that they do."""
+    told = (coarse_rates_of(outcome) for outcome in comparison.outcomes.values())
+    return next((coarse for coarse in told if coarse is not None), None)
 
 
 def _unseen(comparison: Comparison, name: str) -> list[str]:
@@ -290,6 +300,8 @@ def _next(comparison: Comparison) -> str:
             "Measure where the stress stands out of the noise: at higher rates, with a more "
             "sensitive transducer, or with a larger sample."
         )
+    if _coarse(comparison) is not None:
+        return MORE_SAMPLES
     lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
     if lacking or explanation.verdict == "unexplained":
         return (

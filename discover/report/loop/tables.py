@@ -240,7 +240,7 @@ def ranking_rows(ranking: Sequence[CandidateScore], shown: int = 12) -> list[dic
     ]
 
 
-_SHARES = ("error", "floor")
+_SHARES = ("error", "floor", "/ change", "/ left")
 """Last words of what is a share of the root-mean-square stress."""
 
 
@@ -254,6 +254,11 @@ _REMAINING = {
     "outlier times s": "their times in s",
     "probability": "probability of such a residual, were it noise",
     "resolution": "numerical error of the prediction, relative",
+    "sampled rate / change": "what another curve through the samples of the rate would change",
+    "sampled rate / left": "beside what is left",
+    "sampled rate / too coarse": "the rate is sampled too coarsely",
+    "sampled rate / hides the law": "so that no law can be told",
+    "sampled rate / said": "in words, of the rate",
     "noise known": "noise can be told from structure",
     "carries over": "runs held out are explained too",
     "without fluid": "records show nothing of the fluid",

@@ -7,6 +7,7 @@ import numpy as np
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import ConstantByMode, Stage, StageParameter
+from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates, of_json
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
@@ -36,6 +37,8 @@ _LOOP = {
 }
 
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
+
+_UNKNOWN_RATE = "What the rate did between its samples hides all that could tell what is missing"
 
 _NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
 
@@ -81,7 +84,9 @@ def _loop_found(result: LoopResult) -> str:
         )
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
-        if not result.remaining.get("noise_known", True):
+        if (coarse := _coarse(result)) is not None and coarse.hides:
+            verdict = _UNKNOWN_RATE
+        elif not result.remaining.get("noise_known", True):
             verdict = _UNKNOWN_NOISE
         elif not result.remaining.get("carries_over", True):
             verdict = _NOT_CARRIED
@@ -148,6 +153,8 @@ def _loop_sure(result: LoopResult) -> str:
         )
     if before.held_out is None:
         parts.append("no run was held out to judge by")
+    if (coarse := _coarse(result)) is not None:
+        sentences.append(coarse.sentence)
     if few := result.remaining.get("not_judging", ()):
         verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
         parts.append(f"{_several(few, 'and')} {verb}")
@@ -193,7 +200,16 @@ def _several(names: Sequence[str], word: str) -> str:
     return f" {word} ".join(shown)
 
 
+def _coarse(result: LoopResult) -> CoarseRates | None:
+    """Return what rates read in too few samples leave open, if that is not small."""
+    found = result.remaining.get("sampled_rate")
+    coarse = of_json(found) if found else None
+    return coarse if coarse is not None and coarse.is_coarse else None
+
+
 def _loop_next(result: LoopResult) -> str:
+    if _coarse(result) is not None:
+        return MORE_SAMPLES
     rates = [float(np.max(np.abs(record.rate))) for record in result.records]
     faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
     if result.verdict == "no_signal" or result.remaining.get("without_fluid"):

@@ -1,0 +1,136 @@
+"""What a rate did between its samples, which nobody knows: in constants, bands and the verdict."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.judging.finer_steps import change_on_finer_steps
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.results.run_record import RunRecord
+from discover.dataset import Run
+from discover.dataset.coarse_rates import CoarseRates, samples_a_cycle, worth_a_look
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
+from discover.protocols import unknown_between_samples
+from discover.statistics.residual import judging
+
+_STRAIN_STEP = 0.25  # that of the fit
+_GUESSED = 2.0  # one other curve stands for all that go through the samples
+
+Bounds = dict[int, tuple[float, float]]
+
+
+def change_between_samples(
+    model: AugmentedModel,
+    batch: Batch,
+    runs: Sequence[Run],
+    theta: np.ndarray,
+    active: Sequence[str],
+    left: float,
+) -> Float[np.ndarray, "runs n"] | None:
+    """Return how weighted residuals would change with other rates; None where that is nothing.
+
+    Parameters
+    ----------
+    model, batch, runs
+        The model, and the runs as a batch and as they are.
+    theta, active
+        Parameters, and the effects among them that are in the model.
+    left
+        Relative misfit, beside which it is looked at.
+    """
+    unknown = [unknown_between_samples(run.protocol, run.time) for run in runs]
+    if not worth_a_look(unknown, left):
+        return None
+    return change_on_finer_steps(
+        model, batch, runs, theta, active, other_rates=True, strain_step=_STRAIN_STEP
+    )
+
+
+def coarse_rates(
+    model: AugmentedModel,
+    batch: Batch,
+    runs: Sequence[Run],
+    fit: Fit,
+    bounds: Bounds,
+    change: Float[np.ndarray, "runs n"],
+) -> tuple[CoarseRates, Bounds]:
+    """Return what other rates would change, and intervals that allow for it.
+
+    Parameters
+    ----------
+    model, batch, runs, fit
+        The fitted runs and their fit.
+    bounds
+        95 % intervals of constants, by position.
+    change
+        As from `change_between_samples`.
+    """
+    shifts: dict[str, float] = {}
+    names = {i: parameter.name for i, parameter in enumerate(model.declared.free_parameters)}
+    for effect in model.effects:
+        own = zip(model.positions(effect.name), effect.parameters, strict=True)
+        names |= {position: parameter.name for position, parameter in own}
+    wider = dict(bounds)
+    kept = change.ravel()
+    if fit.free:
+        design = fit.jacobian.reshape(len(fit.free), -1).T
+        moved = np.linalg.lstsq(design, -kept, rcond=None)[0]
+        kept = kept + design @ moved
+        for position, shift in zip(fit.free, np.abs(moved), strict=True):
+            value, (low, high) = float(fit.theta[position]), bounds[position]
+            half = max(0.5 * (high - low), np.finfo(float).tiny)
+            shifts[names[position]] = float(shift / half)
+            wider[position] = (
+                max(value - float(np.hypot(value - low, shift)), float(model.low[position])),
+                min(value + float(np.hypot(high - value, shift)), float(model.high[position])),
+            )
+    each = np.sqrt(np.sum(kept.reshape(change.shape) ** 2, axis=1))
+    seen = judging(np.asarray(batch.weight))
+    left = float(np.mean(fit.run_errors[seen]))
+    most = np.sqrt(np.sum(change**2, axis=1))
+    where = {
+        run.name: samples_a_cycle(run.time, run.rate)
+        for run, size in zip(runs, most, strict=True)
+        if size > 0.5 * np.max(most)
+    }
+    return CoarseRates(float(np.mean(each[seen])), left, shifts, where), wider
+
+
+def judged_with(judgement: Judgement, coarse: CoarseRates | None) -> Judgement:
+    """Return the judgement of a model whose rates were read in samples.
+
+    Where what they did between the samples hides all that the model leaves, nothing is explained.
+    """
+    if coarse is None or not coarse.is_coarse:
+        return judgement
+    told = replace(judgement, description=f"{coarse.sentence} {judgement.description}")
+    if not coarse.hides or told.verdict not in ("effects_added", "no_effect_needed"):
+        return told
+    return replace(told, verdict="unexplained")
+
+
+def wider_bands(
+    records: Sequence[RunRecord], batch: Batch, change: Float[np.ndarray, "runs n"] | None
+) -> list[RunRecord]:
+    """Return records whose bands give way by twice the most that changes along each run.
+
+    Parameters
+    ----------
+    records, batch
+        Runs, and the same as the model has them.
+    change
+        As from `change_between_samples`.
+    """
+    if change is None:
+        return list(records)
+    weight = np.asarray(batch.weight)
+    found = []
+    for record, weights, off in zip(records, weight, change, strict=True):
+        n = len(record.time)
+        most = _GUESSED * float(np.max(np.abs(off[:n] / weights[:n])))
+        band = None if record.band is None else record.band + most * np.array([[-1.0], [1.0]])
+        found.append(replace(record, band=band))
+    return found
