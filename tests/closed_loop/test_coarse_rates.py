@@ -6,9 +6,11 @@ import pytest
 from independent import Giesekus, oscillation
 
 import discover as dc
+from discover.closed_loop import run_loop
 from discover.comparison.fitting.sampled_rates import coarse_rates_of, with_sampled_rates
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.forward import DeclaredModel
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols import measured_rate, oscillatory_shear, sampled_rate
@@ -53,6 +55,20 @@ def test_a_mobility_comes_back_from_few_samples_a_cycle(samples):
     assert loop.error_after.fit == pytest.approx(NOISE, rel=0.2)
     # beside 1 % of noise what the rate did between samples is nothing, and nothing is said of it
     assert "too coarsely" not in " ".join(loop_verdict(loop))
+
+
+def test_what_a_rate_did_between_its_samples_widens_constants_of_the_declared_model_too():
+    tables = [
+        pd.DataFrame({"run": f"{a:g}", "time_s": t, "shear_rate_1_s": r, "stress_Pa": s})
+        for a, t, r, s in records(4, noise=0.003)
+    ]
+    law = make_law("giesekus", {"alpha": MOBILITY})
+    declared = DeclaredModel(law, np.array([MODULUS]), np.array([TIME]), fit_modulus=True)
+    data = dc.from_dataframe(pd.concat(tables))
+    loop = run_loop(data, declared, effects=["stress_offset"], explanations=1)
+    low, high = loop.declared_parameters["modulus_Pa"].ci95
+    assert low <= MODULUS <= high
+    assert loop.remaining["sampled_rate"]["shifts"]["modulus_Pa"] > 0.0
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.dataset.coarse_rates import CoarseRates, samples_a_cycle, worth_a_look
-from discover.forward import AugmentedModel, Batch
+from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.protocols import unknown_between_samples
 from discover.statistics.residual import judging
@@ -69,7 +69,8 @@ def coarse_rates(
         As from `change_between_samples`.
     """
     shifts: dict[str, float] = {}
-    names = {i: parameter.name for i, parameter in enumerate(model.declared.free_parameters)}
+    names = {0: MODULUS, 1: RELAXATION_TIME}
+    names |= {2 + i: parameter.name for i, parameter in enumerate(model.declared.free_parameters)}
     for effect in model.effects:
         own = zip(model.positions(effect.name), effect.parameters, strict=True)
         names |= {position: parameter.name for position, parameter in own}
@@ -82,7 +83,9 @@ def coarse_rates(
         for position, shift in zip(fit.free, np.abs(moved), strict=True):
             value, (low, high) = float(fit.theta[position]), bounds[position]
             half = max(0.5 * (high - low), np.finfo(float).tiny)
-            shifts[names[position]] = float(shift / half)
+            # what is left are coefficients of a constant by mode
+            name = names.get(position, "a_constant_by_mode")
+            shifts[name] = max(shifts.get(name, 0.0), float(shift / half))
             wider[position] = (
                 max(value - float(np.hypot(value - low, shift)), float(model.low[position])),
                 min(value + float(np.hypot(high - value, shift)), float(model.high[position])),
