@@ -54,7 +54,12 @@ class CoarseRates:
     @property
     def is_coarse(self) -> bool:
         """Whether it is too large to be passed over."""
-        return self.change > SMALL * self.left or any(s > SMALL for s in self.shifts.values())
+        return self.shows or any(s > SMALL for s in self.shifts.values())
+
+    @property
+    def shows(self) -> bool:
+        """Whether it is too large beside what the law leaves; of constants nothing is asked."""
+        return self.change > SMALL * self.left
 
     @property
     def hides(self) -> bool:

@@ -55,7 +55,9 @@ def over_explanations(
         if having and low < value < high and np.isfinite([low, high]).all():
             values, weights = np.array(having, dtype=float).T
             ends = _ends(values, weights / np.sum(weights), value - low, high - value)
-            found[at] = (min(low, ends[0]), max(high, ends[1]))
+            least, most = float(model.low[at]), float(model.high[at])
+            # half a normal distribution may reach beyond the range that is physical
+            found[at] = (min(low, max(ends[0], least)), max(high, min(ends[1], most)))
     return found
 
 

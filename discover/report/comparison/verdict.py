@@ -222,8 +222,12 @@ def _how_sure(comparison: Comparison) -> str:
 
 def _coarse(comparison: Comparison) -> CoarseRates | None:
     """Return what rates read in too few samples leave open of the first law that they do."""
-    told = (coarse_rates_of(outcome) for outcome in comparison.outcomes.values())
-    return next((coarse for coarse in told if coarse is not None), None)
+    for name, outcome in comparison.outcomes.items():
+        coarse = coarse_rates_of(outcome)
+        # intervals of a law that explains nothing are no claim, whatever moves them
+        if coarse is not None and (coarse.shows or name in comparison.explanation.by):
+            return coarse
+    return None
 
 
 def _unseen(comparison: Comparison, name: str) -> list[str]:
