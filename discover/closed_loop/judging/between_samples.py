@@ -6,7 +6,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.judging.finer_steps import change_on_finer_steps
+from discover.closed_loop.judging.finer_steps import (
+    change_on_finer_steps,
+    constants_that_follow,
+)
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
@@ -75,22 +78,18 @@ def coarse_rates(
         own = zip(model.positions(effect.name), effect.parameters, strict=True)
         names |= {position: parameter.name for position, parameter in own}
     wider = dict(bounds)
-    kept = change.ravel()
-    if fit.free:
-        design = fit.jacobian.reshape(len(fit.free), -1).T
-        moved = np.linalg.lstsq(design, -kept, rcond=None)[0]
-        kept = kept + design @ moved
-        for position, shift in zip(fit.free, np.abs(moved), strict=True):
-            value, (low, high) = float(fit.theta[position]), bounds[position]
-            half = max(0.5 * (high - low), np.finfo(float).tiny)
-            # what is left are coefficients of a constant by mode
-            name = names.get(position, "a_constant_by_mode")
-            shifts[name] = max(shifts.get(name, 0.0), float(shift / half))
-            wider[position] = (
-                max(value - float(np.hypot(value - low, shift)), float(model.low[position])),
-                min(value + float(np.hypot(high - value, shift)), float(model.high[position])),
-            )
-    each = np.sqrt(np.sum(kept.reshape(change.shape) ** 2, axis=1))
+    moved, kept = constants_that_follow(fit, change)
+    for position, shift in zip(fit.free, np.abs(moved), strict=True):
+        value, (low, high) = float(fit.theta[position]), bounds[position]
+        half = max(0.5 * (high - low), np.finfo(float).tiny)
+        # what is left are coefficients of a constant by mode
+        name = names.get(position, "a_constant_by_mode")
+        shifts[name] = max(shifts.get(name, 0.0), float(shift / half))
+        wider[position] = (
+            max(value - float(np.hypot(value - low, shift)), float(model.low[position])),
+            min(value + float(np.hypot(high - value, shift)), float(model.high[position])),
+        )
+    each = np.sqrt(np.sum(kept**2, axis=1))
     seen = judging(np.asarray(batch.weight))
     left = float(np.mean(fit.run_errors[seen]))
     most = np.sqrt(np.sum(change**2, axis=1))

@@ -42,11 +42,31 @@ def on_finer_steps(
     if not any(isinstance(effect, SeriesElement) for effect in effects):
         return fit
     change = change_on_finer_steps(model, batch, runs, fit.theta, active)
-    design = fit.jacobian.reshape(len(fit.free), -1).T
-    step = np.linalg.lstsq(design, -change.ravel(), rcond=None)[0]
+    step, _ = constants_that_follow(fit, change)
     moved, at = fit.theta.copy(), list(fit.free)
     moved[at] = np.clip(moved[at] + step, model.low[at], model.high[at])
     return replace(fit, theta=moved) if np.all(np.isfinite(moved)) else fit
+
+
+def constants_that_follow(
+    fit: Fit, change: Float[np.ndarray, "runs n"]
+) -> tuple[Float[np.ndarray, " free"], Float[np.ndarray, "runs n"]]:
+    """Return how a change of the residuals moves the fitted constants, and what is left of it.
+
+    One Gauss–Newton step.
+
+    Parameters
+    ----------
+    fit
+        With its Jacobian.
+    change
+        Of the weighted residuals.
+    """
+    if not fit.free:
+        return np.zeros(0), change
+    design = fit.jacobian.reshape(len(fit.free), -1).T
+    step = np.linalg.lstsq(design, -change.ravel(), rcond=None)[0]
+    return step, (change.ravel() + design @ step).reshape(change.shape)
 
 
 def change_on_finer_steps(
