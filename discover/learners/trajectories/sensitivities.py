@@ -99,10 +99,7 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
     """Return what `_solve_run` does of steady states, by the implicit function."""
 
     def at(time):
-        def recorded(coefficients, inner):
-            state = _steady_modes(problem, active, coefficients, inner, protocol, time)
-            return _observed(problem, protocol, time, state)
-
+        recorded = partial(_observed_in_steady_flow, problem, active, protocol, time)
         value = recorded(coefficients, inner)
         columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
         return jnp.concatenate([value[:, None], *columns], axis=1)
@@ -110,10 +107,11 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
     return jax.vmap(at)(grid.times[grid.sample_index])
 
 
-def _steady_modes(problem, active, coefficients, inner, protocol, time):
+def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
     gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
     law = partial(_known_less_terms, problem, active, coefficients, inner)
-    return steady_modes(law, gradient, jnp.zeros((problem.modulus.shape[0], 4)))
+    state = steady_modes(law, gradient, jnp.zeros((problem.modulus.shape[0], 4)))
+    return _observed(problem, protocol, time, state)
 
 
 def _known_less_terms(problem, active, coefficients, inner, stress, rate):
@@ -169,16 +167,13 @@ def predict_many(
     """
 
     def run(coefficients, inner, protocol, grid):
-        mode = partial(_known_less_terms, problem, active, coefficients, inner)
         if protocol.control == "steady":
             return jax.vmap(
-                lambda time: _observed(
-                    problem,
-                    protocol,
-                    time,
-                    _steady_modes(problem, active, coefficients, inner, protocol, time),
+                lambda time: _observed_in_steady_flow(
+                    problem, active, protocol, time, coefficients, inner
                 )
             )(grid.times[grid.sample_index])
+        mode = partial(_known_less_terms, problem, active, coefficients, inner)
 
         def field(t, stress, _):
             rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
