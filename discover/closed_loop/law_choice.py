@@ -118,6 +118,7 @@ def _with_law(
         free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
         solvent_viscosity=declared.solvent_viscosity,
         linear_error=declared.linear_error,
+        modulus_covariance=declared.modulus_covariance,
         effects=declared.effects,
     )
 

@@ -70,6 +70,7 @@ from discover.forward import (
     make_batch,
 )
 from discover.forward.least_squares import intervals
+from discover.forward.modulus_errors import modulus_shifts
 from discover.statistics.residual import Expectation, summarise
 
 
@@ -195,7 +196,7 @@ def run_loop(
         judging = record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
         records += judging
     summary = summarise(current.residual, np.asarray(batch.weight))
-    bounds = intervals(model, batch, current)
+    bounds = intervals(model, batch, current, modulus_shifts(model, current.theta, batch))
     share = float(np.mean(current.run_errors))
     unknown = change_between_samples(model, batch, fitted_runs, current.theta, active, share)
     coarse = None

@@ -20,7 +20,7 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
-from discover.comparison.judging.modes_error import modes_taken_for_exact
+from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
@@ -148,19 +148,22 @@ def judge(
         statements,
         replace(following, bands=claimed(bands, statements, flows)),
         classical,
-        () if silent_records else (*_of_modes(chosen, explanation, expectation), *apart),
+        () if silent_records else (*_of_modes(outcomes, explanation, expectation), *apart),
     )
 
 
 def _of_modes(
-    chosen: LearnerOutcome | None, explanation: Explanation, expectation: Expectation
+    outcomes: Mapping[str, LearnerOutcome], explanation: Explanation, expectation: Expectation
 ) -> tuple[str, ...]:
     """Return what the sweep's error leaves open of a sparse law that explains the runs."""
+    chosen = outcomes.get("tensor_sindy")
     if chosen is None or not explanation.in_library:
         return ()
     misfit = explanation.lack_of_fit["tensor_sindy"].misfit
     path = chosen.details.get("path", ())
-    said = modes_taken_for_exact(path, len(chosen.terms), misfit, expectation.linear_error)
+    network = "tbnn_ude" in outcomes
+    error = expectation.linear_error
+    said = left_open_by_modes(path, len(chosen.terms), misfit, error, network)
     return (said,) if said else ()
 
 

@@ -1,7 +1,7 @@
 """A linear frequency sweep, and a spectrum of relaxation modes from it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,9 @@ class RelaxationSpectrum:
         The smallest such error with any number of modes tried.
     errors
         Error against the number of modes, the best for each number.
+    modulus_covariance
+        Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
+        leaves them; None where they do not come from one.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -112,6 +115,7 @@ class RelaxationSpectrum:
     relative_error: float
     best_error: float
     errors: dict[int, float]
+    modulus_covariance: Float[np.ndarray, "k k"] | None = None
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -175,7 +179,8 @@ def relaxation_spectrum(
     trials = [
         _fit(sweep, n, margin) for n in range(1, most_modes + 1) for margin in MARGINS[: 2 * n]
     ]
-    return fewest_modes(trials, tolerance)
+    found = fewest_modes(trials, tolerance)
+    return replace(found, modulus_covariance=_covariance(sweep, found))
 
 
 def fewest_modes(
@@ -205,13 +210,7 @@ def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndar
     longest = 10.0**margin / frequency.min()
     shortest = 10.0**-margin / frequency.max()
     times = np.geomspace(shortest, longest, n) if n > 1 else np.array([(longest * shortest) ** 0.5])
-    x = frequency[:, None] * times
-    design = np.concatenate(
-        [
-            x**2 / (1 + x**2) / sweep.storage_modulus[:, None],
-            x / (1 + x**2) / sweep.loss_modulus[:, None],
-        ]
-    )
+    design = _relative_moduli(sweep, times)
     # columns of similar size: moduli may span many decades
     scale = np.linalg.norm(design, axis=0)
     modulus, _ = nnls(design / scale, np.ones(len(design)), maxiter=100 * n + 100)
@@ -219,3 +218,22 @@ def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndar
     error = float(np.sqrt(np.mean((design @ modulus - 1.0) ** 2)))
     keep = modulus > 0
     return modulus[keep], times[keep], error
+
+
+def _relative_moduli(sweep: LinearSweep, times: Float[np.ndarray, " k"]) -> np.ndarray:
+    """Return G′ and G″ of modes of 1 Pa over those measured, shape (2n, k), in 1/Pa."""
+    x = sweep.angular_frequency[:, None] * times
+    return np.concatenate(
+        [
+            x**2 / (1 + x**2) / sweep.storage_modulus[:, None],
+            x / (1 + x**2) / sweep.loss_modulus[:, None],
+        ]
+    )
+
+
+def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "k k"]:
+    """Return s² (AᵀA)⁻¹ of the moduli, s² the misfit for each degree of freedom that is left."""
+    design = _relative_moduli(sweep, found.relaxation_time) * found.modulus
+    free = max(len(design) - len(found), 1)
+    variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
+    return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)

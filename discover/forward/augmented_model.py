@@ -8,6 +8,7 @@ a call of its own, each leaves out the terms that it has at zero.
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from functools import cached_property
 
 import jax
@@ -93,6 +94,19 @@ class AugmentedModel:
             jnp.asarray(declared.relaxation_time),
             jnp.asarray(float(declared.solvent_viscosity)),
         )
+
+    def at_moduli(self, modulus: Float[np.ndarray, " k"]) -> "AugmentedModel":
+        """Return the same model with other moduli in Pa, in the same program.
+
+        For derivatives: an error that a sweep allows for may make one of many moduli negative.
+        """
+        other = copy(self)
+        numbers = self._numbers
+        moved = Numbers(
+            numbers.law, jnp.asarray(modulus), numbers.relaxation_time, numbers.solvent_viscosity
+        )
+        other.__dict__["_numbers"] = moved
+        return other
 
     def zero(self) -> Float[np.ndarray, " p"]:
         """Return the vector of the declared model: amplitudes zero, inner parameters at start.

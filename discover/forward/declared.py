@@ -48,6 +48,8 @@ class DeclaredModel:
     linear_error
         Relative error with which the modes describe the linear data they come from; no prediction
         can be expected to do better.
+    modulus_covariance
+        Of the moduli in Pa², shape (k, k), as those data leave them; None where they are exact.
     effects
         What is known beside the law: effects of fluid and instrument, with values or to be fitted.
     by_mode
@@ -72,6 +74,7 @@ class DeclaredModel:
     linear_error: float = 0.0
     effects: tuple[KnownEffect, ...] = ()
     by_mode: tuple[str, ...] = ()
+    modulus_covariance: Float[np.ndarray, "k k"] | None = None
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):

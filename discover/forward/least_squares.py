@@ -9,6 +9,7 @@ from scipy.stats import t as student
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import Batch
+from discover.forward.modulus_errors import response
 from discover.statistics import NoiseModel, least_squares_covariance
 
 _LARGEST_DAMPING = 1e7
@@ -244,15 +245,30 @@ def gauss_newton_step(jacobian, residual, damping, known=None):
     return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
 
 
-def intervals(model: AugmentedModel, batch: Batch, fit: Fit) -> dict[int, tuple[float, float]]:
+def intervals(
+    model: AugmentedModel,
+    batch: Batch,
+    fit: Fit,
+    shifts: Float[np.ndarray, "k runs n"] | None = None,
+) -> dict[int, tuple[float, float]]:
     """Return the 95 % interval of each fitted parameter, by position.
 
     From the curvature at the fit and the noise that its residual shows; see
     `discover.statistics.least_squares_covariance`.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    shifts
+        What errors of the moduli change (`modulus_shifts`); None takes the moduli for exact.
     """
     if not fit.free:
         return {}
     covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+    if shifts is not None and len(shifts):
+        off = response(fit.jacobian, shifts)
+        covariance = covariance + off @ off.T
     half = quantile * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     bounds = {}
     for position, h in zip(fit.free, half, strict=True):

@@ -33,6 +33,10 @@ def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
         raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
 
 
+def _as_covariance(value: ArrayLike | None) -> Float[Array, "k k"] | None:
+    return None if value is None else jnp.asarray(value, dtype=jnp.result_type(float))
+
+
 class Fluid(eqx.Module):
     """Sum of modes that share one dimensionless law, plus a Newtonian solvent.
 
@@ -49,6 +53,9 @@ class Fluid(eqx.Module):
         λ_k, shape (k,), in s.
     solvent_viscosity
         η_s, in Pa s.
+    modulus_covariance
+        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; None where
+        they are exact. Learners widen their intervals by it; no flow depends on it.
 
     Examples
     --------
@@ -62,6 +69,9 @@ class Fluid(eqx.Module):
     modulus: Float[Array, " k"] = eqx.field(converter=_as_modes)
     relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes)
     solvent_viscosity: Float[Array, ""] = eqx.field(converter=as_parameter, default=0.0)
+    modulus_covariance: Float[Array, "k k"] | None = eqx.field(
+        converter=_as_covariance, default=None
+    )
 
     def __check_init__(self):
         if not isinstance(self.law, AbstractConstitutiveLaw):
@@ -142,6 +152,7 @@ class Fluid(eqx.Module):
             spectrum.modulus,
             spectrum.relaxation_time,
             solvent_viscosity,
+            getattr(spectrum, "modulus_covariance", None),
         )
 
     @property

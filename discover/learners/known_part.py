@@ -21,6 +21,7 @@ _HELD_BY_BASE = (
     "solvent_viscosity",
     "base_law",
     "known_relaxation",
+    "modulus_covariance",
 )
 
 
@@ -38,6 +39,8 @@ class KnownPart:
         In Pa s.
     linear_relaxation
         Whether −σ is known.
+    modulus_covariance
+        Of the moduli in Pa², shape (k, k); None where they are exact.
     """
 
     law: AbstractConstitutiveLaw | None
@@ -45,6 +48,7 @@ class KnownPart:
     relaxation_time: Float[np.ndarray, " k"]
     solvent_viscosity: float
     linear_relaxation: bool
+    modulus_covariance: Float[np.ndarray, "k k"] | None = None
 
     @property
     def fluid(self) -> Fluid:
@@ -95,6 +99,7 @@ def known_part(estimator: Any) -> KnownPart:
             relaxation_time,
             float(viscosity),
             estimator.known_relaxation if law is None else law.linear_relaxation,
+            getattr(estimator, "modulus_covariance", None),
         )
     if not isinstance(base, Fluid):
         raise InputError(
@@ -112,6 +117,7 @@ def known_part(estimator: Any) -> KnownPart:
         np.asarray(base.relaxation_time),
         float(base.solvent_viscosity),
         base.law.linear_relaxation,
+        None if base.modulus_covariance is None else np.asarray(base.modulus_covariance),
     )
 
 

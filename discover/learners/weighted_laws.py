@@ -6,6 +6,7 @@ from functools import partial
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -38,10 +39,13 @@ class WeightedLaws:
         One law whose arrays have a leading axis of laws.
     weights
         Adding up to one, shape (laws,).
+    moduli
+        Of each law in Pa, shape (laws, k); None where all have those of the fluid.
     """
 
     laws: AbstractConstitutiveLaw
     weights: Float[np.ndarray, " laws"]
+    moduli: Float[np.ndarray, "laws k"] | None = None
 
     def bands(
         self,
@@ -54,7 +58,8 @@ class WeightedLaws:
         Parameters
         ----------
         modes
-            Moduli in Pa, relaxation times in s, and the solvent's viscosity in Pa s.
+            Moduli in Pa, for laws without their own, relaxation times in s, and the solvent's
+            viscosity in Pa s.
         flows
             From `lay_out`.
         samples
@@ -64,7 +69,12 @@ class WeightedLaws:
         -------
         None for a flow in which laws of more than half of the weight run away.
         """
-        predicted = np.asarray(_predict(self.laws, *modes, flows))
+        modulus, relaxation_time, viscosity = modes
+        if self.moduli is None:
+            moduli = jnp.tile(modulus, (len(self.weights), 1))
+        else:
+            moduli = jnp.asarray(self.moduli)
+        predicted = np.asarray(_predict(self.laws, moduli, relaxation_time, viscosity, flows))
         bands: list[Limits | None] = []
         for flow, n in enumerate(samples):
             values = predicted[:, flow, :n]
@@ -79,12 +89,13 @@ class WeightedLaws:
 
 @compiled
 def _predict(
-    laws, modulus, relaxation_time, solvent_viscosity, flows
+    laws, moduli, relaxation_time, solvent_viscosity, flows
 ) -> Float[Array, "laws flows n 3"]:
     arrays, rest = eqx.partition(laws, eqx.is_array)
 
-    def of_law(law):
+    def of_law(numbers):
+        law, modulus = numbers
         fluid = Fluid(eqx.combine(law, rest), modulus, relaxation_time, solvent_viscosity)
         return flows.over(partial(observed_on_grid, fluid))
 
-    return jax.lax.map(of_law, arrays, batch_size=_LAWS_AT_ONCE)
+    return jax.lax.map(of_law, (arrays, moduli), batch_size=_LAWS_AT_ONCE)

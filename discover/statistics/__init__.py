@@ -1,6 +1,6 @@
 """What residuals say of noise, and noise of parameters."""
 
-from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.covariance import least_squares_covariance, root_of
 from discover.statistics.dead_records import holds_signal
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
@@ -17,4 +17,5 @@ __all__ = [
     "lack_of_fit",
     "least_squares_covariance",
     "noise_model",
+    "root_of",
 ]

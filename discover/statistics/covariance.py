@@ -4,10 +4,10 @@ A least-squares fit weighs all samples alike whatever their noise, so its covari
 
     C = (SᵀS)⁻¹ Sᵀ Ω S (SᵀS)⁻¹,
 
-with S the weighted sensitivities and Ω the covariance of the noise. Ω is estimated from the
-residual as an autoregressive process (`noise_model`): a block bootstrap needs a refit for every
-draw, an effective sample size alone would shrink all directions alike, while slow noise spoils a
-slow signature more than a fast one.
+with S the weighted sensitivities and Ω the covariance of the noise, and of errors of what counts as
+known. That of the noise is estimated from the residual as an autoregressive process
+(`noise_model`): a block bootstrap needs a refit for every draw, an effective sample size alone
+would shrink all directions alike, while slow noise spoils a slow signature more than a fast one.
 
 A combination of parameters that changes no sample is not determined, however small the noise.
 """
@@ -27,10 +27,17 @@ _OPEN = 100.0
 off, either of two parameters that cancel changes the residual a hundredfold of its unit."""
 
 
+def root_of(covariance: Float[np.ndarray, "p p"]) -> Float[np.ndarray, "p p"]:
+    """Return R with RRᵀ a covariance: its columns are independent, each a standard deviation."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.clip(values, 0.0, None))
+
+
 def least_squares_covariance(
     columns: Float[np.ndarray, "rows p"],
     residual: Float[np.ndarray, " rows"],
     sequences: Sequence[Int[np.ndarray, " _"]],
+    shared: Float[np.ndarray, "rows k"] | None = None,
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
 
@@ -45,6 +52,8 @@ def least_squares_covariance(
         Residual of the fit.
     sequences
         Rows of each sequence of observations, in the order of time.
+    shared
+        Z of errors Z u that all rows share, u of unit variance, beside the noise; None for none.
     """
     noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
     # columns of like size, or the pseudo-inverse would drop what is merely small
@@ -58,5 +67,8 @@ def least_squares_covariance(
     middle = sum(
         scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
     )
+    if shared is not None:
+        common = scaled.T @ shared
+        middle = middle + common @ common.T
     sizes = np.outer(norms, norms)
     return (inverse @ middle @ inverse + unseen) / sizes, inverse / sizes, noise

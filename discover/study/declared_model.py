@@ -70,6 +70,17 @@ class DeclaredModel:
         return (*self.free, *of_effects)
 
     @property
+    def modulus_covariance(self) -> np.ndarray | None:
+        """Of the moduli in Pa², shape (k, k), as the sweep leaves them; None without one."""
+        spectrum = self.spectrum
+        if spectrum is None or spectrum.modulus_covariance is None:
+            return None
+        if spectrum.modulus.shape != self.modulus.shape:
+            return None
+        factor = self.modulus / spectrum.modulus  # a gain that was fitted, or another loading
+        return spectrum.modulus_covariance * np.outer(factor, factor)
+
+    @property
     def fluid(self) -> Fluid:
         """The declared fluid."""
         return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)
@@ -143,6 +154,7 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
     options = {
         "solvent_viscosity": declared.solvent_viscosity,
         "linear_error": 0.0 if spectrum is None else spectrum.relative_error,
+        "modulus_covariance": declared.modulus_covariance,
         "effects": declared.effects,
         "by_mode": declared.by_mode,
     }

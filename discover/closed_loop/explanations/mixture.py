@@ -14,6 +14,7 @@ from discover.closed_loop.explanations.widening import widening
 from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
+from discover.forward.modulus_errors import modulus_shifts, response
 
 _HALVINGS = 40
 _TAILS = (0.025, 0.975)
@@ -59,6 +60,9 @@ def mixed_bands(
     -------
     For each of `batches` the lower and the upper limit, in the unit of the record; zero at padding.
     """
+    at = carried[0].fit.theta
+    shifts = modulus_shifts(model, at, fitted)
+    moved = [shifts if b is fitted else modulus_shifts(model, at, b) for b in batches]
     tails = student.ppf(_TAILS[1], len(fitted.weight)) / ndtri(_TAILS[1]) if structured else 1.0
     parts: list[list[tuple[np.ndarray, np.ndarray, float]]] = [[] for _ in batches]
     for one, probability in zip(carried, probabilities, strict=True):
@@ -66,23 +70,33 @@ def mixed_bands(
         own = signatures(model, fitted, one.fit, others) if others else None
         lacking = discrepancy(model, fitted, one.fit, others, batches, own)
         root = root_of_covariance(fitted, one.fit)[0] if one.fit.free else None
+        off = response(one.fit.jacobian, shifts) if one.fit.free and len(shifts) else None
         left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
         wider = widening(model, fitted, one.fit, own, left)
         faster = [np.ones(len(batch.weight)) for batch in batches]
         if structured and rates:
             faster = [growth(one.fit.run_errors, rates[0], other) for other in rates[1:]]
-        for part, batch, square, more in zip(parts, batches, lacking, faster, strict=True):
-            found = _distribution(model, one.fit, root, square, left * more[:, None], batch)
+        for part, batch, square, more, by_moduli in zip(
+            parts, batches, lacking, faster, moved, strict=True
+        ):
+            size = left * more[:, None]
+            found = _distribution(model, one.fit, (root, off, by_moduli), square, size, batch)
             if found is not None:
                 part.append((found[0], wider * found[1], probability))
     return [_limits(part, batch) for part, batch in zip(parts, batches, strict=True)]
 
 
 def _distribution(
-    model: AugmentedModel, fit: Fit, root: np.ndarray | None, square: np.ndarray,
-    left: np.ndarray, batch: Batch,
+    model: AugmentedModel, fit: Fit,
+    uncertain: tuple[np.ndarray | None, np.ndarray | None, np.ndarray],
+    square: np.ndarray, left: np.ndarray, batch: Batch,
 ) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
-    """Return mean and standard deviation of what an explanation predicts; None if it runs away."""
+    """Return mean and standard deviation of what an explanation predicts; None if it runs away.
+
+    Uncertain are the constants by noise (a root of their covariance), and by errors of the moduli
+    (their response), which change the prediction themselves, too.
+    """
+    root, off, by_moduli = uncertain
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     seen = weight > 0
     scale = np.where(seen, weight, 1.0)
@@ -94,6 +108,9 @@ def _distribution(
         slope = jacobians(model, batch, [fit.theta], residual, [fit.free])[0] / scale
         columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
         variance = variance + np.sum(columns**2, axis=0)
+        if off is not None:
+            by_moduli = by_moduli - np.tensordot(off, slope * scale, axes=(0, 0))
+    variance = variance + np.sum(np.nan_to_num(by_moduli / scale) ** 2, axis=0)
     samples = np.maximum(np.count_nonzero(seen, axis=1), 1)
     # of a flow curve or sweep each sample has the noise that it is weighted by
     size = np.where(seen, 1.0 / (scale * np.sqrt(samples)[:, None]), 0.0)

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, covariance_and_noise, jacobians
+from discover.statistics import root_of
 from discover.statistics.unseen import Unseen
 
 
@@ -80,5 +81,4 @@ def root_of_covariance(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     covariance, noise = covariance_and_noise(batch, fit.residual, fit.jacobian)
     if not np.all(np.isfinite(covariance)):
         return np.zeros_like(covariance), noise.correlation
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0.0)), noise.correlation
+    return root_of(covariance), noise.correlation

@@ -85,6 +85,7 @@ def train(
             max_terms=options.max_terms,
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
+            modulus_covariance=model.modulus_covariance,
             **shared,
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files
@@ -95,7 +96,7 @@ def train(
         # the whole library of degree one, whatever the study's: fewer terms are surer, not truer
         dense = TensorDense(
             use_normal_stresses=options.use_normal_stresses,
-            solvent_viscosity=model.solvent_viscosity,
+            modulus_covariance=model.modulus_covariance,
             progress=progress,
             **shared,
         ).fit(list(runs))

@@ -20,12 +20,13 @@ from discover.effects import KnownEffect, library_term, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import Fit, fit_batch, intervals, jacobians
+from discover.forward.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
 from discover.protocols import strains
-from discover.statistics import least_squares_covariance
+from discover.statistics import least_squares_covariance, root_of
 from discover.study.data import StudyData
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from tensor_library.library import TermLibrary
@@ -301,7 +302,7 @@ class FittedAlong:
             return None
         before = float(np.sum(model.residuals([start], self.batch)[0] ** 2))
         values = dict(zip(raw, map(float, fit.theta[free[: len(raw)]]), strict=True))
-        bounds = intervals(model, self.batch, fit)
+        bounds = intervals(model, self.batch, fit, modulus_shifts(model, fit.theta, self.batch))
         halves = [0.5 * (bounds[at][1] - bounds[at][0]) for at in free[: len(raw)]]
         gained = 1.0 - fit.cost / before if before > 0.0 else 0.0
         return _Given(values, fit if joint else None, halves, gained)
@@ -346,7 +347,8 @@ class FittedAlong:
 
     def _with_joint(self, result: LearnerResult, fit: Fit) -> LearnerResult:
         """Return a sparse law with coefficients and intervals that allow for the constants."""
-        bounds = intervals(self.model, self.batch, fit)
+        shifts = modulus_shifts(self.model, fit.theta, self.batch)
+        bounds = intervals(self.model, self.batch, fit, shifts)
         at = [self.model.positions(term.term)[0] for term in result.terms]
         terms = tuple(
             replace(
@@ -363,25 +365,35 @@ class FittedAlong:
             result.law.linear_relaxation,
             getattr(result.law, "base", None),
         )
-        details: dict[str, Any] = {**result.details, "covariance": self._covariance(fit)}
+        details: dict[str, Any] = {**result.details, **self._uncertainty(fit, shifts)}
         drawn = details.get("draws") or {}
         if drawn and drawn.get("method") != "linear":
             reason = "the constants fitted along are not in the draws from its likelihood"
             details["draws"] = {**drawn, "method": "none", "reason": drawn.get("reason") or reason}
         return replace(result, terms=terms, law=law, details=details)
 
-    def _covariance(self, fit: Fit) -> list[list[float]] | None:
-        """Return the covariance of the coefficients, whatever the constants are."""
+    def _uncertainty(self, fit: Fit, shifts: Float[np.ndarray, "k runs n"]) -> dict[str, Any]:
+        """Return how uncertain the coefficients are, whatever the constants, as searches say it."""
         count = len(self.free)
         if len(fit.free) == count:
-            return None
+            return {"covariance": None, "modulus_errors": None}
         n_runs, n = fit.residual.shape
         rows = np.arange(n_runs * n).reshape(n_runs, n)
         seen = np.asarray(self.batch.weight) > 0
         sequences = [row[kept] for row, kept in zip(rows, seen, strict=True)]
         design = fit.jacobian.reshape(len(fit.free), -1).T
-        covariance, _, _ = least_squares_covariance(design, fit.residual.ravel(), sequences)
-        return covariance[count:, count:].tolist()
+        by_moduli = shifts.reshape(len(shifts), -1).T if len(shifts) else None
+        covariance, _, _ = least_squares_covariance(
+            design, fit.residual.ravel(), sequences, by_moduli
+        )
+        found: dict[str, Any] = {"covariance": covariance[count:, count:].tolist()}
+        found["modulus_errors"] = None
+        of_modes = self.model.declared.modulus_covariance
+        if by_moduli is not None and of_modes is not None:
+            root = root_of(of_modes)
+            off = response(fit.jacobian, shifts)[count:]
+            found["modulus_errors"] = {"root": root.tolist(), "response": off.tolist()}
+        return found
 
     def value_of(self, name: str, raw: float) -> float:
         """Return a constant in its unit from what the forward model has."""
@@ -392,7 +404,10 @@ class FittedAlong:
         return float(np.exp(raw)) * (float(own[0]) if len(own) == 1 else 1.0)
 
     def _constants(self, raw: Mapping[str, float], joint: Fit | None) -> dict[str, Constant]:
-        bounds = {} if joint is None else intervals(self.model, self.batch, joint)
+        bounds = {}
+        if joint is not None:
+            shifts = modulus_shifts(self.model, joint.theta, self.batch)
+            bounds = intervals(self.model, self.batch, joint, shifts)
         single = len(self.declared.modulus) == 1
         found = {}
         for name, value in raw.items():

@@ -11,12 +11,16 @@ _SHOWS = 0.1
 """An error of the modes below this share of what the law leaves hardly moves its constants."""
 
 
-def modes_taken_for_exact(
-    path: Sequence[Mapping[str, Any]], n_terms: int, misfit: float, linear_error: float
+def left_open_by_modes(
+    path: Sequence[Mapping[str, Any]],
+    n_terms: int,
+    misfit: float,
+    linear_error: float,
+    network: bool = False,
 ) -> str:
-    """Return what is to be said of intervals that take the modes for exact; empty for nothing.
+    """Return what is to be said of a law beside modes of a noisy sweep; empty for nothing.
 
-    The learners hold the modes to the values that fit a sweep, which has noise of its own: a term
+    Intervals and bands allow for errors of the moduli. The choice of the terms does not: a term
     may stand for what these are wrong by.
 
     Parameters
@@ -27,13 +31,16 @@ def modes_taken_for_exact(
         Of the law found.
     linear_error
         By which the modes miss the sweep, relative.
+    network
+        Whether there is a network beside it, whose members all have the modes that fit best.
     """
     if not n_terms or linear_error <= _SHOWS * misfit:
         return ""
     said = (
-        f"The modes miss the sweep by {percent_of(linear_error)}, and the intervals of the sparse "
-        "law take them for exact"
+        f"The modes miss the sweep by {percent_of(linear_error)}, which intervals and bands of the "
+        "sparse law allow for"
     )
+    said += " and those of the network do not" if network else ""
     for row in sorted(path, key=lambda row: row["size"]):
         if not 0 < row["size"] < n_terms:
             continue

@@ -13,6 +13,7 @@ from discover.identify.design.next_experiment import Proposal, propose_experimen
 from discover.identify.rivals.bands import PredictionBand, prediction_bands
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
+from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.protocols import another_between_samples
 from discover.study.schema import NextExperiment
 
@@ -241,7 +242,11 @@ def _uncertainty(row: Mapping[str, Any], size: int) -> dict[str, Any]:
     found = row.get("draws") or {"method": "linear"}
     drawn = np.asarray(found.get("values", ()), dtype=float)
     weighed = found["method"] == "weighed" and drawn.ndim == 2 and drawn.shape[1] == size
+    errors = row.get("modulus_errors")
     return {
+        "modulus_errors": None
+        if errors is None
+        else ModulusErrors(**{name: np.asarray(v, dtype=float) for name, v in errors.items()}),
         "covariance": _covariance(row, size),
         "drawn": drawn if weighed else None,
         "without_band": str(found.get("reason", "")) if found["method"] == "none" else "",

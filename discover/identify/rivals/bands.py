@@ -101,7 +101,8 @@ def prediction_bands(
         Of the draws.
     """
     rng = np.random.default_rng(seed)
-    drawn = [draws(law, n_draws, rng) for law in (chosen, *rivals)]
+    modulus = np.asarray(declared.modulus)
+    drawn = [draws(law, n_draws, rng, modulus) for law in (chosen, *rivals)]
     flat = [law for group in drawn for law in group]
     predicted = predict_laws(fluid_of(flat, declared), protocols, times)
     sizes = [len(group) for group in drawn]

@@ -14,6 +14,7 @@ from scipy.stats.qmc import LatinHypercube
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
+from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.flow_batch import FlowBatch, lay_out
@@ -40,6 +41,10 @@ class Contender:
     drawn
         Equally likely parameters in the same order, shape (draws, p), where the covariance does
         not serve; None where it does.
+    modulus_errors
+        Errors of the moduli that the covariance allows for; None where they are exact.
+    modulus
+        Of this law in Pa, shape (k,); None for those declared.
     without_band
         Why nothing is known of the parameters' uncertainty; empty where something is.
     """
@@ -50,6 +55,8 @@ class Contender:
     covariance: Float[np.ndarray, "p p"] | None = None
     drawn: Float[np.ndarray, "draws p"] | None = None
     without_band: str = ""
+    modulus_errors: ModulusErrors | None = None
+    modulus: Float[np.ndarray, " k"] | None = None
 
 
 def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
@@ -63,14 +70,17 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
     contenders
         The laws.
     declared
-        The known part: its law is the base, its modes are shared.
+        The known part: its law is the base, its modes are shared where a law has no own.
     """
     names = sorted({name for c in contenders for name in c.terms}) or ["sigma"]
     library = TermLibrary(tuple(parse_term(name) for name in names))
     rows = [dense(library, LawTerms(c.terms, c.inner)) for c in contenders]
     coefficients, inner = (np.stack(part) for part in zip(*rows, strict=True))
 
-    def make(coefficients, inner):
+    declared_modulus = np.asarray(declared.modulus)
+    moduli = [declared_modulus if c.modulus is None else c.modulus for c in contenders]
+
+    def make(coefficients, inner, modulus):
         law = LibraryExpansion(
             coefficients=coefficients,
             inner=inner,
@@ -78,13 +88,21 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
             linear_relaxation=declared.law.linear_relaxation,
             base=declared.law,
         )
-        return Fluid(law, declared.modulus, declared.relaxation_time, declared.solvent_viscosity)
+        return Fluid(law, modulus, declared.relaxation_time, declared.solvent_viscosity)
 
-    return eqx.filter_vmap(make)(jnp.asarray(coefficients), jnp.asarray(inner))
+    stacked = (jnp.asarray(part) for part in (coefficients, inner, np.stack(moduli)))
+    return eqx.filter_vmap(make)(*stacked)
 
 
-def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple[Contender, ...]:
+def draws(
+    contender: Contender,
+    n_draws: int,
+    rng: np.random.Generator,
+    modulus: Float[np.ndarray, " k"] | None = None,
+) -> tuple[Contender, ...]:
     """Return laws with parameters drawn from the contender's uncertainty; itself comes first.
+
+    Moduli about `modulus` in Pa are drawn with them where they are uncertain too.
 
     From a covariance by Latin hypercubes   [McKay, Beckman & Conover 1979, Technometrics 21, 239].
     """
@@ -103,6 +121,10 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]
     split = len(names)
+    moduli: list[np.ndarray | None] = [None] * len(drawn)
+    errors = contender.modulus_errors
+    if errors is not None and modulus is not None and contender.covariance is not None:
+        moduli = list(modulus + errors.draw(drawn - centre, contender.covariance, rng))
     return (
         contender,
         *(
@@ -110,8 +132,9 @@ def draws(contender: Contender, n_draws: int, rng: np.random.Generator) -> tuple
                 contender.name,
                 dict(zip(names, row[:split], strict=True)),
                 dict(zip(inner, row[split:], strict=True)),
+                modulus=own,
             )
-            for row in drawn
+            for row, own in zip(drawn, moduli, strict=True)
         ),
     )
 

@@ -26,6 +26,8 @@ class DenseDraws:
         Of the library on top of it, shape (draws, n).
     weights
         Adding up to one, shape (draws,).
+    moduli
+        In Pa, shape (draws, k); None where all have those declared.
     relaxation
         One where the reference laws bring −σ along, else zero.
     """
@@ -34,6 +36,7 @@ class DenseDraws:
     coefficients: Float[np.ndarray, "draws n"]
     weights: Float[np.ndarray, " draws"]
     relaxation: float
+    moduli: Float[np.ndarray, "draws k"] | None = None
 
     def laws(self, library: TermLibrary, base: AbstractConstitutiveLaw) -> WeightedLaws:
         """Return the laws, dimensionless, the known one included.
@@ -62,4 +65,4 @@ class DenseDraws:
             )
 
         laws = eqx.filter_vmap(law)(jnp.asarray(self.constants), jnp.asarray(self.coefficients))
-        return WeightedLaws(laws, self.weights)
+        return WeightedLaws(laws, self.weights, self.moduli)

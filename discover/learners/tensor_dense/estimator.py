@@ -62,7 +62,10 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         A known dimensionless law to which terms are added; by default UCM.
     base
         The known `Fluid`, in place of `modulus`, `relaxation_time`, `solvent_viscosity`,
-        `base_law` and `known_relaxation`.
+        `base_law`, `known_relaxation` and `modulus_covariance`.
+    modulus_covariance
+        Of the moduli in Pa², shape (k, k), as a sweep leaves them: the laws that fit differ in them
+        too. None where the moduli are exact.
     use_normal_stresses
         Whether N1 and N2, where measured, join as observed rows.
     misfit_floor
@@ -136,6 +139,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         random_state: int | None = 0,
         progress: Progress | None = None,
         base: Fluid | None = None,
+        modulus_covariance: Float[np.ndarray, "k k"] | None = None,
     ):
         self.library = library
         self.modulus = modulus
@@ -149,6 +153,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.progress = progress
         self.base = base
+        self.modulus_covariance = modulus_covariance
 
     def fit(self, X: Iterable[Run], y=None) -> "TensorDense":
         """Find the laws that fit these runs.
@@ -190,6 +195,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
             found.coefficients,
             found.weights_of_draws,
             float(_reference(problem).relaxation),
+            found.moduli if np.any(np.asarray(problem.modulus_error)) else None,
         )
         self.law_ = LibraryExpansion(
             coefficients=jnp.asarray(self.coefficients_),
@@ -272,6 +278,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
             known.linear_relaxation,
             self.use_normal_stresses,
             strain_step=self.strain_step,
+            modulus_covariance=known.modulus_covariance,
         )
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:

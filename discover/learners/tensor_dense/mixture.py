@@ -24,6 +24,7 @@ from discover.learners.tensor_dense.reference_laws import (
     fit_reference,
     with_reference,
 )
+from discover.learners.trajectories.modulus_errors import modulus_columns
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from discover.statistics.noise_model import noise_model
@@ -106,6 +107,8 @@ class Mixture:
         Position in `optima`, shape (draws,).
     coefficients
         Of the library, on top of the reference law, shape (draws, n).
+    moduli
+        Of each draw in Pa, shape (draws, k).
     weights_of_draws
         Adding up to one, shape (draws,).
     """
@@ -117,6 +120,7 @@ class Mixture:
     scale: Float[np.ndarray, " n"]
     optimum_of_draw: Int[np.ndarray, " draws"]
     coefficients: Float[np.ndarray, "draws n"]
+    moduli: Float[np.ndarray, "draws k"]
     weights_of_draws: Float[np.ndarray, " draws"]
 
 
@@ -172,7 +176,7 @@ def explore(
     weights = _weights(fitting, noise)
     rng = np.random.default_rng(seed)
     drawn = [_draws(problem, optimum, scale, noise, records, rng) for optimum in fitting]
-    counts = np.array([len(rows) for rows in drawn])
+    counts = np.array([len(laws) for laws, _ in drawn])
     owner = np.repeat(np.arange(len(fitting)), counts)
     return Mixture(
         tuple(fitting),
@@ -181,7 +185,8 @@ def explore(
         records,
         scale,
         owner,
-        np.concatenate(drawn) * scale,
+        np.concatenate([laws for laws, _ in drawn]) * scale,
+        np.concatenate([moduli for _, moduli in drawn]),
         (weights / counts)[owner],
     )
 
@@ -244,34 +249,68 @@ def _fitting(found: list[Optimum], noise: float, records: float) -> list[Optimum
     return [o for o in told if o.misfit <= FITS * noise or o is likeliest or o is written]
 
 
-def _draws(problem, optimum: Optimum, scale, noise, records, rng) -> Float[np.ndarray, "m n"]:
-    """Return an optimum and draws about it that fit as it does, in scaled coefficients.
+def _draws(
+    problem, optimum: Optimum, scale, noise, records, rng
+) -> tuple[Float[np.ndarray, "m n"], Float[np.ndarray, "m k"]]:
+    """Return an optimum and draws about it that fit as it does: scaled coefficients, and moduli.
 
     The covariance is that of the linearisation, which long directions leave: each draw is moved
-    until its prediction is what the linearisation said it would be.
+    until its prediction is what the linearisation said it would be. Moduli that a sweep leaves
+    open count as coefficients with a prior of their own.
     """
     # a misfit beyond the noise counts as more noise
     size = max(noise, optimum.misfit)
-    root, inverse = spread(optimum.columns, optimum.width, size, records)
-    unit = rng.normal(size=(_PAIRS, len(scale)))
-    moved = np.concatenate([unit, -unit]) @ root.T
-    wanted = optimum.residual + moved @ optimum.columns.T
-    back = root @ (optimum.columns @ root).T * (records / size**2)
-    laws = optimum.coefficients + moved
+    modulus, error = np.asarray(problem.modulus), np.asarray(problem.modulus_error)
+    columns = optimum.columns
+    if np.any(error):
+        # of the unit that the coefficients' prior has
+        shifts = _modulus_columns(problem, optimum, scale) / optimum.width
+        columns = np.hstack([columns, shifts])
+    n, errors = len(scale), columns.shape[1] - len(scale)
+    error = error / optimum.width
+    root, inverse = spread(columns, optimum.width, size, records)
+    back = root @ (columns @ root).T * (records / size**2)
+    centre = np.append(optimum.coefficients, np.zeros(errors))
+    if errors:
+        # where the moduli may move too, the mode is elsewhere: one step of Gauss and Newton
+        prior = root @ (root.T @ np.append(optimum.coefficients, np.zeros(errors)))
+        centre = centre - back @ optimum.residual - prior / optimum.width**2
+    unit = rng.normal(size=(_PAIRS, n + errors))
+    moved = centre + np.concatenate([unit, -unit]) @ root.T
+    start = np.append(optimum.coefficients, np.zeros(errors))
+    wanted = optimum.residual + (moved - start) @ columns.T
+    laws = moved
+
+    def moduli(laws):
+        return modulus + laws[:, n:] @ error.T if errors else np.tile(modulus, (len(laws), 1))
+
+    def residuals(laws):
+        own = moduli(laws) if errors else None
+        return _residuals(problem, optimum, laws[:, :n] * scale, own)
+
     # a law that runs away has no prediction to be corrected, and is not kept
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_CORRECTIONS):
-            off = _residuals(problem, optimum, laws * scale) - wanted
+            off = residuals(laws) - wanted
             step = np.where(np.all(np.isfinite(off), axis=1)[:, None], off, 0.0) @ back.T
             length = np.linalg.norm(step @ inverse.T, axis=1)
             laws = laws - step * np.minimum(1.0, _FARTHEST / np.maximum(length, 1e-12))[:, None]
-        misfit = np.linalg.norm(_residuals(problem, optimum, laws * scale), axis=1)
+        misfit = np.linalg.norm(residuals(laws), axis=1)
         kept = misfit <= _STRAY * optimum.misfit
-    return np.vstack([optimum.coefficients, laws[kept]])
+    found = np.vstack([start, laws[kept]])
+    return found[:, :n], moduli(found)
 
 
-def _residuals(problem, optimum: Optimum, coefficients) -> Float[np.ndarray, "m rows"]:
+def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "rows k"]:
+    """Return the change of an optimum's weighted predictions with each error of the moduli."""
+    at, places = with_reference(problem, optimum.constants), range(len(scale))
+    inner = np.zeros(0)
+    return modulus_columns(at, places, len(scale), optimum.coefficients * scale, inner)
+
+
+def _residuals(problem, optimum: Optimum, coefficients, moduli=None) -> Float[np.ndarray, "m rows"]:
     target = np.asarray(problem.weight * problem.target).reshape(-1)
     at = with_reference(problem, optimum.constants)
     places, inner = jnp.arange(coefficients.shape[1]), jnp.zeros((len(coefficients), 0))
-    return np.asarray(predict_many(at, places, jnp.asarray(coefficients), inner)) - target
+    own = None if moduli is None else jnp.asarray(moduli)
+    return np.asarray(predict_many(at, places, jnp.asarray(coefficients), inner, own)) - target

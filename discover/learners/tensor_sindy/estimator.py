@@ -29,7 +29,13 @@ from discover.learners.tensor_sindy.optimisers import (
 )
 from discover.learners.tensor_sindy.recovered_terms import recovered_terms
 from discover.learners.tensor_sindy.refit import Fit
-from discover.learners.tensor_sindy.report import frequency_table, noise_of, path_table, rival_table
+from discover.learners.tensor_sindy.report import (
+    described,
+    frequency_table,
+    noise_of,
+    path_table,
+    rival_table,
+)
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import (
     choose_by_bic,
@@ -40,6 +46,7 @@ from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
 from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
+from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import make_problem
 from discover.progress import Progress, by_lines
@@ -74,7 +81,10 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         A known dimensionless law to which terms are added; by default UCM.
     base
         The known `Fluid`, in place of `modulus`, `relaxation_time`, `solvent_viscosity`,
-        `base_law` and `known_relaxation`.
+        `base_law`, `known_relaxation` and `modulus_covariance`.
+    modulus_covariance
+        Of the moduli in Pa², shape (k, k), as a sweep leaves them: intervals and bands allow for
+        it. None where the moduli are exact.
     use_normal_stresses
         Whether N1 and N2, where measured, join as observed rows.
     selection
@@ -156,6 +166,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         LearnerResult,
         RecoveredTerm,
         ParameterUncertainty,
+        ModulusErrors,
         NoiseModel,
         Stability,
         WeighedDraws,
@@ -181,6 +192,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         random_state: int | None = 0,
         progress: Progress | None = None,
         base: Fluid | None = None,
+        modulus_covariance: Float[np.ndarray, "k k"] | None = None,
     ):
         self.library = library
         self.optimizer = optimizer
@@ -199,6 +211,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.random_state = random_state
         self.progress = progress
         self.base = base
+        self.modulus_covariance = modulus_covariance
 
     def fit(self, X: Iterable[Run], y=None) -> "TensorSINDy":
         """Find the law of these runs.
@@ -232,6 +245,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             known.linear_relaxation,
             self.use_normal_stresses,
             self.strain_step,
+            known.modulus_covariance,
         )
         groups = _groups(runs)
         n_groups = int(np.max(groups)) + 1
@@ -300,7 +314,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         )
         self.uncertainty_, self.draws_ = None, None
         if fit.support:
-            self.uncertainty_ = parameter_uncertainty(problem, fit, self.misfit_floor)
+            self.uncertainty_ = parameter_uncertainty(problem, fit, self.misfit_floor, search.slots)
             self.draws_ = draws_of_fit(
                 problem, fit, self.uncertainty_, search.slots, self.random_state or 0
             )
@@ -322,9 +336,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 "selectors": selectors,
                 "selection_frequency": frequency_table(library, self.stability_),
                 "rivals": rival_table(search, fit),
-                "covariance": None
-                if self.uncertainty_ is None
-                else self.uncertainty_.total_covariance.tolist(),
+                **described(self.uncertainty_),
                 "draws": None if self.draws_ is None else self.draws_.to_json(),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer

@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy.stats import t as student
 
 from discover.learners.tensor_sindy.refit import Fit
+from discover.learners.trajectories.modulus_errors import ModulusErrors, modulus_columns
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.statistics import NoiseModel, least_squares_covariance
@@ -22,7 +23,8 @@ class ParameterUncertainty:
     Attributes
     ----------
     covariance
-        Of the coefficients of the support, then of the inner parameters used, shape (p, p).
+        Of the coefficients of the support, then of the inner parameters used, shape (p, p), by
+        noise and by errors of the moduli.
     inverse
         (SᵀS)⁻¹ of the fit, in the same order.
     inner_positions
@@ -35,6 +37,8 @@ class ParameterUncertainty:
         The noise the residual shows.
     floor
         Relative misfit below which the integration itself is in doubt.
+    modulus_errors
+        What the moduli may be off by, which the covariance allows for; None where they are exact.
     """
 
     covariance: Float[np.ndarray, "p p"]
@@ -44,6 +48,7 @@ class ParameterUncertainty:
     factor: float
     noise: NoiseModel
     floor: float = 0.0
+    modulus_errors: ModulusErrors | None = None
 
     @property
     def total_covariance(self) -> Float[np.ndarray, "p p"]:
@@ -86,7 +91,7 @@ class ParameterUncertainty:
 
 
 def parameter_uncertainty(
-    problem: TrajectoryProblem, fit: Fit, misfit_floor: float = 0.0
+    problem: TrajectoryProblem, fit: Fit, misfit_floor: float = 0.0, slots: int = 1
 ) -> ParameterUncertainty:
     """Return the uncertainty of a fit's coefficients and inner parameters.
 
@@ -98,9 +103,17 @@ def parameter_uncertainty(
         A fit on all rows, with at least one term.
     misfit_floor
         Relative misfit below which the integration itself is in doubt.
+    slots
+        Largest size of a support; sets the shape of a compiled program.
     """
+    slots = max(slots, len(fit.support))
     residual, chosen, inner = sensitivities_at(problem, fit)
-    covariance, inverse, noise = least_squares_covariance(chosen, residual, problem.sequences())
+    shared = None
+    if np.any(np.asarray(problem.modulus_error)):
+        shared = modulus_columns(problem, fit.support, slots, fit.coefficients, fit.inner)
+    covariance, inverse, noise = least_squares_covariance(
+        chosen, residual, problem.sequences(), shared
+    )
     free = max(noise.effective_samples - chosen.shape[1], 1.0)
     return ParameterUncertainty(
         covariance=covariance,
@@ -111,6 +124,9 @@ def parameter_uncertainty(
         factor=float(student.ppf(0.975, free)),
         noise=noise,
         floor=misfit_floor,
+        modulus_errors=None
+        if shared is None
+        else ModulusErrors(np.asarray(problem.modulus_error), inverse @ (chosen.T @ shared)),
     )
 
 

@@ -77,15 +77,26 @@ def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
             rivals.append((row, fit))
     rivals.sort(key=lambda pair: pair[0]["difference"])
     for row, fit in rivals[:_MOST_COVARIANCES]:
-        row["covariance"] = covariance_table(search, fit)
+        row.update(uncertainty_table(search, fit))
     return [row for row, _ in rivals]
 
 
-def covariance_table(search: SupportSearch, fit: Fit) -> list[list[float]] | None:
-    """Return the covariance of a law's coefficients, then its inner parameters; None if empty."""
+def uncertainty_table(search: SupportSearch, fit: Fit) -> dict[str, Any]:
+    """Return how uncertain the parameters of a fit are, as `described` writes it."""
     if not fit.support:
-        return None
-    return parameter_uncertainty(search.problem, fit, search.floor).total_covariance.tolist()
+        return described(None)
+    return described(parameter_uncertainty(search.problem, fit, search.floor, search.slots))
+
+
+def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:
+    """Return the covariance of a law's parameters, and the errors of moduli that it allows for."""
+    if uncertainty is None:
+        return {"covariance": None}
+    rows: dict[str, Any] = {"covariance": uncertainty.total_covariance.tolist()}
+    errors = uncertainty.modulus_errors
+    if errors is not None:
+        rows["modulus_errors"] = {name: v.tolist() for name, v in vars(errors).items()}
+    return rows
 
 
 def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str, Any]:
@@ -102,9 +113,9 @@ def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str,
     """
     if not fit.support:
         return {"covariance": None, "draws": None}
-    uncertainty = parameter_uncertainty(search.problem, fit, search.floor)
+    uncertainty = parameter_uncertainty(search.problem, fit, search.floor, search.slots)
     draws = draws_of_fit(search.problem, fit, uncertainty, search.slots, seed)
-    return {"covariance": uncertainty.total_covariance.tolist(), "draws": draws.to_json()}
+    return {**described(uncertainty), "draws": draws.to_json()}
 
 
 def frequency_table(library: TermLibrary, stability: Stability | None) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.runs import as_runs
 from discover.simulate.flow_batch import FlowBatch, lay_out
+from discover.statistics import root_of
 from tensor_library.library import TermLibrary
 
 OBSERVED = ("recorded", "first_normal_stress_difference", "second_normal_stress_difference")
@@ -36,6 +37,9 @@ class TrajectoryProblem(eqx.Module):
         Of each mode, shape (k,), in Pa and s.
     solvent_viscosity
         In Pa s.
+    modulus_error
+        R with moduli G + R u, u of unit variance, as a sweep leaves them, shape (k, k), in Pa; zero
+        where they are exact.
     flows
         The runs and their grids.
     target
@@ -53,6 +57,7 @@ class TrajectoryProblem(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
+    modulus_error: Float[Array, "k k"]
     flows: FlowBatch
     target: Float[Array, "runs n 3"]
     weight: Float[Array, "runs n 3"]
@@ -88,6 +93,7 @@ def make_problem(
     known_relaxation: bool = True,
     use_normal_stresses: bool = False,
     strain_step: float = 0.1,
+    modulus_covariance: Any = None,
 ) -> TrajectoryProblem:
     """Return the problem of finding library terms from runs.
 
@@ -108,6 +114,8 @@ def make_problem(
         Whether N1 and N2, where measured, are observed too.
     strain_step
         Largest strain between two steps of the integration.
+    modulus_covariance
+        Of the moduli, in Pa²; None where they are exact.
 
     Raises
     ------
@@ -160,8 +168,23 @@ def make_problem(
         modulus=jnp.asarray(modulus),
         relaxation_time=jnp.asarray(relaxation_time),
         solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
+        modulus_error=jnp.asarray(_root(modulus_covariance, len(modulus))),
         flows=flows.with_steps_in(_PADDED_STEPS),
         target=jnp.asarray(target),
         weight=jnp.asarray(weight / np.sqrt(np.sum(weight > 0))),
         order_of_time=jnp.asarray(order),
     )
+
+
+def _root(covariance: Any, n_modes: int) -> np.ndarray:
+    """Return R with RRᵀ the covariance of moduli; zero for none."""
+    if covariance is None:
+        return np.zeros((n_modes, n_modes))
+    values = np.asarray(covariance, dtype=float)
+    usable = values.shape == (n_modes, n_modes) and np.all(np.isfinite(values))
+    if not usable or not np.allclose(values, values.T):
+        raise InputError(
+            "modulus_covariance must be a symmetric matrix in Pa² with one row for each mode; got "
+            f"the shape {values.shape} for {n_modes} modes."
+        )
+    return root_of(values)

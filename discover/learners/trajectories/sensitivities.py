@@ -13,6 +13,7 @@ Which terms are active is an index array, not a program: no support needs a comp
 
 from functools import partial
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
@@ -160,13 +161,15 @@ def predict_many(
     active: Int[Array, " q"],
     coefficients: Float[Array, "laws q"],
     inner: Float[Array, "laws m"],
+    modulus: Float[Array, "laws k"] | None = None,
 ) -> Float[Array, "laws rows"]:
     """Return the weighted predictions of many laws of the same terms, without sensitivities.
 
-    Parameters as in `observe`, with a leading axis of laws. Not finite where a law runs away.
+    Parameters as in `observe`, with a leading axis of laws, and moduli of each law in Pa, by
+    default those of the problem. Not finite where a law runs away.
     """
 
-    def run(coefficients, inner, protocol, grid):
+    def run(problem, coefficients, inner, protocol, grid):
         if protocol.control == "steady":
             return jax.vmap(
                 lambda time: _observed_in_steady_flow(
@@ -190,10 +193,12 @@ def predict_many(
         return observed[grid.sample_index]
 
     def law(numbers):
-        predicted = problem.flows.over(partial(run, *numbers))
+        coefficients, inner, modulus = numbers
+        at = problem if modulus is None else eqx.tree_at(lambda p: p.modulus, problem, modulus)
+        predicted = problem.flows.over(partial(run, at, coefficients, inner))
         return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
 
-    return jax.lax.map(law, (coefficients, inner), batch_size=_LAWS_AT_ONCE)
+    return jax.lax.map(law, (coefficients, inner, modulus), batch_size=_LAWS_AT_ONCE)
 
 
 @compiled

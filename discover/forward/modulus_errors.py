@@ -1,0 +1,56 @@
+"""What errors of the declared moduli, as a linear sweep leaves them, change in records and fits."""
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward.augmented_model import AugmentedModel
+from discover.forward.batches import Batch
+from discover.statistics import root_of
+
+_SHIFT = 0.1
+"""Standard deviations by which moduli are moved; what a rate controls is linear in them."""
+
+
+def modulus_shifts(
+    model: AugmentedModel, theta: Float[np.ndarray, " p"], batch: Batch
+) -> Float[np.ndarray, "k runs n"]:
+    """Return the change of the weighted residuals with each independent error of the moduli.
+
+    An error of each has unit variance. Empty where the moduli are exact.
+
+    Parameters
+    ----------
+    model, theta
+        The model and its parameters.
+    batch
+        The runs.
+    """
+    declared = model.declared
+    if declared.modulus_covariance is None:
+        return np.zeros((0, *np.shape(batch.weight)))
+
+    def residuals(step: Float[np.ndarray, " k"]) -> np.ndarray:
+        return model.at_moduli(declared.modulus + step).residuals([theta], batch)[0]
+
+    steps = _SHIFT * root_of(declared.modulus_covariance).T
+    found = [(residuals(step) - residuals(-step)) / (2.0 * _SHIFT) for step in steps]
+    return np.nan_to_num(np.stack(found))
+
+
+def response(
+    jacobian: Float[np.ndarray, "free runs n"], shifts: Float[np.ndarray, "k runs n"]
+) -> Float[np.ndarray, "free k"]:
+    """Return by how much fitted parameters come out wrong with each error of the moduli.
+
+    Parameters
+    ----------
+    jacobian
+        Derivatives of the weighted residuals in the fitted parameters.
+    shifts
+        From `modulus_shifts`, of the same runs.
+    """
+    design = jacobian.reshape(len(jacobian), -1).T
+    scale = np.linalg.norm(design, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    target = shifts.reshape(len(shifts), -1).T
+    return np.linalg.lstsq(design / scale, target, rcond=None)[0] / scale[:, None]

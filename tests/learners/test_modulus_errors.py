@@ -1,0 +1,209 @@
+"""Intervals and bands beside modes from a noisy sweep: sweeps by closed form, records by scipy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from independent import Giesekus, start_up
+
+import discover as dc
+from discover.comparison.fitting import training
+from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward.least_squares import fit_batch, intervals
+from discover.forward.modulus_errors import modulus_shifts
+from discover.identify.side_by_side.many_laws import Contender, draws
+from discover.learners.tensor_sindy.intervals import parameter_uncertainty
+from discover.learners.tensor_sindy.refit import refit
+from discover.learners.trajectories.modulus_errors import ModulusErrors
+from discover.learners.trajectories.problem import make_problem
+from discover.study.in_memory import declared_fluid
+from discover.study.schema import Study
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+MODULUS, TIME = np.array([300.0, 400.0, 200.0]), np.array([3.0, 0.4, 0.05])
+MOBILITY, NOISE, SWEEP_NOISE = 0.3, 0.01, 0.03
+RATES = (0.5, 2.0, 8.0)
+MOBILITY_TERM = TermLibrary((parse_term("sigma.sigma"),))
+
+
+@cache
+def stress(rate, quantity="sigma12"):
+    """Of three Giesekus modes in start-up: times in s, stress in Pa."""
+    times = np.linspace(0.05, 12.0 / rate + 2.0, 60)
+    parts = (
+        modulus * getattr(Giesekus(MOBILITY).respond(start_up(rate * time), times / time), quantity)
+        for modulus, time in zip(MODULUS, TIME, strict=True)
+    )
+    return times, sum(parts)
+
+
+def records(seed, rates=RATES):
+    generator, runs = np.random.default_rng(1000 + seed), []
+    for rate in rates:
+        times, exact = stress(rate)
+        off = NOISE * np.sqrt(np.mean(exact**2)) * generator.standard_normal(times.size)
+        name = f"at_{rate:g}"
+        runs.append(dc.Run(name, times, dc.start_up(rate), np.full(times.size, rate), exact + off))
+    return runs
+
+
+def sweep(seed, noise=SWEEP_NOISE):
+    generator, omega = np.random.default_rng(seed), np.geomspace(0.05, 100.0, 30)
+    x = omega[:, None] * TIME
+    off = 1.0 + noise * generator.standard_normal((2, omega.size))
+    return dc.LinearSweep(
+        omega, (x**2 / (1 + x**2)) @ MODULUS * off[0], (x / (1 + x**2)) @ MODULUS * off[1]
+    )
+
+
+def test_the_covariance_of_moduli_is_their_scatter_over_repeated_sweeps():
+    """At the relaxation times of the first, by least squares written out here."""
+    found = sweep(0).relaxation_spectrum()
+    modes = []
+    for seed in range(200):
+        one = sweep(seed)
+        x = one.angular_frequency[:, None] * found.relaxation_time
+        measured = np.concatenate([one.storage_modulus, one.loss_modulus])
+        design = np.concatenate([x**2 / (1 + x**2), x / (1 + x**2)]) / measured[:, None]
+        modes.append(np.linalg.lstsq(design, np.ones(measured.size), rcond=None)[0])
+    scatter = np.std(modes, axis=0, ddof=1)
+    said = np.sqrt(np.diag(found.modulus_covariance))
+    # both sides are standard deviations: that of 60 residuals has an error of 10 %, of 200 draws 5
+    np.testing.assert_allclose(said, scatter, rtol=0.35)
+
+
+def test_a_sweep_without_noise_of_its_own_modes_leaves_no_doubt_of_them():
+    omega = np.geomspace(0.1, 10.0, 9)
+    one = dc.LinearSweep(omega, omega**2 / (1 + omega**2), omega / (1 + omega**2))
+    spectrum = one.relaxation_spectrum()
+    assert np.max(np.sqrt(np.diag(spectrum.modulus_covariance)) / spectrum.modulus) < 1e-6
+    assert dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus_covariance is None
+
+
+def problem_of(seed, noise=SWEEP_NOISE, known=True):
+    spectrum = sweep(seed, noise).relaxation_spectrum()
+    covariance = spectrum.modulus_covariance if known else None
+    modes = spectrum.modulus, spectrum.relaxation_time
+    return make_problem(
+        records(seed), MOBILITY_TERM, *modes, strain_step=0.2, modulus_covariance=covariance
+    )
+
+
+def fit_of(problem):
+    return refit(problem, [(0,)], [(np.array([0.2]), np.zeros(0))], np.ones(1), 1)[0]
+
+
+@pytest.mark.parametrize("learner", ["tensor_sindy", "closed_loop"])
+def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(learner):
+    """And by both ways to fit, without the sweep's noise several times too narrow."""
+    off, narrow = [], []
+    for seed in range(10):
+        if learner == "tensor_sindy":
+            problem = problem_of(seed)
+            fit = fit_of(problem)
+            value = fit.coefficients[0]
+            half, exact = (
+                parameter_uncertainty(p, fit, 1e-5).half_widths[0]
+                for p in (problem, problem_of(seed, known=False))
+            )
+        else:
+            spectrum, runs = sweep(seed).relaxation_spectrum(), records(seed)
+            declared = DeclaredModel.named(
+                "giesekus", {"alpha": 0.2}, spectrum.modulus, spectrum.relaxation_time,
+                free=["alpha"], modulus_covariance=spectrum.modulus_covariance,
+            )  # fmt: skip
+            model, batch = AugmentedModel(declared, [], data_scales(runs)), make_batch(runs)
+            fit = fit_batch(model, batch, [model.zero()], [model.free_positions])[0]
+            shifts = modulus_shifts(model, fit.theta, batch)
+            value = fit.theta[2]
+            half, exact = (
+                0.5 * np.ptp(intervals(model, batch, fit, moved)[2]) for moved in (shifts, None)
+            )
+        off.append((value - MOBILITY) / half)
+        narrow.append((value - MOBILITY) / exact)
+    # errors in half widths of 95 %: one over 1.96, from ten draws to within a half (chi-squared)
+    assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.9
+    assert np.sqrt(np.mean(np.square(narrow))) > 1.5
+
+
+def test_parameters_move_with_the_moduli_as_the_response_says():
+    problem = problem_of(0)
+    fit = fit_of(problem)
+    errors = parameter_uncertainty(problem, fit, 1e-5).modulus_errors
+    spectrum = sweep(0).relaxation_spectrum()
+    for direction in (-1, -2):  # those in which the moduli are least known
+        moved = spectrum.modulus + 0.3 * errors.root[:, direction]
+        other = make_problem(
+            records(0), MOBILITY_TERM, moved, spectrum.relaxation_time, strain_step=0.2
+        )
+        change = fit_of(other).coefficients[0] - fit.coefficients[0]
+        # to first order: what 0.3 standard deviations bend is some percent of what they move
+        assert change == pytest.approx(-0.3 * errors.response[0, direction], rel=0.1, abs=1e-5)
+
+
+def test_moduli_are_drawn_with_the_parameters_that_go_with_them():
+    errors = ModulusErrors(root=np.diag([2.0, 0.0]), response=np.array([[0.1, 0.0]]))
+    law = Contender("law", {"sigma": 1.0}, covariance=np.array([[0.01]]), modulus_errors=errors)
+    drawn = draws(law, 50, np.random.default_rng(0), np.array([10.0, 5.0]))
+    terms = np.array([one.terms["sigma"] for one in drawn[1:]])
+    moduli = np.array([one.modulus for one in drawn[1:]])
+    # all of the parameter's variance comes from the first modulus: θ = 1 − 0.1 u, G = 10 + 2 u
+    np.testing.assert_allclose(moduli[:, 0], 10.0 - 20.0 * (terms - 1.0), atol=1e-6)
+    np.testing.assert_allclose(moduli[:, 1], 5.0)
+
+
+@pytest.mark.parametrize("covariance", [np.eye(2), np.full((3, 3), np.nan), np.triu(np.ones(3))])
+def test_a_covariance_that_is_none_is_refused(covariance):
+    with pytest.raises(InputError, match="symmetric matrix in Pa²"):
+        make_problem(records(0), MOBILITY_TERM, MODULUS, TIME, modulus_covariance=covariance)
+
+
+def test_a_base_from_a_sweep_brings_the_errors_of_its_moduli():
+    base = dc.Fluid.from_sweep(sweep(0))
+    sparse = dc.TensorSINDy(base=base, library=MOBILITY_TERM, n_stability=0).fit(records(0))
+    assert sparse.uncertainty_.modulus_errors is not None
+    low, high = sparse.terms_[0].ci95
+    assert low <= MOBILITY <= high
+    with pytest.raises(InputError, match="base holds modulus_covariance already"):
+        dc.TensorSINDy(base=base, modulus_covariance=np.eye(3)).fit(records(0))
+
+
+def test_a_study_hands_every_learner_what_it_knows(monkeypatch):
+    """Each of the three that are built in takes the arguments of a comparison."""
+    met = {}
+
+    def fit(self, runs):
+        met[type(self).__name__] = self
+        raise InterruptedError
+
+    for name in ("TensorSINDy", "TensorDense", "TBNNUDE"):
+        monkeypatch.setattr(getattr(dc, name), "fit", fit)
+    data = dc.Dataset("planted", tuple(records(0)), sweep(0))
+    declared = declared_fluid(dc.Fluid.from_sweep(data.linear_sweep), data)
+    study = Study.model_validate({"data": {"folder": "planted"}, "model": {"law": "ucm"}})
+    for learner in ("tensor_sindy", "tensor_dense", "tbnn_ude"):
+        with pytest.raises(InterruptedError):
+            training.train(learner, study, declared, data.runs)
+    for name in ("TensorSINDy", "TensorDense"):
+        np.testing.assert_array_equal(met[name].modulus_covariance, declared.modulus_covariance)
+
+
+@pytest.mark.slow
+def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
+    """Where moduli count as exact it does not: a fifth or less of N1 was inside."""
+    inside = {}
+    unseen = records(0, rates=(4.0,))
+    exact = stress(4.0, "N1")[1]
+    spectrum = sweep(0).relaxation_spectrum()
+    for known in (True, False):
+        dense = dc.TensorDense(
+            modulus=spectrum.modulus,
+            relaxation_time=spectrum.relaxation_time,
+            modulus_covariance=spectrum.modulus_covariance if known else None,
+        ).fit(records(0))
+        low, _, high = dense.predict_band(unseen)[0]["N1"]
+        inside[known] = np.mean((exact >= low) & (exact <= high))
+    assert inside[True] > 0.9
+    assert inside[False] < 0.7
