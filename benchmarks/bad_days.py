@@ -90,11 +90,11 @@ def without_pages() -> Iterator[None]:
         write_predictions,
     )
 
-    def loop(result, folder, *rest):
+    def loop(result, folder, *of_the_page, **of_it):
         result.write_json(folder.path / "loop.json")
         write_predictions(loop_predictions(result), folder)
 
-    def comparison(result, folder, *rest):
+    def comparison(result, folder, *of_the_page, **of_it):
         folder.write("comparison.json", json.dumps(result.to_json(), indent=1) + "\n")
         write_predictions(comparison_predictions(result), folder)
 
