@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from bad_day_cases import CASES, Case, recorded, white
 from bad_day_rules import judge
-from bad_days import make, run, write
+from bad_days import make, write
+from bad_days import run as run_case
 from independent import Giesekus
 
 MOBILITY = {"giesekus_mobility": {"alpha": 0.3}}
@@ -126,8 +127,8 @@ def test_the_cases_are_sixty_and_reproduce(tmp_path):
     assert white(0.0)(one, np.random.default_rng(0)) is not one
 
 
-@pytest.mark.parametrize("task", ["close-loop", "compare"])
+@pytest.mark.parametrize("task", ["close-loop", pytest.param("compare", marks=pytest.mark.slow)])
 def test_a_dead_sensor_goes_through_the_whole_program_without_a_claim(task, tmp_path):
-    row = run("dead_sensor", task, tmp_path, 0, pages=False)
+    row = run_case("dead_sensor", task, tmp_path, 0, pages=False)
     assert row["verdict"] in ("no_signal", "unexplained", "refused"), row.get("message")
     assert not row["falsehoods"]
