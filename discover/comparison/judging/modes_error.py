@@ -20,8 +20,8 @@ def left_open_by_modes(
 ) -> str:
     """Return what is to be said of a law beside modes of a noisy sweep; empty for nothing.
 
-    Intervals and bands allow for errors of the moduli. The choice of the terms does not: a term
-    may stand for what these are wrong by.
+    Intervals, bands and the choice of the terms allow for errors of the moduli as noise of the
+    sweep makes them. A misfit of the modes that is no noise a term may stand for all the same.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_library, check_settings
+from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
 from discover.learners.tensor_sindy.optimisers import (
@@ -266,7 +267,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             held_out, errors = held_out_misfits(problem, path, folds, search.scale, search.slots)
             names = [run.name for run in runs]
             by_run = [dict(zip(names, map(float, row), strict=True)) for row in errors]
-        criterion = np.array([search.criterion(fit) for fit in path])
+        criterion = criteria_beside_modes(search, path)
         if self.selection == "held_out" and held_out is not None:
             chosen = choose_by_held_out(held_out, self.misfit_floor)
         elif self.selection == "one_standard_error" and held_out is not None:

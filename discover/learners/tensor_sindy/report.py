@@ -48,6 +48,7 @@ def path_table(
     for i, fit in enumerate(path):
         row = _describe(search, fit)
         row["size"] = len(fit.support)
+        row["bic_at_exact_moduli"] = row["bic"]
         row["bic"] = float(criterion[i])
         row["held_out"] = (
             None if held_out is None else float(np.sqrt(np.mean(np.square(held_out[i]))))

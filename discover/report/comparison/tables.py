@@ -152,7 +152,10 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
                 if sparse
                 else None,
                 "misfit": None if left is None else left.misfit,
-                "criterion": path[chosen]["bic"] if path and chosen is not None else None,
+                # of moduli that may move it would say less of the misfit than classical laws' do
+                "criterion": path[chosen].get("bic_at_exact_moduli", path[chosen]["bic"])
+                if path and chosen is not None
+                else None,
                 **_mean_errors(errors, placed),
             }
         )
