@@ -28,7 +28,8 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     Parameters
     ----------
     data
-        The runs to fit, and the held-out ones too where they are given by name.
+        The runs to fit, and the held-out ones too where they are given by name. Of a data set
+        without runs its tables are fitted, or its linear sweep where there is no other.
     held_out
         A data set of runs that only judge, names of runs of `data`, or ``"each"``.
 
@@ -43,6 +44,8 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
             f"This needs a data set; got a {type(data).__name__}. Load one with load_dataset, or "
             'make one of runs: Dataset("name", runs).'
         )
+    if not data.runs and (data.material_functions or data.linear_sweep is not None):
+        data = data.with_material_functions()  # as a study does where there is nothing else
     if isinstance(held_out, Dataset):
         whole = joined(data, held_out.runs)
         divided = StudyData(whole, data, held_out)
