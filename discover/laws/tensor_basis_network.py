@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
 from tensor_library.algebra import Symmetric
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
@@ -81,11 +81,18 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         """Whether the chains of the base law retract."""
         return self.base is not None and self.base.retracts
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    @property
+    def variables(self) -> int:
+        """Those of the base law."""
+        return 0 if self.base is None else self.base.variables
+
+    def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return Σ gₙ Tₙ, without the base law's."""
+        return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ gₙ Tₙ, plus the base law's."""
-        extra = jnp.tensordot(
-            self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1
-        )
+        extra = as_state(self.own_term(stress_in(stress), rate), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
     def as_terms(self) -> tuple[TermShare, ...] | None:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.optimize import least_squares
 
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from tensor_library.algebra import Symmetric
@@ -52,18 +52,32 @@ class ReferenceLaw(AbstractConstitutiveLaw):
     base: AbstractConstitutiveLaw
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    @property
+    def variables(self) -> int:
+        """Those of the known law."""
+        return self.base.variables
+
+    @property
+    def retracts(self) -> bool:
+        """Whether the chains of the known law retract."""
+        return self.base.retracts
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, γ̇), the known law's included."""
         mobility, slip, extensibility, factor, exponent = self.constants
-        tensors, invariants = integrity_basis(stress, rate), scalar_invariants(stress, rate)
-        rate_size = jnp.sqrt(jnp.maximum(0.5 * invariants[_RATE_SQUARED], 0.0))
-        faster = extensibility * invariants[0] + factor * rate_size**exponent
-        return (
-            self.base.extra_term(stress, rate)
-            + mobility * tensors[_SQUARE]
+        own = stress_in(stress)
+        tensors, invariants = integrity_basis(own, rate), scalar_invariants(own, rate)
+        squared = 0.5 * invariants[_RATE_SQUARED]
+        flows = squared > 0.0
+        # at rest a power of the rate has no derivative
+        power = jnp.where(flows, jnp.where(flows, squared, 1.0) ** (0.5 * exponent), 0.0)
+        faster = extensibility * invariants[0] + factor * power
+        added = (
+            mobility * tensors[_SQUARE]
             + 0.5 * slip * tensors[_PRODUCT]
-            + (self.relaxation + faster) * stress
+            + (self.relaxation + faster) * own
         )
+        return self.base.extra_term(stress, rate) + as_state(added, stress)
 
 
 @dataclass(frozen=True)
