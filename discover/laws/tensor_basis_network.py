@@ -6,7 +6,13 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from tensor_library.algebra import Symmetric
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
@@ -26,7 +32,7 @@ def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
     return value
 
 
-class TensorBasisNetwork(AbstractConstitutiveLaw):
+class TensorBasisNetwork(AbstractExtendedLaw):
     """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
 
     The coefficients are gₙ = cₙ + mₙ MLPₙ(invariants): a constant, and a network for what varies.
@@ -75,16 +81,6 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
         if self.invariant_scale is not None:
             invariants = jnp.arcsinh(invariants / self.invariant_scale)
         return self.constants + self.network_mask * self.network(invariants)
-
-    @property
-    def retracts(self) -> bool:
-        """Whether the chains of the base law retract."""
-        return self.base is not None and self.base.retracts
-
-    @property
-    def variables(self) -> int:
-        """Those of the base law."""
-        return 0 if self.base is None else self.base.variables
 
     def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return Σ gₙ Tₙ, without the base law's."""

@@ -22,7 +22,7 @@ def longest_step(law: AbstractConstitutiveLaw) -> float:
     """
     if not law.retracts:
         return np.inf
-    return 1.0 / (1.0 + float(law.trace_relaxation(law.rest())))
+    return 1.0 / (1.0 + float(jnp.max(jnp.sum(law.relaxations(), axis=1))))
 
 
 def runge_kutta_4(

@@ -82,7 +82,9 @@ def exponential_steps(fluid: Fluid, columns: bool = False) -> ExponentialRungeKu
     """
     # where the split lies is a choice of method, not of model: no gradient through it
     decay = jax.lax.stop_gradient(fluid.decay_rate())
-    return ExponentialRungeKutta4(decay[..., None] if columns else decay, fluid.law.retracts)
+    tensors = 1 + fluid.law.tensors if fluid.law.retracts else 0
+    shares = jax.lax.stop_gradient(fluid.law.shares()) if fluid.law.tensors else None
+    return ExponentialRungeKutta4(decay[..., None] if columns else decay, tensors, shares)
 
 
 @compiled

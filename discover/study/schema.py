@@ -168,7 +168,7 @@ class Model(Section):
     def choice(self) -> tuple[str, ...]:
         """Laws to choose from; none where one is declared."""
         if self.law == ANY:
-            return tuple(LAWS)
+            return tuple(name for name, law in LAWS.items() if law.is_one_mode)
         return () if isinstance(self.law, str) else self.law
 
 

@@ -14,7 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.optimize import least_squares
 
-from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from tensor_library.algebra import Symmetric
@@ -29,7 +35,7 @@ MOBILITY, SLIP, EXTENSIBILITY, RATE_FACTOR, RATE_EXPONENT = range(5)
 N_CONSTANTS = 5
 
 
-class ReferenceLaw(AbstractConstitutiveLaw):
+class ReferenceLaw(AbstractExtendedLaw):
     """h = α σ·σ + (ξ/2)(σ·γ̇ + γ̇·σ) + (ε tr σ + k |γ̇|ᵐ) σ + r σ, on top of a known law.
 
     [Giesekus 1982, JNNFM 11, 69; Johnson & Segalman 1977, JNNFM 2, 255; Phan-Thien & Tanner 1977,
@@ -51,16 +57,6 @@ class ReferenceLaw(AbstractConstitutiveLaw):
     relaxation: Float[Array, ""]
     base: AbstractConstitutiveLaw
     linear_relaxation: bool = eqx.field(static=True, default=True)
-
-    @property
-    def variables(self) -> int:
-        """Those of the known law."""
-        return self.base.variables
-
-    @property
-    def retracts(self) -> bool:
-        """Whether the chains of the known law retract."""
-        return self.base.retracts
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, γ̇), the known law's included."""
