@@ -11,7 +11,7 @@ from tensor_library.notation import Notation, T
 if TYPE_CHECKING:
     import sympy
 
-RESERVED = ("s", "d", "unit", "constant", "mode", "np", "sympy")
+RESERVED = ("s", "d", "unit", "constant", "mode", "variables", "np", "sympy", "ufl")
 """Names that the exported text has for its own."""
 
 
@@ -42,6 +42,9 @@ class IsotropicFunction:
         Scalars defined on the way, in order, each over what stands before it.
     letters
         LaTeX of those constants and scalars whose names are no letters.
+    rates
+        Of each structure variable of the law by its name, in the order of the law's state: its rate
+        of change over 1/λ, over `scalars`, the variables and what is defined on the way.
 
     Raises
     ------
@@ -58,12 +61,13 @@ class IsotropicFunction:
     coefficients: Mapping[str, "sympy.Expr"]
     where: Mapping[str, "sympy.Expr"] = field(default_factory=dict)
     letters: Mapping[str, str] = field(default_factory=dict)
+    rates: Mapping[str, "sympy.Expr"] = field(default_factory=dict)
 
     def __post_init__(self):
         unknown = [name for name in self.coefficients if name not in TENSOR_NAMES]
         if unknown:
             raise ValueError(f"{unknown[0]!r} is not one of {', '.join(TENSOR_NAMES)}.")
-        names = [*self.where, *self.constants]
+        names = [*self.where, *self.constants, *self.rates]
         wrong = [name for name in names if name in RESERVED or not name.isidentifier()]
         if wrong:
             raise ValueError(
@@ -74,9 +78,9 @@ class IsotropicFunction:
     @property
     def constants(self) -> tuple[str, ...]:
         """Names of the constants, in alphabetical order."""
-        expressions = [*self.coefficients.values(), *self.where.values()]
+        expressions = [*self.coefficients.values(), *self.where.values(), *self.rates.values()]
         names = {str(symbol) for one in expressions for symbol in one.free_symbols}
-        return tuple(sorted(names - {*INVARIANT_NAMES, *self.where}))
+        return tuple(sorted(names - {*INVARIANT_NAMES, *self.where, *self.rates}))
 
     def spell(
         self, notation: Notation[T], letters: Mapping[str, T]
@@ -88,12 +92,10 @@ class IsotropicFunction:
         notation
             How to write it.
         letters
-            How the constants and the scalars defined on the way are written.
+            How the constants, the structure variables and the scalars defined on the way are
+            written.
         """
-        known = {**letters}
-        for name in INVARIANT_NAMES:
-            inside = name.removeprefix("tr(").removesuffix(")").split(".")
-            known[name] = notation.trace(notation.contraction([*map(notation.tensor, inside)]))
+        known = _with_invariants(notation, letters)
         defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]
         summands = []
         for name, coefficient in self.coefficients.items():
@@ -105,3 +107,19 @@ class IsotropicFunction:
             one = notation.scalar(coefficient, known, factor=True)
             summands.append(notation.product([one, tensor]))
         return defined, summands
+
+    def spell_rates(self, notation: Notation[T], letters: Mapping[str, T]) -> list[tuple[str, T]]:
+        """Return the rate of change of each structure variable over 1/λ, by its name.
+
+        Parameters as in `spell`.
+        """
+        known = _with_invariants(notation, letters)
+        return [(name, notation.scalar(one, known)) for name, one in self.rates.items()]
+
+
+def _with_invariants(notation: Notation[T], letters: Mapping[str, T]) -> dict[str, T]:
+    known = {**letters}
+    for name in INVARIANT_NAMES:
+        inside = name.removeprefix("tr(").removesuffix(")").split(".")
+        known[name] = notation.trace(notation.contraction([*map(notation.tensor, inside)]))
+    return known

@@ -14,6 +14,7 @@ from independent.maxwell import Newtonian, UpperConvectedMaxwell
 from independent.phan_thien_tanner import PhanThienTanner
 from independent.pom_pom import ExtendedPomPom, PomPom
 from independent.rolie_poly import RoliePoly
+from independent.rolie_poly_blend import RoliePolyBlend
 from independent.structured import Structured
 from independent.thixotropic import Thixotropic
 from independent.white_metzner import WhiteMetzner
@@ -32,6 +33,7 @@ __all__ = [
     "PomPom",
     "RateLaw",
     "RoliePoly",
+    "RoliePolyBlend",
     "StressLaw",
     "Stresses",
     "Structured",

@@ -8,12 +8,12 @@ from jaxtyping import Array, Float
 from discover.effects import ConstitutiveEffect
 from discover.equations import effect_terms, law_terms
 from discover.laws import LAWS, AbstractConstitutiveLaw
-from discover.laws.base import State, as_state, stress_in
+from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
 
 
-class AugmentedLaw(AbstractConstitutiveLaw):
+class AugmentedLaw(AbstractExtendedLaw):
     """A law with the extra terms of constitutive effects.
 
     Attributes
@@ -33,10 +33,9 @@ class AugmentedLaw(AbstractConstitutiveLaw):
     effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def variables(self) -> int:
-        """Those of the declared law."""
-        return self.base.variables
+    def trace_relaxation(self, stress: State) -> Float[Array, ""]:
+        """Return that of the declared law: at rest what an effect adds may have no derivative."""
+        return self.base.trace_relaxation(stress)
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h of the declared law plus the terms of the effects."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
+from discover.comparison.fitting.further_laws import fit_further_laws
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.declared_constants import (
@@ -173,12 +174,20 @@ _MODES_NOT_IN_BANDS = (
 
 
 def _classical(study: Study, known: Known, independent: float | None) -> Sequence[ClassicalFit]:
-    """Return the classical laws, with the same constants fitted along as the learners have."""
+    """Return the classical laws, with the same constants fitted along as the learners have.
+
+    Behind them those that the study names, with the constants that the known part alone has.
+    """
+    before = known.before
+    further = [name for name in study.compare.laws if name not in CLASSICAL]
+    fits = fit_further_laws(
+        further, before.model, before.data.fit.runs, before.flows, before.recorded, independent
+    )
     if known.along is None:
         relaxes = study.model.known_relaxation
-        return fit_classical_laws(known.before.model, known.flows, relaxes, independent)
+        return [*fit_classical_laws(before.model, known.flows, relaxes, independent), *fits]
     each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
-    return classical_along(known.along, each, known.flows, independent)
+    return [*classical_along(known.along, each, known.flows, independent), *fits]
 
 
 def expectation_of(study: Study, model: DeclaredModel) -> Expectation:

@@ -110,23 +110,23 @@ SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
 {constants}
 
-def extra_term(s, d{mode}):
+def extra_term(s, d{mode}{also}):
     """Return h, dimensionless, shape (3, 3), of scaled stress s and scaled rate d."""
     unit = np.eye(3)
 {where}    return {extra}
 
-
-def stress_rate(stress, velocity_gradient):
+{variables_rate}
+def stress_rate(stress, velocity_gradient{also}):
     """Return d(stress)/dt of every mode in Pa/s, shape (modes, 3, 3).
 
     stress: of every mode in Pa, shape (modes, 3, 3); zero at rest.
-    velocity_gradient: in 1/s, shape (3, 3).
+    velocity_gradient: in 1/s, shape (3, 3).{of_variables}
     """
     rate = np.empty_like(stress)
     for k, (modulus, time) in enumerate(zip(MODULUS_PA, RELAXATION_TIME_S)):
         s, gradient = stress[k] / modulus, time * velocity_gradient
         d = gradient + gradient.T
-        change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode})
+        change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode}{also_k})
         rate[k] = modulus / time * change
     return rate
 
@@ -149,25 +149,29 @@ def simulate_shear(shear_rate, times, step=0.02):
         g[0, 1] = shear_rate(t)
         return g
 
-    def components(t, stress):
-        total = total_stress(stress, gradient(t))
+    def change(t, state):
+        stress = state[:, :9].reshape(-1, 3, 3)
+        return {change}
+
+    def components(t, state):
+        total = total_stress(state[:, :9].reshape(-1, 3, 3), gradient(t))
         return total[0, 1], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]
 
-    t, stress = float(times[0]), np.zeros((len(MODULUS_PA), 3, 3))
-    rows = [components(t, stress)]
+    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size}))
+    rows = [components(t, state)]
     for end in times[1:]:
         fastest = max(1.0 / RELAXATION_TIME_S.min(), abs(shear_rate(t)), abs(shear_rate(end)))
         n = max(1, int(np.ceil((end - t) * fastest / step)))
         h = (end - t) / n
         for _ in range(n):
-            k1 = stress_rate(stress, gradient(t))
-            k2 = stress_rate(stress + 0.5 * h * k1, gradient(t + 0.5 * h))
-            k3 = stress_rate(stress + 0.5 * h * k2, gradient(t + 0.5 * h))
-            k4 = stress_rate(stress + h * k3, gradient(t + h))
-            stress = stress + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            k1 = change(t, state)
+            k2 = change(t + 0.5 * h, state + 0.5 * h * k1)
+            k3 = change(t + 0.5 * h, state + 0.5 * h * k2)
+            k4 = change(t + h, state + h * k3)
+            state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             t += h
         t = float(end)
-        rows.append(components(t, stress))
+        rows.append(components(t, state))
     return tuple(np.array(rows).T)
 '''
 
@@ -197,7 +201,32 @@ tested = {tested}
 {constants}
 {where}extra_term = {extra}
 stress_rate = d + gradient @ s + s @ gradient.T{relaxation} - extra_term
+{variables_rate}'''
+
+_NUMPY_RATES = '''
+def variables_rate(stress, velocity_gradient, variables):
+    """Return the rates of change of {names} in 1/s, shape (modes, {count}).
+
+    Parameters as of `stress_rate`.
+    """
+    return np.array([
+        scaled_rates(
+            stress[k] / modulus, time * (velocity_gradient + velocity_gradient.T), k, variables[k]
+        ) / time
+        for k, (modulus, time) in enumerate(zip(MODULUS_PA, RELAXATION_TIME_S))
+    ])
+
+
+def scaled_rates(s, d, mode, variables):
+    """Return the rates of change of {names}, times the relaxation time."""
+    unit = np.eye(3)
+{where}    return np.array([{rates}])
+
 '''
+_SYMPY_RATES = """# of the structure variables, with time in lambda_k; each is 0 at rest
+variables = [{names}]
+variables_rate = [{rates}]
+"""
 
 
 def numpy_code(equation: Equation) -> str:
@@ -208,7 +237,7 @@ def numpy_code(equation: Equation) -> str:
     InputError
         If the equation has a named law of which nobody said how it is written.
     """
-    return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))")
+    return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))", rates=_NUMPY_RATES)
 
 
 def sympy_code(equation: Equation) -> str:
@@ -229,9 +258,26 @@ def sympy_code(equation: Equation) -> str:
             "values = [\n    {constant[n]: v for n, v in one.items()}\n"
             f"    for one in {_constants(equation)}\n]\n"
         )
+    for name in () if named is None else named.function.rates:
+        constants += f'{name} = sympy.Symbol("{name}", real=True)\n'
     return filled(
-        _SYMPY_TEMPLATE, equation, _SympyCodeNotation(), "sympy.zeros(3, 3)", constants, ""
+        _SYMPY_TEMPLATE,
+        equation,
+        _SympyCodeNotation(),
+        "sympy.zeros(3, 3)",
+        constants,
+        "",
+        _SYMPY_RATES,
     )
+
+
+_CHANGE_OF_BOTH = """np.hstack([
+            stress_rate(stress, gradient(t), state[:, 9:]).reshape(-1, 9),
+            variables_rate(stress, gradient(t), state[:, 9:]),
+        ])"""
+
+_OF_VARIABLES = """
+    variables: {names} of every mode, dimensionless, shape (modes, number); zero at rest."""
 
 
 def filled(
@@ -241,6 +287,7 @@ def filled(
     nothing: str,
     constants: str | None = None,
     indent: str = "    ",
+    rates: str = "",
 ) -> str:
     """Return a module: a template with the law in a notation.
 
@@ -256,20 +303,32 @@ def filled(
         What holds the constants of a named law; by default a list of one table for each mode.
     indent
         Of the lines before h.
+    rates
+        A template of what says how structure variables change, for a law that has some.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
     lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
-    where, table = "", ""
+    where, table, changing, variables = "", "", "", ()
     if named is not None:
         function = named.function
+        variables = tuple(function.rates)
         letters = {name: f'constant["{name}"]' for name in function.constants}
-        defined, summands = function.spell(notation, letters | {n: n for n in function.where})
+        letters |= {name: name for name in (*function.where, *variables)}
+        defined, summands = function.spell(notation, letters)
         where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
         lines = summands + lines
         table = f"CONSTANTS = {_constants(equation)}\n"
         if indent:
-            where = f"{indent}constant = CONSTANTS[mode]\n" + where
+            given = "".join(f"{indent}{n} = variables[{i}]\n" for i, n in enumerate(variables))
+            where = f"{indent}constant = CONSTANTS[mode]\n" + given + where
+        if variables:
+            changing = rates.format(
+                names=", ".join(variables),
+                count=len(variables),
+                where=where,
+                rates=", ".join(text for _, text in function.spell_rates(notation, letters)),
+            )
     return template.format(
         header="\n".join(header_lines(equation)) or "No record of where it was tested.",
         relaxation=" - s" if equation.linear_relaxation else "",
@@ -279,8 +338,14 @@ def filled(
         solvent=repr(float(equation.solvent_viscosity)),
         tested=_tested(equation),
         constants=table if constants is None else constants,
-        mode=", mode=0" if named else "",
+        mode=", mode" if variables else ", mode=0" if named else "",
         of_mode=", k" if named else "",
+        also=", variables" if variables else "",
+        also_k=", variables[k]" if variables else "",
+        of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
+        variables_rate=changing,
+        change=_CHANGE_OF_BOTH if variables else "stress_rate(stress, gradient(t)).reshape(-1, 9)",
+        size=9 + len(variables),
         where=where,
         extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
     )

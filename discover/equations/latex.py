@@ -45,6 +45,8 @@ def law_latex(
         defined, summands = named.function.spell(notation, spelled)
         text += "".join(f" - {summand}" for summand in summands)
         defined = [(spelled[name], value) for name, value in defined]
+        rates = named.function.spell_rates(notation, spelled)
+        defined = [(rf"\dot{{{spelled[name]}}}", value) for name, value in rates] + defined
         constants = named.constants[0].items()
         fixed = [(spelled[n], v) for n, v in constants if n not in named.differing]
         defined += [(letter, latex_number(value, digits)) for letter, value in fixed]
@@ -72,5 +74,6 @@ def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
             return function.letters[name]
         return name if len(name) == 1 else notation.letter(name)
 
-    found = {name: letter(name) for name in (*function.constants, *function.where)}
+    names = (*function.constants, *function.where, *function.rates)
+    found = {name: letter(name) for name in names}
     return found | {name: f"{found[name]}_{{k}}" for name in named.differing}

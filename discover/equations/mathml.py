@@ -138,14 +138,19 @@ def law_element(
     where = []
     if named is not None:
         notation, function = MathmlNotation(), named.function
-        letters = {n: notation.letter(n) for n in (*function.constants, *function.where)}
+        names = (*function.constants, *function.where, *function.rates)
+        letters = {n: notation.letter(n) for n in names}
         defined, summands = function.spell(notation, letters)
         extra = [_SIGN.format("−") + one for one in summands] + extra
         first = named.constants[0]
         fixed = [(n, number(first[n])) for n in first if n not in named.differing]
+        rates = [
+            (f"<mover><mrow>{letters[n]}</mrow><mo>˙</mo></mover>", value)
+            for n, value in function.spell_rates(notation, letters)
+        ]
         where = [
-            f"<mo>,</mo><mspace width='1em'/>{letters[n]}<mo>=</mo>{value}"
-            for n, value in [*defined, *fixed]
+            f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}"
+            for left, value in [*rates, *((letters[n], value) for n, value in [*defined, *fixed])]
         ]
     parts = [f"{convected}<mo>=</mo>{rate}{relaxation}", *extra, *where]
     law = "<wbr/>".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)

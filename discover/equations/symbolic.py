@@ -13,7 +13,8 @@ from tensor_library.terms import parse_term
 def extra_term_expression(terms: Sequence[TermLike], named: NamedPart | None = None) -> sympy.Expr:
     """Return h as an expression over the non-commuting tensors of `tensor_library.symbolic`.
 
-    Constants of a named law that differ from mode to mode stay letters.
+    Constants of a named law that differ from mode to mode stay letters, and so do its structure
+    variables.
     """
     total: sympy.Expr = sympy.Integer(0)
     notation = SympyNotation()
@@ -21,7 +22,7 @@ def extra_term_expression(terms: Sequence[TermLike], named: NamedPart | None = N
         letters = {name: sympy.Float(value) for name, value in named.constants[0].items()}
         letters |= {name: sympy.Symbol(name) for name in named.differing}
         function = named.function
-        letters |= {name: sympy.Symbol(name) for name in function.where}
+        letters |= {name: sympy.Symbol(name) for name in (*function.where, *function.rates)}
         where, summands = function.spell(notation, letters)
         total = sympy.Add(*summands)
         for name, value in reversed(where):

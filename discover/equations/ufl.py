@@ -28,18 +28,18 @@ SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
 {constants}
 
-def extra_term(s, d{mode}):
+def extra_term(s, d{mode}{also}):
     """Return h, dimensionless, of scaled stress s and scaled rate d."""
     unit = ufl.Identity(3)
 {where}    return {extra}
 
-
-def stress_rate(stress, velocity_gradient, k):
+{variables_rate}
+def stress_rate(stress, velocity_gradient, k{also}):
     """Return the material derivative of the stress of mode k, from 0, in Pa/s."""
     modulus, time = MODULUS_PA[k], RELAXATION_TIME_S[k]
     s, gradient = stress / modulus, time * velocity_gradient
     d = gradient + gradient.T
-    change = d + dot(gradient, s) + dot(s, gradient.T){relaxation} - extra_term(s, d{of_mode})
+    change = d + dot(gradient, s) + dot(s, gradient.T){relaxation} - extra_term(s, d{of_mode}{also})
     return modulus / time * change
 
 
@@ -52,6 +52,20 @@ def total_stress(stresses, velocity_gradient):
 def in_space(plane):
     """Return the 3 by 3 velocity gradient of a plane flow from its 2 by 2 one."""
     return ufl.as_tensor([[plane[0, 0], plane[0, 1], 0], [plane[1, 0], plane[1, 1], 0], [0, 0, 0]])
+'''
+
+
+_RATES = '''
+def variables_rate(stress, velocity_gradient, mode, variables):
+    """Return the material derivatives of {names} of a mode in 1/s, a list; each is 0 at rest.
+
+    variables: {names} of this mode, scalar fields of their own.
+    """
+    modulus, time = MODULUS_PA[mode], RELAXATION_TIME_S[mode]
+    s, gradient = stress / modulus, time * velocity_gradient
+    d, unit = gradient + gradient.T, ufl.Identity(3)
+{where}    return [rate / time for rate in [{rates}]]
+
 '''
 
 
@@ -87,4 +101,5 @@ def ufl_code(equation: Equation) -> str:
     InputError
         If the equation has a named law of which nobody said how it is written.
     """
-    return filled(_TEMPLATE, equation, _UflNotation(), "ufl.as_tensor([[0.0] * 3] * 3)")
+    nothing = "ufl.as_tensor([[0.0] * 3] * 3)"
+    return filled(_TEMPLATE, equation, _UflNotation(), nothing, rates=_RATES)

@@ -54,9 +54,10 @@ class Dynamics(NamedTuple):
         Elements in series with the fluid; None where there can be none.
     viscosity
         Recorded stress beside the modes at unit rate, in Pa s.
-    trace_relaxation
-        Rate at which a small trace of each mode relaxes beside −σ, over 1/λ, shape (k,); that too
-        is integrated exactly. None where chains do not retract.
+    relaxations
+        Rates at which each tensor of a mode at rest, and its trace, relax beside −σ, over 1/λ, as
+        the law's, shape (t, 2, k); these too are integrated exactly. None where chains do not
+        retract.
     times_change
         1 where a state changes the relaxation times, else 0.
     states_in_use
@@ -64,6 +65,8 @@ class Dynamics(NamedTuple):
         that is not in use stays at rest.
     variables
         Structure variables of each mode that the law has.
+    shares
+        Of each tensor that stands first among them, of each mode, as the law's.
     """
 
     slope: Callable
@@ -73,10 +76,16 @@ class Dynamics(NamedTuple):
     states: dict[StateEffect, Float[Array, " p"]]
     series: Series | None
     viscosity: Float[Array, ""]
-    trace_relaxation: Float[Array, " k"] | None = None
+    relaxations: Float[Array, "t 2 k"] | None = None
     times_change: Int[Array, ""] | int = 0
     states_in_use: Int[Array, ""] | None = None
     variables: int = 0
+    shares: Float[Array, "tensors k"] | None = None
+
+    @property
+    def tensors(self) -> int:
+        """Tensors that stand first among the variables."""
+        return 0 if self.shares is None else len(self.shares)
 
     @property
     def modes(self) -> Modes:
@@ -96,16 +105,17 @@ class Dynamics(NamedTuple):
         """Return what `weights_of_step` wants of steps of these widths in s.
 
         Apart for the declared modes and those of effects; of each the weights of its stress and,
-        where that relaxes faster, of its trace.
+        where that relaxes faster, of its trace, and so on of each further tensor.
         """
         pieces, first = [], 0
         for modes in [self.declared] if self.extra is None else [self.declared, self.extra]:
             h, last = width[:, None] / modes.relaxation_time, first + len(modes.relaxation_time)
             kinds = [krogstad_weights(-self.decay * h, h)]
-            if self.trace_relaxation is not None:
-                kinds.append(
-                    krogstad_weights(-(self.decay + self.trace_relaxation[first:last]) * h, h)
-                )
+            if self.relaxations is not None:
+                # of the stress as a whole there is nothing to add
+                faster = jnp.cumsum(self.relaxations[..., first:last], axis=1)
+                rates = faster.reshape(-1, last - first)[1:]
+                kinds += [krogstad_weights(-(self.decay + rate) * h, h) for rate in rates]
             pieces.append(jnp.stack([jnp.stack(kind, axis=1) for kind in kinds], axis=1))
             first = last
         return tuple(pieces)
@@ -137,9 +147,14 @@ class Dynamics(NamedTuple):
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
         whole = KrogstadWeights(*joined[0])
-        if self.trace_relaxation is None:
+        if self.relaxations is None:
             return StressWeights(whole)
-        return StressWeights(whole, KrogstadWeights(*joined[1]), self.trace_relaxation)
+        trace, *others = [KrogstadWeights(*one) for one in joined[1:]]
+        beside = tuple(
+            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
+            for i, one in enumerate(self.relaxations[1:])
+        )
+        return StressWeights(whole, trace, self.relaxations[0, 1], beside, self.shares)
 
     def rest(self) -> tuple[Float[Array, "s k"], Levels]:
         """Return modes and states at rest."""

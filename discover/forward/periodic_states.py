@@ -202,7 +202,8 @@ def _half_cycle(dynamics: Dynamics, wave, width):
     def sheared(stress, rate):
         return dynamics.sheared(stress, rate, None)[0]
 
-    mirror = jnp.ones(4 + dynamics.variables).at[:4].set(jnp.array(_MIRROR))[:, None]
+    tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
+    mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
 
     def half(stress, levels, amplitude) -> _Half:
         rate = amplitude * wave

@@ -362,17 +362,20 @@ class Program:
             {effect: self._values(theta, effect) for effect in self._states},
             series,
             self._beside(numbers, theta, jnp.ones(1), flow)[0],
-            self._trace_relaxation(law, modulus, extra) if law.retracts else None,
+            self._of_modes_at_rest("relaxations", law, modulus, extra) if law.retracts else None,
             used.times,
             used.states,
             law.variables,
+            self._of_modes_at_rest("shares", law, modulus, extra) if law.tensors else None,
         )
 
-    def _trace_relaxation(self, law: AbstractConstitutiveLaw, modulus, extra: Modes | None):
-        """Return that of each mode; a choice of method, through which no gradient passes."""
+    def _of_modes_at_rest(
+        self, name: str, law: AbstractConstitutiveLaw, modulus, extra: Modes | None
+    ):
+        """Return what decides how modes are stepped through; no gradient passes through that."""
         count = len(modulus) + (0 if extra is None else len(extra.modulus))
         rest = jnp.zeros((4 + law.variables, count))
-        of_law = self._over_modes(lambda law, stress, _: law.trace_relaxation(stress))
+        of_law = self._over_modes(lambda law, *_: getattr(law, name)())
         return jax.lax.stop_gradient(of_law(law, rest, rest))
 
 

@@ -53,6 +53,14 @@ class AbstractConstitutiveLaw(eqx.Module):
         """
         return 0
 
+    @property
+    def tensors(self) -> int:
+        """How many tensors stand first among the variables, four components each.
+
+        Each is the conformation of a part of the fluid without I, and is carried along as σ is.
+        """
+        return 0
+
     def rest(self) -> Float[Array, " s"]:
         """Return the state at rest: the four components of σ, and the variables."""
         return jnp.zeros(4 + self.variables)
@@ -94,6 +102,23 @@ class AbstractConstitutiveLaw(eqx.Module):
         along = jax.jvp(lambda s: self.extra_term(s, still), (stress,), (unit,))[1]
         return trace(stress_in(along)) / 3.0
 
+    def relaxations(self) -> Float[Array, "t 2"]:
+        """Return the rates, over 1/λ and beside −1, at which σ and each tensor relax at rest.
+
+        The first of the tensor as a whole, the second by how much its trace is faster still. As
+        `trace_relaxation` they decide how integrators step, and not what law they solve.
+        """
+        trace_alone = self.trace_relaxation(self.rest())[None]
+        return jnp.stack([jnp.zeros_like(trace_alone), trace_alone], axis=1)
+
+    def shares(self) -> Float[Array, " tensors"]:
+        """Return the share of each further tensor in σ, which is their sum.
+
+        Integrators follow the tensors, and of σ only what is not this sum: nothing, but for terms
+        that are added to h.
+        """
+        return jnp.zeros(self.tensors)
+
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
         """Return dσ/dt, and that of the variables.
 
@@ -109,9 +134,52 @@ class AbstractConstitutiveLaw(eqx.Module):
         rate = rate_of_deformation(velocity_gradient)
         own = stress_in(stress)
         change = as_state(rate + upper_convected_production(own, velocity_gradient), stress)
+        if self.tensors:
+            end = 4 + 4 * self.tensors
+            carried = jax.vmap(upper_convected_production, in_axes=(0, None))(
+                stress[4:end].reshape(-1, 4), velocity_gradient
+            )
+            change = change.at[4:end].set((rate + carried).ravel())
         if self.linear_relaxation:
             change = change - stress
         return change - self.extra_term(stress, rate)
+
+
+class AbstractExtendedLaw(AbstractConstitutiveLaw):
+    """A law that adds to h of another, whose states it carries along.
+
+    Attributes
+    ----------
+    base
+        The other law, or None.
+    """
+
+    base: eqx.AbstractVar[AbstractConstitutiveLaw | None]
+
+    @property
+    def variables(self) -> int:
+        """Those of the base law."""
+        return 0 if self.base is None else self.base.variables
+
+    @property
+    def tensors(self) -> int:
+        """Those of the base law."""
+        return 0 if self.base is None else self.base.tensors
+
+    @property
+    def retracts(self) -> bool:
+        """Whether the chains of the base law retract."""
+        return self.base is not None and self.base.retracts
+
+    def relaxations(self) -> Float[Array, "t 2"]:
+        """Return those of the base law where it has tensors beside σ."""
+        if self.base is not None and self.base.tensors:
+            return self.base.relaxations()
+        return super().relaxations()
+
+    def shares(self) -> Float[Array, " tensors"]:
+        """Return those of the base law."""
+        return jnp.zeros(0) if self.base is None else self.base.shares()
 
 
 def stress_in(state: State) -> Symmetric:

@@ -6,13 +6,19 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, State, as_state, stress_in
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from tensor_library.algebra import Symmetric
 from tensor_library.library import TermLibrary
 from tensor_library.terms import TermShare, parse_term
 
 
-class LibraryExpansion(AbstractConstitutiveLaw):
+class LibraryExpansion(AbstractExtendedLaw):
     """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
 
     Attributes
@@ -32,16 +38,6 @@ class LibraryExpansion(AbstractConstitutiveLaw):
     library: TermLibrary = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
     base: AbstractConstitutiveLaw | None = None
-
-    @property
-    def retracts(self) -> bool:
-        """Whether the chains of the base law retract."""
-        return self.base is not None and self.base.retracts
-
-    @property
-    def variables(self) -> int:
-        """Those of the base law."""
-        return 0 if self.base is None else self.base.variables
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""

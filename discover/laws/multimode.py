@@ -172,15 +172,16 @@ class Fluid(eqx.Module):
     def decay_rate(self) -> Float[Array, "k _"]:
         """Return the rate of linear relaxation of each mode in 1/s, (k, 1).
 
-        Where chains retract that of each component, (k, s): of normal stresses the mean of those of
-        deviator and trace, from which neither is so far off that fast modes run away.
+        Where chains retract that of each component, (k, s), in the place of the first normal stress
+        of each tensor that of its trace, as `ExponentialRungeKutta4` takes it.
         """
         rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
         if not self.law.retracts:
             return rate
-        rest = self.law.rest()
-        normal = jnp.zeros_like(rest).at[:3].set(0.5 * self.law.trace_relaxation(rest))
-        return rate + normal / self.relaxation_time[:, None]
+        faster = self.law.relaxations()
+        of_each = jnp.repeat(faster[:, :1], 4, axis=1).at[:, 0].add(faster[:, 1]).ravel()
+        beside = jnp.zeros_like(self.law.rest()).at[: len(of_each)].set(of_each)
+        return rate + beside / self.relaxation_time[:, None]
 
     def state_rate(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient

@@ -26,6 +26,9 @@ class NamedLaw:
     written
         Returns h with its constants as letters, by the names of `parameters`, so that the law can
         be written out; None where nobody said.
+    is_one_mode
+        Whether at small strain the law is one Maxwell mode. One that is not brings a spectrum of
+        its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it out.
     """
 
     title: str
@@ -34,6 +37,7 @@ class NamedLaw:
     range_sources: Mapping[str, str] = field(default_factory=dict)
     source: str = ""
     written: Callable[[], IsotropicFunction] | None = None
+    is_one_mode: bool = True
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

@@ -11,6 +11,7 @@ from discover.laws.extended_pom_pom import NAMED as EXTENDED
 from discover.laws.named import NamedLaw
 from discover.laws.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
 
 _FADES = 0.05
 """Share of q over which growth fades on the way to it, so that steps of fixed length can follow."""
@@ -69,6 +70,25 @@ class PomPom(AbstractConstitutiveLaw):
         return as_state(extra, stress).at[4].set(1.0 - turning - y - growth)
 
 
+def _written(drag_strain: bool = False) -> IsotropicFunction:
+    import sympy
+
+    arms, ratio, y, trace = scalars("q", "stretch_time_ratio", "y", "tr(sigma)")
+    stretch, g, r, left, b = scalars("Lambda", "g", "r", "p", "b")
+    held = sympy.exp(2 * (stretch - 1) / arms) if drag_strain else 1
+    where = {
+        "Lambda": sympy.sqrt(1 + trace / 3),
+        "g": scalars("tr(sigma.gammadot)") / (3 * stretch**2),
+        "r": 2 / ratio * held * (1 - 1 / stretch),
+        "p": sympy.Max(0, 1 - sympy.Max(0, 1 - (arms - stretch) / (_FADES * arms))),
+        "b": r + (1 - left) * sympy.Max(g - r, 0),
+    }
+    turning = sympy.exp(-y)
+    coefficients = {"sigma": turning - 1 + b, "I": b - turning * trace / 3}
+    letters = {"stretch_time_ratio": r"\theta"}
+    return IsotropicFunction(coefficients, where, letters, {"y": g - 1 + turning})
+
+
 _RANGES = {name: ends for name, ends in EXTENDED["xpp"].parameters.items() if name != "alpha"}
 _RANGE_SOURCES = {name: EXTENDED["xpp"].range_sources[name] for name in _RANGES}
 
@@ -79,6 +99,7 @@ NAMED = {
         _RANGES,
         _RANGE_SOURCES,
         source="McLeish & Larson 1998, J. Rheol. 42, 81",
+        written=_written,
     ),
     "pom_pom_drag_strain": NamedLaw(
         "pom-pom with drag-strain coupling",
@@ -86,5 +107,6 @@ NAMED = {
         _RANGES,
         _RANGE_SOURCES,
         source="Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121",
+        written=partial(_written, drag_strain=True),
     ),
 }

@@ -6,7 +6,13 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from tensor_library.algebra import Symmetric
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
@@ -26,7 +32,7 @@ def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
     return value
 
 
-class TensorBasisNetwork(AbstractConstitutiveLaw):
+class TensorBasisNetwork(AbstractExtendedLaw):
     """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
 
     The coefficients are gₙ = cₙ + mₙ MLPₙ(invariants): a constant, and a network for what varies.
@@ -76,16 +82,13 @@ class TensorBasisNetwork(AbstractConstitutiveLaw):
             invariants = jnp.arcsinh(invariants / self.invariant_scale)
         return self.constants + self.network_mask * self.network(invariants)
 
-    @property
-    def retracts(self) -> bool:
-        """Whether the chains of the base law retract."""
-        return self.base is not None and self.base.retracts
+    def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return Σ gₙ Tₙ, without the base law's."""
+        return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ gₙ Tₙ, plus the base law's."""
-        extra = jnp.tensordot(
-            self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1
-        )
+        extra = as_state(self.own_term(stress_in(stress), rate), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
     def as_terms(self) -> tuple[TermShare, ...] | None:

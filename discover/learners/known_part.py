@@ -80,7 +80,7 @@ def known_part(estimator: Any) -> KnownPart:
                 f"base_law must be a law, such as make_law('ucm'); got a {type(law).__name__}."
             )
         if law is not None:
-            _check_known(law)
+            check_law(law)
         modulus = per_mode("modulus", estimator.modulus)
         relaxation_time = per_mode("relaxation_time", estimator.relaxation_time)
         if modulus.shape != relaxation_time.shape:
@@ -110,7 +110,7 @@ def known_part(estimator: Any) -> KnownPart:
     for name in _HELD_BY_BASE:
         if name in defaults and not _same(getattr(estimator, name), defaults[name].default):
             raise InputError(f"base holds {name} already; got both. Leave {name} out, or base.")
-    _check_known(base.law)
+    check_law(base.law)
     return KnownPart(
         None if isinstance(base.law, UpperConvectedMaxwell) else base.law,
         np.asarray(base.modulus),
@@ -119,15 +119,6 @@ def known_part(estimator: Any) -> KnownPart:
         base.law.linear_relaxation,
         None if base.modulus_covariance is None else np.asarray(base.modulus_covariance),
     )
-
-
-def _check_known(law: AbstractConstitutiveLaw) -> None:
-    check_law(law)
-    if law.variables:
-        raise InputError(
-            f"A learner takes no known law with a structure variable beside the stress, as "
-            f"{type(law).__name__} has. Give another law, or use close_loop, which takes it."
-        )
 
 
 def _same(value: Any, default: Any) -> bool:

@@ -4,8 +4,10 @@ from collections.abc import Callable
 from typing import ClassVar, NamedTuple
 
 import diffrax
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 _TAYLOR_TERMS = 14
@@ -38,6 +40,29 @@ def phi_functions(
         jnp.where(small, series_second, second),
         jnp.where(small, series, third),
     )
+
+
+def _with_shares(state, shares, factor: float, axis: int):
+    """Return states whose first tensor has shares of the further ones more, times a factor.
+
+    Parameters
+    ----------
+    state
+        Components along an axis: four of each tensor, and what stands behind.
+    shares
+        Of each further tensor, or of each and of each mode along the last axis of `state`; None or
+        none leaves states as they are.
+    factor
+        1, or −1 to undo it.
+    axis
+        Of the components.
+    """
+    if shares is None or not len(shares):
+        return state
+    moved = jnp.moveaxis(state, axis, 0)
+    for i, share in enumerate(shares, start=1):
+        moved = moved.at[:4].add(factor * share * moved[4 * i : 4 * i + 4])
+    return jnp.moveaxis(moved, 0, axis)
 
 
 class KrogstadWeights(NamedTuple):
@@ -86,19 +111,31 @@ class StressWeights(NamedTuple):
         Those of its trace; None where it relaxes as the rest does.
     faster
         By how much the trace relaxes faster, over 1/λ, shape (k,).
+    beside
+        The same of each further tensor of the law, each with by how much it relaxes as a whole
+        faster than −1; for a law with one tensor none.
+    shares
+        What σ has of each of these, of which only the rest is followed; None for none.
     """
 
     whole: KrogstadWeights
     trace: KrogstadWeights | None = None
     faster: Float[Array, " k"] | float = 0.0
+    beside: tuple[tuple["StressWeights", Float[Array, " k"]], ...] = ()
+    shares: Float[Array, "tensors k"] | None = None
 
     def remainder(self, stress, change, decay: float):
         """Return what of a change is not relaxation at the rates of these weights."""
+        stress, change = (_with_shares(one, self.shares, -1.0, axis=0) for one in (stress, change))
         if decay:
             change = change + decay * stress
-        if self.trace is None:
-            return change
-        return change.at[:3].add(self.faster * _mean_normal(stress))
+        if self.trace is not None:
+            change = change.at[:3].add(self.faster * _mean_normal(stress))
+        for i, (own, faster) in enumerate(self.beside, start=1):
+            at = slice(4 * i, 4 * i + 4)
+            left = own.remainder(stress[at], change[at] + faster * stress[at], 0.0)
+            change = change.at[at].set(left)
+        return _with_shares(change, self.shares, 1.0, axis=0)
 
     def second(self, y, n1):
         """Return Y2, as `KrogstadWeights` does."""
@@ -117,12 +154,16 @@ class StressWeights(NamedTuple):
         return self._applied("end", y, n1, n2, n3, n4)
 
     def _applied(self, stage: str, *parts):
+        parts = [_with_shares(part, self.shares, -1.0, axis=0) for part in parts]
         found = getattr(self.whole, stage)(*parts)
-        if self.trace is None:
-            return found
-        means = [_mean_normal(part) for part in parts]
-        apart = getattr(self.trace, stage)(*means) - getattr(self.whole, stage)(*means)
-        return found.at[:3].add(apart)
+        if self.trace is not None:
+            means = [_mean_normal(part) for part in parts]
+            apart = getattr(self.trace, stage)(*means) - getattr(self.whole, stage)(*means)
+            found = found.at[:3].add(apart)
+        for i, (own, _) in enumerate(self.beside, start=1):
+            at = slice(4 * i, 4 * i + 4)
+            found = found.at[at].set(getattr(own, stage)(*(part[at] for part in parts)))
+        return _with_shares(found, self.shares, 1.0, axis=0)
 
 
 def _mean_normal(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
@@ -168,6 +209,30 @@ def relax(
     return state * jnp.exp(z) + source * width * phi_functions(z)[0]
 
 
+_NORMAL = np.array([1.0 - 3.0**0.5, 1.0, 1.0])
+_TURN = np.eye(3) - 2.0 * np.outer(_NORMAL, _NORMAL) / np.sum(_NORMAL**2)
+"""The reflection that takes (1, 1, 1) to the first axis; it is its own inverse."""
+
+
+def turned(state: Float[Array, "k s *columns"], tensors: int = 1) -> Float[Array, "k s *columns"]:
+    """Return states whose normal stresses are told as their sum over √3 and two of a deviator.
+
+    Done twice it changes nothing.
+
+    Parameters
+    ----------
+    state
+        Of each mode.
+    tensors
+        How many stand first in it, four components each.
+    """
+    for first in range(0, 4 * tensors, 4):
+        normals = slice(first, first + 3)
+        normal = jnp.tensordot(jnp.asarray(_TURN, state.dtype), state[:, normals], axes=(1, 1))
+        state = state.at[:, normals].set(jnp.moveaxis(normal, 0, 1))
+    return state
+
+
 class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     """Fourth-order exponential Runge–Kutta method   [Krogstad 2005, JCP 203, 72].
 
@@ -182,9 +247,17 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     decay
         Rates of linear relaxation in 1/s, broadcastable against the state. Any value is
         consistent: it decides accuracy, not the limit. No gradient flows through it.
+    tensors
+        Of how many tensors the rates are those of a state as `turned` gives it, each with its trace
+        first: chains that retract relax that faster than the rest, and both have to be exact where
+        steps are long beside a mode's time.
+    shares
+        What the first tensor has of the others, of which only the rest is followed; or None.
     """
 
     decay: Float[Array, " ..."]
+    tensors: int = eqx.field(static=True, default=0)
+    shares: Float[Array, " tensors"] | None = None
     term_structure: ClassVar = diffrax.ODETerm
     interpolation_cls: ClassVar[Callable[..., diffrax.AbstractPath]] = (
         diffrax.ThirdOrderHermitePolynomialInterpolation
@@ -211,6 +284,23 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     def step(self, terms, t0, t1, y0, args, solver_state, made_jump):
         """Make one step from t0 to t1."""
         del solver_state, made_jump
+        if not self.tensors:
+            return self._step(terms, t0, t1, y0, args)
+
+        def turn(y):
+            return turned(_with_shares(y, self.shares, -1.0, axis=1), self.tensors)
+
+        def back(y):
+            return _with_shares(turned(y, self.tensors), self.shares, 1.0, axis=1)
+
+        def field(t, y, args):
+            return turn(terms.vf(t, back(y), args))
+
+        y1, *rest = self._step(diffrax.ODETerm(field), t0, t1, turn(y0), args)
+        error, dense = jax.tree.map(back, rest[:2])
+        return back(y1), error, dense, *rest[2:]
+
+    def _step(self, terms, t0, t1, y0, args):
         step = t1 - t0
         step = jnp.asarray(step)
         z = -self.decay * step

@@ -9,7 +9,20 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PyTree
+
+from discover.laws.base import AbstractConstitutiveLaw
+
+
+def longest_step(law: AbstractConstitutiveLaw) -> float:
+    """Return the longest step, over λ, in which these steps follow chains that retract.
+
+    Other laws relax in λ, in which any step of the flow's length is short enough.
+    """
+    if not law.retracts:
+        return np.inf
+    return 1.0 / (1.0 + float(jnp.max(jnp.sum(law.relaxations(), axis=1))))
 
 
 def runge_kutta_4(

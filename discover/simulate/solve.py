@@ -70,9 +70,21 @@ def _observe(t, state, args):
     return fluid.stress(state, protocol.velocity_gradient(t))
 
 
-def _decay(fluid: Fluid) -> Float[Array, "k _"]:
+def exponential_steps(fluid: Fluid, columns: bool = False) -> ExponentialRungeKutta4:
+    """Return the method that is exact for the linear relaxation of a fluid.
+
+    Parameters
+    ----------
+    fluid
+        The fluid.
+    columns
+        Whether states have derivatives beside them, along a third axis.
+    """
     # where the split lies is a choice of method, not of model: no gradient through it
-    return jax.lax.stop_gradient(fluid.decay_rate())
+    decay = jax.lax.stop_gradient(fluid.decay_rate())
+    tensors = 1 + fluid.law.tensors if fluid.law.retracts else 0
+    shares = jax.lax.stop_gradient(fluid.law.shares()) if fluid.law.tensors else None
+    return ExponentialRungeKutta4(decay[..., None] if columns else decay, tensors, shares)
 
 
 @compiled
@@ -134,7 +146,7 @@ def simulate(
         return ShearStress(times, np.asarray(fluid.stress(fluid.rest(), gradient))[None])
     shortest = float(np.min(np.asarray(fluid.relaxation_time)))
     stiff = fluid.n_modes > 1 and end / shortest > 1e3
-    solver = ExponentialRungeKutta4(_decay(fluid)) if stiff else diffrax.Tsit5()
+    solver = exponential_steps(fluid) if stiff else diffrax.Tsit5()
     knots = np.asarray(protocol.table_times)
     jumps = np.unique(knots[1:][np.diff(knots) <= 0.0])
     components, successful = _solve_adaptively(
@@ -201,7 +213,7 @@ def solve_on_grid(
         return _in_fixed_steps(fluid, protocol, grid, _observe)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(_vector_field),
-        ExponentialRungeKutta4(_decay(fluid)),
+        exponential_steps(fluid),
         grid.times[0],
         grid.times[-1],
         None,
@@ -227,10 +239,11 @@ def observed_on_grid(
 
 def solve_states_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
-) -> Float[Array, "n k 4"]:
-    """Return the dimensionless stress of every mode at the samples of one grid.
+) -> Float[Array, "n k s"]:
+    """Return the dimensionless state of every mode at the samples of one grid.
 
-    As `solve_on_grid` without an adjoint, but before the modes are added.
+    As `solve_on_grid` without an adjoint, but before the modes are added. Structure variables of
+    the law stand behind the four components of σ.
     """
     return _in_fixed_steps(fluid, protocol, grid, None)
 
@@ -238,7 +251,7 @@ def solve_states_on_grid(
 def _in_fixed_steps(fluid, protocol, grid, observe):
     if protocol.control == "steady":
         return _in_steady_flow(fluid, protocol, grid, observe)
-    solver = ExponentialRungeKutta4(_decay(fluid))
+    solver = exponential_steps(fluid)
     args = (fluid, protocol)
     values = fixed_steps(_vector_field, solver, grid.times, fluid.rest(), args, observe)
     return values[grid.sample_index]

@@ -148,8 +148,8 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
     modulus = np.zeros(len(omega), dtype=complex)
     for size, time in zip(np.asarray(fluid.modulus), times, strict=True):
         # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
-        left = 1j * time * omega[:, None, None] * np.eye(4) - decay
-        drives = np.broadcast_to(drive[:, None], (len(omega), 4, 1))
+        left = 1j * time * omega[:, None, None] * np.eye(len(drive)) - decay
+        drives = np.broadcast_to(drive[:, None], (len(omega), len(drive), 1))
         stress = np.linalg.solve(left, drives)[:, 3, 0]
         modulus += size * 1j * time * omega * stress
     modulus += 1j * omega * float(fluid.solvent_viscosity)
@@ -158,5 +158,5 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
 
 @compiled
 def _at_rest(law):
-    """Return the derivatives of the stress rate to stress and shear rate, (4, 4) and (4,)."""
-    return jax.jacfwd(law.stress_rate, argnums=(0, 1))(jnp.zeros(4), jnp.zeros(()))
+    """Return the derivatives of the stress rate to state and shear rate, (s, s) and (s,)."""
+    return jax.jacfwd(law.stress_rate, argnums=(0, 1))(law.rest(), jnp.zeros(()))

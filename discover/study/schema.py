@@ -168,7 +168,7 @@ class Model(Section):
     def choice(self) -> tuple[str, ...]:
         """Laws to choose from; none where one is declared."""
         if self.law == ANY:
-            return tuple(LAWS)
+            return tuple(name for name, law in LAWS.items() if law.is_one_mode)
         return () if isinstance(self.law, str) else self.law
 
 
@@ -248,9 +248,12 @@ class Compare(Section):
     sweep: Sweep | None = None
     distillation: bool = False
     next: NextExperiment = NextExperiment()
+    laws: tuple[SyntheticLaw, ...] = ()
 
     @model_validator(mode="after")
     def _at_least_one(self):
+        if len(set(self.laws)) != len(self.laws):
+            raise ValueError("name each of the laws once")
         if not self.learners or len(set(self.learners)) != len(self.learners):
             raise ValueError("name each learner once, and at least one")
         return self

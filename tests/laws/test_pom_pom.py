@@ -14,7 +14,6 @@ from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.laws.pom_pom import _FADES
-from discover.learners.known_part import known_part
 from discover.protocols import imposed_stress, in_flow, oscillations, start_up, steady_rates
 from discover.simulate import simulate
 
@@ -165,12 +164,6 @@ def test_no_flow_takes_the_conformation_away(name):
     s11, s22, s33, s12 = found.T + np.array([[1.0], [1.0], [1.0], [0.0]])
     assert np.min((s11 + s22) / 2 - np.hypot((s11 - s22) / 2, s12)) > 0.0
     assert np.min(s33) > 0.0
-
-
-def test_a_learner_says_that_it_takes_no_law_with_a_structure_variable():
-    base = Fluid.dimensionless(make_law("pom_pom", CONSTANTS))
-    with pytest.raises(dc.InputError, match="structure variable"):
-        known_part(dc.TensorSINDy(base=base))
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
 from discover.learners.weighted_laws import WeightedLaws
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
@@ -197,9 +198,10 @@ def _weighted_bands(
     if not shown:
         return {}, {}
     protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
+    limits = {"strain_step": _STRAIN_STEP, "relaxation_time": fluid.settling_time}
     found = weighted.bands(
         (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
-        lay_out(protocols, times, strain_step=_STRAIN_STEP, relaxation_time=fluid.settling_time),
+        in_enough_steps(fluid, lay_out(protocols, times, **limits)),
         [len(t) for t in times],
     )
     middle, bands = {}, {}

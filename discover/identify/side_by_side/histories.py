@@ -17,6 +17,7 @@ from discover.protocols.protocol import (
     start_up,
 )
 from discover.simulate.grid import IntegrationGrid, make_grids
+from discover.simulate.runge_kutta import longest_step
 from tensor_library.library import TermLibrary
 
 SAME = 1e-5
@@ -58,7 +59,7 @@ class Histories:
 
 
 @lru_cache(maxsize=4)
-def random_histories(each: int = 3, seed: int = 0) -> Histories:
+def random_histories(each: int = 3, seed: int = 0, max_step: float = np.inf) -> Histories:
     """Return band-limited random shear rates at several amplitudes.
 
     γ̇(t) is a sum of six cosines with frequencies from 0.1 to 3 and random phases, for eight
@@ -71,6 +72,8 @@ def random_histories(each: int = 3, seed: int = 0) -> Histories:
         Histories at each amplitude.
     seed
         Of the generator.
+    max_step
+        Longest step, in relaxation times, as from `longest_step`.
     """
     generator = np.random.default_rng(seed)
     protocols, amplitudes = [], []
@@ -95,8 +98,14 @@ def random_histories(each: int = 3, seed: int = 0) -> Histories:
     ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
     protocols += ordinary.values()
     times = np.linspace(0.0, _DURATION, _SAMPLES)
-    grids = make_grids(protocols, [times] * len(protocols), strain_step=_STRAIN_STEP)
+    limits = {"strain_step": _STRAIN_STEP, "max_step": max_step}
+    grids = make_grids(protocols, [times] * len(protocols), **limits)
     return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes), tuple(ordinary))
+
+
+def histories_for(law: AbstractConstitutiveLaw | None) -> Histories:
+    """Return `random_histories()` in steps that a law allows; none is UCM."""
+    return random_histories() if law is None else random_histories(max_step=longest_step(law))
 
 
 @dataclass(frozen=True)
@@ -141,7 +150,7 @@ def differences(
     histories
         By default `random_histories()`.
     """
-    flows = random_histories() if histories is None else histories
+    flows = histories_for(base) if histories is None else histories
     stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)
     observed = observe_differences(stresses[:, : flows.n_random])
     return [difference(observed[0], other) for other in observed[1:]]

@@ -120,7 +120,7 @@ def _march(library, base, coefficients, inner, protocols, grids):
         def slope(t, stress):
             return law.stress_rate(stress, protocol.velocity_gradient(t))
 
-        return runge_kutta_4(slope, jnp.zeros(4), grid.times)[grid.sample_index]
+        return runge_kutta_4(slope, law.rest(), grid.times)[grid.sample_index, :4]
 
     over_runs = jax.vmap(one, in_axes=(None, None, 0, 0))
     return jax.vmap(over_runs, in_axes=(0, 0, None, None))(coefficients, inner, protocols, grids)

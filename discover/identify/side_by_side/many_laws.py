@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -17,6 +18,7 @@ from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import observed_on_grid
 from tensor_library.library import TermLibrary
@@ -156,6 +158,9 @@ def predict_laws(
         The flows and their sampling times.
     """
     flows = lay_out(protocols, times, relaxation_time=fluids.settling_time)
+    first = jax.tree.map(lambda leaf: leaf[0], eqx.filter(fluids, eqx.is_array))
+    fluid = eqx.combine(first, eqx.filter(fluids, eqx.is_array, inverse=True))
+    flows = in_enough_steps(fluid, flows)
     return np.asarray(_predict(fluids, flows))
 
 

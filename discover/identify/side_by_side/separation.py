@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from discover.identify.side_by_side.histories import observe_differences, random_histories
+from discover.identify.side_by_side.histories import histories_for, observe_differences
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.simulate.grid import make_grids
+from discover.simulate.runge_kutta import longest_step
 from discover.words import percent_of
 from tensor_library.library import TermLibrary
 
@@ -74,13 +75,14 @@ def separations(
         As in `differences`.
     """
     laws = [reference, *others]
-    flows = random_histories()
+    flows = histories_for(base)
     stresses = stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
     names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
     times = np.linspace(0.0, _DURATION, 161)
     starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
     protocols = [in_flow(start_up(rate), kind) for kind, rate in starts]
-    grids = make_grids(protocols, [times] * len(protocols), strain_step=np.inf)
+    step = np.inf if base is None else longest_step(base)
+    grids = make_grids(protocols, [times] * len(protocols), strain_step=np.inf, max_step=step)
     extension = stresses_of_laws(library, laws, stack_protocols(protocols), grids, base)
     return [
         _best(

@@ -25,6 +25,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch
 
 _ROUNDING = 1e-6
@@ -140,7 +141,7 @@ def check_physics(
         Largest shear rate and frequency of training, times the mean relaxation time: the corner of
         the box beyond which the law extrapolates.
     """
-    along = trajectories(fluid, flows)
+    along = trajectories(fluid, in_enough_steps(fluid, flows))
     beyond = cycles(
         fluid,
         [weissenberg * factor for factor in _BOX_FACTORS],
@@ -299,7 +300,7 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
 @compiled
 def _linearised_at_rest(law: AbstractConstitutiveLaw):
     """Return dσ/dt at rest, and its derivatives with respect to stress and to shear rate."""
-    rest, still = jnp.zeros(4), jnp.asarray(0.0)
+    rest, still = law.rest(), jnp.asarray(0.0)
     by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
     return law.stress_rate(rest, still), by_stress, by_rate
 
@@ -308,10 +309,10 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     name = SMALL_STRAIN
     drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(fluid.law))
     offset = float(np.max(np.abs(drift)))
-    frequency = np.geomspace(0.01, 100.0, 41)
+    frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(source))
     response = np.array(
         [
-            1j * w * np.linalg.solve(1j * w * np.eye(4) - relaxation, source.astype(complex))[3]
+            1j * w * np.linalg.solve(1j * w * one - relaxation, source.astype(complex))[3]
             for w in frequency
         ]
     )

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import solve_batch, solve_states_on_grid
 
@@ -131,7 +132,8 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
         np.linspace(0.0, _CYCLES * 2.0 * np.pi * scale / de, _CYCLES * _SAMPLES_A_CYCLE + 1)
         for _, de in pairs
     ]
-    stress = np.asarray(solve_batch(fluid, lay_out(flows, times, strain_step=0.2)))[..., 3]
+    laid_out = in_enough_steps(fluid, lay_out(flows, times, strain_step=0.2))
+    stress = np.asarray(solve_batch(fluid, laid_out))[..., 3]
     work = np.full(len(pairs), np.nan)
     for i, ((wi, de), t) in enumerate(zip(pairs, times, strict=True)):
         values = stress[i, : t.size]

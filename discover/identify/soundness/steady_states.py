@@ -17,7 +17,7 @@ _CONVERGED = 1e-9
 @compiled
 def steady_shear(
     law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
-) -> tuple[Float[Array, "n 4"], Float[Array, "n 4 4"], Float[Array, " n"]]:
+) -> tuple[Float[Array, "n s"], Float[Array, "n s s"], Float[Array, " n"]]:
     """Return the steady dimensionless stresses in shear, their Jacobians and residuals.
 
     Newton's method at each rate from the solution at the one before, starting at rest: the branch
@@ -32,16 +32,19 @@ def steady_shear(
 
     Returns
     -------
-    Stress (11, 22, 33, 12), ∂(dσ/dt)/∂σ, and the size of dσ/dt over that of the stress.
+    Stress (11, 22, 33, 12) with the law's structure variables behind it, ∂(dσ/dt)/∂σ, and the size
+    of dσ/dt over that of the stress.
     """
-    return _follow(law.stress_rate, jnp.zeros(4), rates)
+    return _follow(law.stress_rate, law.rest(), rates)
 
 
 @compiled
 def steady_uniaxial_extension(
     law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
-) -> tuple[Float[Array, "n 2"], Float[Array, "n 2 2"], Float[Array, " n"]]:
+) -> tuple[Float[Array, "n d"], Float[Array, "n d d"], Float[Array, " n"]]:
     """Return the steady (σ11, σ22 = σ33) in uniaxial extension, Jacobians and residuals.
+
+    Behind these two stand the structure variables of the law.
 
     Parameters
     ----------
@@ -49,12 +52,13 @@ def steady_uniaxial_extension(
         As in `steady_shear`, with extension rates.
     """
 
-    def slope(stress, rate):
-        full = jnp.diag(jnp.stack([stress[0], stress[1], stress[1]]))
-        change = to_shear(law.stress_rate(full, uniaxial_extension(rate)))
-        return change[:2]
+    def slope(state, rate):
+        stress = jnp.stack([state[0], state[1], state[1], jnp.zeros(())])
+        gradient = to_shear(uniaxial_extension(rate))
+        change = law.stress_rate(jnp.concatenate([stress, state[2:]]), gradient)
+        return jnp.concatenate([change[:2], change[4:]])
 
-    return _follow(slope, jnp.zeros(2), rates)
+    return _follow(slope, law.rest()[2:], rates)
 
 
 def _follow(slope, start, rates):

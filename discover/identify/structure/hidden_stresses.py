@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.side_by_side.histories import Histories, random_histories
+from discover.identify.side_by_side.histories import Histories, histories_for
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.simulate.runge_kutta import runge_kutta_4
@@ -82,7 +82,7 @@ def hidden_stresses(
     histories
         By default `random_histories()`. Histories in which the law runs away are left out.
     """
-    flows = random_histories() if histories is None else histories
+    flows = histories_for(law) if histories is None else histories
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids.times))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)
@@ -126,7 +126,8 @@ def _arrivals(law, protocols, times):
             )
             return value, jacobian @ change
 
-        start = (jnp.zeros(4), jnp.eye(4)[:, :3])
+        rest = law.rest()
+        start = (rest, jnp.eye(len(rest))[:, :3])
         return runge_kutta_4(slope, start, grid)[1][1:, 3]
 
     return jax.vmap(one)(protocols, times)

@@ -259,6 +259,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             np.asarray(fluid.modulus),
             np.asarray(fluid.relaxation_time),
             known_relaxation=fluid.law.linear_relaxation,
+            base=fluid.law,
         )
         stresses = np.asarray(solve_batch(self.fluid_, problem.flows))
         return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
@@ -316,6 +317,7 @@ def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
         known.relaxation_time,
         solvent_viscosity=known.solvent_viscosity,
         known_relaxation=known.linear_relaxation,
+        base=known.law,
     )
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 from discover.dataset.run import Run
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import solve_on_grid
 
@@ -94,6 +95,7 @@ def make_problem(
     phase_step: float = 0.15,
     solvent_viscosity: float = 0.0,
     known_relaxation: bool = True,
+    base: AbstractConstitutiveLaw | None = None,
 ) -> TrainingProblem:
     """Return the training problem of some runs.
 
@@ -112,6 +114,8 @@ def make_problem(
         In Pa s. The solvent's stress follows from the rate alone, so it is taken off the record.
     known_relaxation
         Whether the fluid relaxes in these times, and not only in what is learned.
+    base
+        The known law, for steps that follow it; by default UCM.
     """
     total = float(np.sum(modulus))
     protocols = [run.protocol for run in runs]
@@ -122,6 +126,8 @@ def make_problem(
         phase_step=phase_step,
         relaxation_time=float(np.max(relaxation_time)) if known_relaxation else None,
     )
+    if base is not None:
+        flows = in_enough_steps(Fluid(base, modulus, relaxation_time), flows)
     n = max(map(len, runs))
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
     target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])

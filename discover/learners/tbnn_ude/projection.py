@@ -47,7 +47,7 @@ class Projection:
 def project(
     law: TensorBasisNetwork, cloud: Cloud, library: TermLibrary, max_terms: int = 5
 ) -> Projection:
-    """Return the few library terms that best stand for a law's extra term.
+    """Return the few library terms that best stand for what a network adds to its known law.
 
     Forward selection with backward elimination on the value of h at the states of `cloud`. The
     result describes the network; it is not fitted to the data. There is one term at least, however
@@ -64,7 +64,7 @@ def project(
     max_terms
         Largest number of terms.
     """
-    target = np.asarray(_extra_term(law, cloud.stress, cloud.rate)).ravel()
+    target = np.asarray(_own_term(law, cloud.stress, cloud.rate)).ravel()
     norm = float(np.linalg.norm(target))
     if norm < 1e-12 or not np.isfinite(norm):
         return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
@@ -125,8 +125,8 @@ def project(
 
 
 @compiled
-def _extra_term(law, stress, rate):
-    return jax.vmap(law.extra_term)(stress, rate)
+def _own_term(law, stress, rate):
+    return jax.vmap(law.own_term)(stress, rate)
 
 
 def _solve(matrix: np.ndarray, target: np.ndarray) -> np.ndarray:

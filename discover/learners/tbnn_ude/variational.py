@@ -1,8 +1,9 @@
 """Trajectories together with their derivatives by every weight.
 
 The variational equation dS/dt = J S + ∂f/∂θ, with S = ∂σ/∂θ and J = ∂f/∂σ, is integrated beside the
-state as one ordinary differential equation. J is 4 × 4, and four reverse passes through a tiny
-network give it together with ∂f/∂θ, where one forward pass per weight would cost hundreds.
+state as one ordinary differential equation. J is 4 × 4, or little more, and as many reverse passes
+through a tiny network give it together with ∂f/∂θ, where one forward pass per weight would cost
+hundreds.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -17,8 +18,8 @@ from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwor
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
-from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
 
 
@@ -83,7 +84,6 @@ def states_and_jacobian(
         looked_at = jax.lax.dynamic_slice_in_dim(looked_at, first, count)
     modulus, relaxation_time = problem.modulus, problem.relaxation_time
     fluid = problem.fluid(rebuild(weights))
-    decay = jax.lax.stop_gradient(fluid.decay_rate())[..., None]
     n_weights = weights.shape[0]
 
     def one_mode(state, sensitivity, time_scale, gradient):
@@ -92,7 +92,7 @@ def states_and_jacobian(
 
         # one evaluation and four pullbacks give both derivatives
         value, pull = jax.vjp(change, state, weights)
-        by_state, by_weight = jax.vmap(pull)(jnp.eye(4))
+        by_state, by_weight = jax.vmap(pull)(jnp.eye(len(state)))
         return jnp.concatenate([value[:, None], by_state @ sensitivity + by_weight], axis=1)
 
     @jax.jit  # traced once for all stages of a step
@@ -101,14 +101,17 @@ def states_and_jacobian(
         return jax.vmap(one_mode, (0, 0, 0, None))(y[..., 0], y[..., 1:], relaxation_time, gradient)
 
     def observe(t, y, protocol):
-        return y[..., 0], protocol.recorded_stress(jnp.tensordot(modulus, y[..., 1:], axes=1))
+        stress = y[:, :4]  # without structure variables, which no record holds
+        return stress[..., 0], protocol.recorded_stress(
+            jnp.tensordot(modulus, stress[..., 1:], axes=1)
+        )
 
     def steady_run(protocol, grid):
         def at(time):
             gradient = jnp.multiply.outer(relaxation_time, protocol.velocity_gradient(time))
 
             def recorded(w):
-                state = steady_modes(rebuild(w).stress_rate, gradient, fluid.rest())
+                state = steady_modes(rebuild(w).stress_rate, gradient, fluid.rest())[:, :4]
                 return protocol.recorded_stress(jnp.tensordot(modulus, state, axes=1)), state
 
             # one number recorded: a pullback costs what one weight's tangent would
@@ -120,8 +123,8 @@ def states_and_jacobian(
     def one_run(protocol, grid):
         if protocol.control == "steady":
             return steady_run(protocol, grid)
-        start = jnp.zeros((modulus.shape[0], 4, 1 + n_weights))
-        solver = ExponentialRungeKutta4(decay)
+        start = jnp.pad(fluid.rest()[..., None], ((0, 0), (0, 0), (0, n_weights)))
+        solver = exponential_steps(fluid, columns=True)
         observed = fixed_steps(field, solver, grid.times, start, protocol, observe)
         return jax.tree.map(lambda values: values[grid.sample_index], observed)
 

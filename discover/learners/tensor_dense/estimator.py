@@ -35,6 +35,7 @@ from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.weighted_laws import Limits, WeightedLaws
 from discover.progress import Progress, by_lines
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
@@ -246,14 +247,15 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         check_is_fitted(self, "fluid_")
         fluid = self.fluid_
         runs = as_runs(X, fluid.relaxation_time)
+        flows = lay_out(
+            [r.protocol for r in runs],
+            [r.time for r in runs],
+            strain_step=self.strain_step,
+            relaxation_time=fluid.settling_time,
+        )
         return self.laws_that_fit().bands(
             (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
-            lay_out(
-                [r.protocol for r in runs],
-                [r.time for r in runs],
-                strain_step=self.strain_step,
-                relaxation_time=fluid.settling_time,
-            ),
+            in_enough_steps(fluid, flows),
             [len(run) for run in runs],
         )
 

@@ -14,7 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.optimize import least_squares
 
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from tensor_library.algebra import Symmetric
@@ -29,7 +35,7 @@ MOBILITY, SLIP, EXTENSIBILITY, RATE_FACTOR, RATE_EXPONENT = range(5)
 N_CONSTANTS = 5
 
 
-class ReferenceLaw(AbstractConstitutiveLaw):
+class ReferenceLaw(AbstractExtendedLaw):
     """h = α σ·σ + (ξ/2)(σ·γ̇ + γ̇·σ) + (ε tr σ + k |γ̇|ᵐ) σ + r σ, on top of a known law.
 
     [Giesekus 1982, JNNFM 11, 69; Johnson & Segalman 1977, JNNFM 2, 255; Phan-Thien & Tanner 1977,
@@ -52,18 +58,22 @@ class ReferenceLaw(AbstractConstitutiveLaw):
     base: AbstractConstitutiveLaw
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, γ̇), the known law's included."""
         mobility, slip, extensibility, factor, exponent = self.constants
-        tensors, invariants = integrity_basis(stress, rate), scalar_invariants(stress, rate)
-        rate_size = jnp.sqrt(jnp.maximum(0.5 * invariants[_RATE_SQUARED], 0.0))
-        faster = extensibility * invariants[0] + factor * rate_size**exponent
-        return (
-            self.base.extra_term(stress, rate)
-            + mobility * tensors[_SQUARE]
+        own = stress_in(stress)
+        tensors, invariants = integrity_basis(own, rate), scalar_invariants(own, rate)
+        squared = 0.5 * invariants[_RATE_SQUARED]
+        flows = squared > 0.0
+        # at rest a power of the rate has no derivative
+        power = jnp.where(flows, jnp.where(flows, squared, 1.0) ** (0.5 * exponent), 0.0)
+        faster = extensibility * invariants[0] + factor * power
+        added = (
+            mobility * tensors[_SQUARE]
             + 0.5 * slip * tensors[_PRODUCT]
-            + (self.relaxation + faster) * stress
+            + (self.relaxation + faster) * own
         )
+        return self.base.extra_term(stress, rate) + as_state(added, stress)
 
 
 @dataclass(frozen=True)

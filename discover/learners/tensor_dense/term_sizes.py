@@ -31,11 +31,11 @@ def _sizes(problem: TrajectoryProblem) -> Float[Array, " n"]:
     fluid = Fluid(problem.base, problem.modulus, problem.relaxation_time, problem.solvent_viscosity)
 
     def of_run(protocol, grid):
-        states = solve_states_on_grid(fluid, protocol, grid)  # (samples, modes, 4)
+        states = solve_states_on_grid(fluid, protocol, grid)  # (samples, modes, s)
         gradients = jax.vmap(protocol.velocity_gradient)(grid.times[grid.sample_index])
 
         def squares(stress, gradient, time):
-            values = problem.library.evaluate(stress, rate_of_deformation(gradient * time))
+            values = problem.library.evaluate(stress[:4], rate_of_deformation(gradient * time))
             return jnp.sum(jnp.asarray(_COUNTS) * values**2, axis=-1)
 
         of_modes = jax.vmap(squares, in_axes=(0, None, 0))

@@ -13,6 +13,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.runs import as_runs
+from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics import root_of
 from tensor_library.library import TermLibrary
@@ -155,12 +156,13 @@ def make_problem(
             target[i, : len(run), kind] = values
             weight[i, : len(run), kind] = 1.0 / run.sizes(values)
     base = UpperConvectedMaxwell(known_relaxation) if base is None else base
+    fluid = Fluid(base, modulus, relaxation_time)
     flows = lay_out(
         [r.protocol for r in runs],
         [r.time for r in runs],
         padded,
         strain_step=strain_step,
-        relaxation_time=Fluid(base, modulus, relaxation_time).settling_time,
+        relaxation_time=fluid.settling_time,
     )
     return TrajectoryProblem(
         library=library,
@@ -169,7 +171,7 @@ def make_problem(
         relaxation_time=jnp.asarray(relaxation_time),
         solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
         modulus_error=jnp.asarray(_root(modulus_covariance, len(modulus))),
-        flows=flows.with_steps_in(_PADDED_STEPS),
+        flows=in_enough_steps(fluid, flows.with_steps_in(_PADDED_STEPS)),
         target=jnp.asarray(target),
         weight=jnp.asarray(weight / np.sqrt(np.sum(weight > 0))),
         order_of_time=jnp.asarray(order),

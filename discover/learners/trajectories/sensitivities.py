@@ -18,11 +18,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from discover.laws.base import as_state, stress_in
+from discover.laws.multimode import Fluid
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
 from tensor_library.kinematics import rate_of_deformation
 
@@ -33,11 +36,14 @@ _LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
 # for every stage of the integration.
 @partial(jax.jit, static_argnums=0)
 def _mode_rates(library, base, active, coefficients, inner, state, rate):
-    """Return d/dt of one mode's augmented state (4, 1 + q + m), dimensionless."""
+    """Return d/dt of one mode's augmented state (s, 1 + q + m), dimensionless."""
     stress = state[:, 0]
 
     def stress_rate(stress, inner):
-        terms = evaluate_active(library, active, stress, rate_of_deformation(rate), inner)
+        own = stress_in(stress)
+        terms = evaluate_active(library, active, own, rate_of_deformation(rate), inner)
+        # a law's structure variables stand behind σ, and no term touches them
+        terms = jax.vmap(lambda term: as_state(term, stress))(terms)
         known = base.stress_rate(stress, rate)
         change = known - jnp.tensordot(coefficients, terms, axes=1)
         return change, (change, terms)
@@ -64,7 +70,7 @@ def _vector_field(t, state, args):
 def _observe(t, state, args):
     """Return the recorded stress, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
     problem, protocol, *_ = args
-    total = jnp.tensordot(problem.modulus, state, axes=1)
+    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
     return _recorded(total.at[:, 0].add(_of_solvent(problem, protocol, t)), protocol)
 
 
@@ -82,18 +88,34 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
     if protocol.control == "steady":
         return _steady_run(problem, active, coefficients, inner, protocol, grid)
     columns = 1 + coefficients.shape[0] + inner.shape[0]
-    # Exact for the linear relaxation of the known law; where that too is unknown, a rate of this
-    # size is still the natural split, and the split decides accuracy only.
-    decay = (1.0 / problem.relaxation_time)[:, None, None]
+    start = jnp.pad(_rest(problem)[..., None], ((0, 0), (0, 0), (0, columns - 1)))
     observed = fixed_steps(
         _vector_field,
-        ExponentialRungeKutta4(jax.lax.stop_gradient(decay)),
+        _solver(problem, columns=True),
         grid.times,
-        jnp.zeros((problem.modulus.shape[0], 4, columns)),
+        start,
         (problem, protocol, active, coefficients, inner),
         _observe,
     )
     return observed[grid.sample_index]
+
+
+def _rest(problem):
+    rest = problem.base.rest()
+    return jnp.broadcast_to(rest, (problem.modulus.shape[0], *rest.shape))
+
+
+def _solver(problem, columns=False):
+    """Return the method that is exact for the linear relaxation of the known law.
+
+    Where that too is unknown, a rate of this size is still the natural split, and the split decides
+    accuracy only.
+    """
+    if problem.base.linear_relaxation:
+        fluid = Fluid(problem.base, problem.modulus, problem.relaxation_time)
+        return exponential_steps(fluid, columns)
+    decay = (1.0 / problem.relaxation_time)[:, None]
+    return ExponentialRungeKutta4(decay[..., None] if columns else decay)
 
 
 def _steady_run(problem, active, coefficients, inner, protocol, grid):
@@ -111,18 +133,20 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
     gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
     law = partial(_known_less_terms, problem, active, coefficients, inner)
-    state = steady_modes(law, gradient, jnp.zeros((problem.modulus.shape[0], 4)))
+    state = steady_modes(law, gradient, _rest(problem))
     return _observed(problem, protocol, time, state)
 
 
 def _known_less_terms(problem, active, coefficients, inner, stress, rate):
-    terms = evaluate_active(problem.library, active, stress, rate_of_deformation(rate), inner)
-    return problem.base.stress_rate(stress, rate) - jnp.tensordot(coefficients, terms, axes=1)
+    own = stress_in(stress)
+    terms = evaluate_active(problem.library, active, own, rate_of_deformation(rate), inner)
+    added = as_state(jnp.tensordot(coefficients, terms, axes=1), stress)
+    return problem.base.stress_rate(stress, rate) - added
 
 
 def _observed(problem, protocol, time, state):
-    """Return the recorded stress, N1 and N2 of modes, shape (k, 4)."""
-    total = jnp.tensordot(problem.modulus, state, axes=1)
+    """Return the recorded stress, N1 and N2 of modes, shape (k, s)."""
+    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
     return _recorded(total + _of_solvent(problem, protocol, time), protocol)
 
 
@@ -184,9 +208,9 @@ def predict_many(
 
         observed = fixed_steps(
             field,
-            ExponentialRungeKutta4((1.0 / problem.relaxation_time)[:, None]),
+            _solver(problem),
             grid.times,
-            jnp.zeros((problem.modulus.shape[0], 4)),
+            _rest(problem),
             None,
             lambda t, stress, _: _observed(problem, protocol, t, stress),
         )

@@ -1,0 +1,193 @@
+"""A law with a structure variable, in two modes, read back from every format with its equation.
+
+The reference is the pom-pom law in orientation and stretch, each integrated apart by scipy; every
+text is read by what would run it, and integrated by scipy too.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import sympy
+from independent.homogeneous import UNIT
+from independent.pom_pom import PomPom
+from scipy.integrate import solve_ivp
+from test_named_exports import read_latex, value
+
+from discover.equations import Equation, NamedPart, write_equation
+from discover.errors import InputError
+from discover.laws import make_law
+from discover.laws.pom_pom import _FADES
+
+MODULUS, TIME = (40.0, 5.0), (0.3, 1.5)
+TIMES = np.linspace(0.1, 1.5, 8)
+CONSTANTS = ({"q": 4.0, "stretch_time_ratio": 0.3}, {"q": 5.0, "stretch_time_ratio": 0.3})
+GRADIENTS = {"shear": 2.5 * UNIT["shear"], "extension": 0.6 * UNIT["uniaxial"]}
+both = pytest.mark.parametrize("name", ["pom_pom", "pom_pom_drag_strain"])
+
+
+def text(name, form, constants=CONSTANTS):
+    return write_equation(Equation((), MODULUS, TIME, named=NamedPart(name, constants)), form)
+
+
+def module_of(written):
+    module = {}
+    exec(written, module)
+    return module
+
+
+def reference(name, gradient):
+    total = 0.0
+    for g, time, c in zip(MODULUS, TIME, CONSTANTS, strict=True):
+        law = PomPom(
+            c["q"], c["stretch_time_ratio"] * time, g, time, name == "pom_pom_drag_strain", _FADES
+        )
+        found = solve_ivp(
+            lambda t, y, law=law: law.change(y, gradient),
+            (0, TIMES[-1]), law.rest(), "LSODA", TIMES, rtol=1e-9, atol=1e-11,
+        )  # fmt: skip
+        total = total + np.array([law.stress(y, 0.0) for y in found.y.T])
+    return total
+
+
+def integrated(rates, gradient):
+    """Return the stress of both modes, of rates(mode, stress, y, gradient)."""
+    total = 0.0
+    for k in range(2):
+        found = solve_ivp(
+            lambda t, y, k=k: np.append(*rates(k, y[:9].reshape(3, 3), y[9:], gradient)),
+            (0, TIMES[-1]), np.zeros(10), "LSODA", TIMES, rtol=1e-9, atol=1e-9,
+        )  # fmt: skip
+        total = total + found.y.T[:, :9].reshape(-1, 3, 3)
+    return total
+
+
+def by_python(written):
+    module = module_of(written)
+
+    def rates(k, stress, y, gradient):
+        stresses, variables = np.zeros((2, 3, 3)), np.zeros((2, 1))
+        stresses[k], variables[k] = stress, y
+        asked = stresses, gradient, variables
+        return module["stress_rate"](*asked)[k], module["variables_rate"](*asked)[k]
+
+    return rates
+
+
+def by_sympy(written):
+    module = module_of(written)
+    symbols = [*module["stress_symbols"], *module["gradient_symbols"], *module["variables"]]
+    told = [*module["stress_rate"], *module["variables_rate"]]
+    functions = [
+        sympy.lambdify(symbols, [one.subs(values) for one in told], "math", cse=True)
+        for values in module["values"]
+    ]
+
+    def rates(k, stress, y, gradient):
+        modulus, time = module["modes"][k]
+        s = stress / modulus
+        components = (s[0, 0], s[0, 1], s[0, 2], s[1, 1], s[1, 2], s[2, 2])
+        found = functions[k](*components, *(time * gradient).ravel(), *y)
+        return modulus / time * np.reshape(found[:9], (3, 3)), np.array(found[9:]) / time
+
+    return rates
+
+
+@both
+@pytest.mark.parametrize("reader", [by_python, by_sympy])
+def test_a_text_flows_as_the_law_in_shear_and_in_extension(name, reader):
+    rates = reader(text(name, reader.__name__.removeprefix("by_")))
+    for gradient in GRADIENTS.values():
+        wanted = reference(name, gradient)
+        # the kinks of fading growth cost an integration of 1e-9 some digits
+        assert np.max(np.abs(integrated(rates, gradient) - wanted)) < 1e-5 * np.max(np.abs(wanted))
+
+
+def test_constants_that_are_exchanged_between_modes_would_show():
+    """Negative control of the test above."""
+    rates = by_python(text("pom_pom", "python", CONSTANTS[::-1]))
+    gradient = 3.0 * UNIT["uniaxial"]
+    wanted = reference("pom_pom", gradient)
+    assert np.max(np.abs(integrated(rates, gradient) - wanted)) > 1e-3 * np.max(np.abs(wanted))
+
+
+def test_the_integrator_in_the_text_carries_the_variable_along():
+    module = module_of(text("pom_pom", "python"))
+    times = np.concatenate([[0.0], TIMES])
+    found = np.transpose(module["simulate_shear"](lambda t: 2.5, times))[1:]
+    s = reference("pom_pom", GRADIENTS["shear"])
+    wanted = np.stack([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]], axis=1)
+    # steps of a fiftieth of the shortest time, of fourth order
+    np.testing.assert_allclose(found, wanted, atol=1e-4 * np.max(wanted))
+
+
+def _states(number=3):
+    generator = np.random.default_rng(1)
+    for _ in range(number):
+        root = 0.6 * generator.normal(size=(3, 3)) + np.eye(3)
+        gradient = generator.normal(size=(3, 3))
+        yield (
+            root @ root.T - np.eye(3),
+            generator.normal(),
+            gradient - np.trace(gradient) / 3.0 * np.eye(3),
+        )
+
+
+def in_flow_plane(tensor):
+    """Return a tensor without what no four components hold."""
+    kept = np.diag(np.diag(tensor))
+    kept[0, 1] = kept[1, 0] = tensor[0, 1]
+    return kept
+
+
+def own(name, constants, stress, y, rate):
+    """Return h and the rate of y over 1/λ of the package's own law, of four components."""
+    places = ([0, 1, 2, 0], [0, 1, 2, 1])
+    state = jnp.asarray(np.append(stress[places], y))
+    extra = np.asarray(make_law(name, constants).extra_term(state, jnp.asarray(rate[places])))
+    return extra[:4], -y - extra[4]
+
+
+@both
+def test_ufl_says_stress_and_variable(name):
+    ufl = pytest.importorskip("ufl")
+    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+    from ufl.utils.stacks import StackDict
+
+    def number(expression, place=()):
+        return float(apply_algebra_lowering(expression).evaluate((), {}, place, StackDict()))
+
+    module = module_of(text(name, "ufl"))
+    for stress, y, gradient in _states():
+        stress, d = in_flow_plane(stress), in_flow_plane(gradient + gradient.T)
+        s, variables = ufl.as_matrix(stress.tolist()), [ufl.as_ufl(y)]
+        extra = module["extra_term"](s, ufl.as_matrix(d.tolist()), 1, variables)
+        wanted, changing = own(name, CONSTANTS[1], stress, y, d)
+        places = [(0, 0), (1, 1), (2, 2), (0, 1)]
+        found = [number(extra, place) for place in places]
+        np.testing.assert_allclose(found, wanted, atol=1e-12 * np.max(np.abs(wanted)))
+        asked = ufl.as_matrix((MODULUS[1] * stress).tolist()), ufl.as_matrix((d / 2).tolist())
+        (rate,) = module["variables_rate"](*asked, 1, variables)
+        _, changing = own(name, CONSTANTS[1], stress, y, TIME[1] * d)
+        assert number(rate) == pytest.approx(changing / TIME[1], rel=1e-12)
+
+
+@both
+def test_latex_says_how_the_variable_changes(name):
+    written = text(name, "latex")
+    lines = written.split("\\begin{align}\n")[1].split("\n\\end{align}")[0].splitlines()
+    equations = [line.removesuffix(r" \\").strip().split(" &= ") for line in lines]
+    assert equations[0][0] == r"\dot{y}"
+    for stress, y, gradient in _states():
+        stress, d = in_flow_plane(stress), in_flow_plane(gradient + gradient.T)
+        letters = {"sigma": stress, "gamma": d, "I": np.eye(3), "y": y, "e": np.e}
+        letters["q"] = CONSTANTS[0]["q"]
+        # constants stand last, and each line is over those before it and the constants
+        for left, right in [equations[-1], *equations[1:-1]]:
+            letters[read_latex(left).name] = value(read_latex(right), letters)
+        _, wanted = own(name, CONSTANTS[0], stress, y, d)
+        assert value(read_latex(equations[0][1]), letters) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_rheotool_says_that_it_has_no_such_law():
+    with pytest.raises(InputError, match="the law pom_pom: rheoTool has it not"):
+        text("pom_pom", "rheotool")

@@ -1,0 +1,195 @@
+"""The Rolie–Poly blend, with four tensors a mode, against scipy and the limits that are exact."""
+
+import jax
+import numpy as np
+import pytest
+from independent.homogeneous import UNIT
+from independent.rolie_poly import RoliePoly
+from independent.rolie_poly_blend import RoliePolyBlend as Independent
+from scipy.integrate import solve_ivp
+
+import discover as dc
+from discover.dataset.run import Run
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.laws import Fluid, make_law
+from discover.protocols import in_flow, oscillations, start_up
+from discover.simulate import simulate
+from discover.simulate.flow_batch import lay_out
+from discover.simulate.solve import solve_batch, solve_states_on_grid
+
+CONSTANTS = {
+    "long_fraction": 0.3,
+    "short_time_ratio": 0.1,
+    "stretch_time_ratio": 0.15,
+    "short_stretch_time_ratio": 0.3,
+    "beta": 0.8,
+}
+TIMES = np.linspace(0.05, 4.0, 40)
+PLACES = ([0, 1, 2, 0], [0, 1, 2, 1])
+
+
+def independent(modulus=1.0, time=1.0, **changed):
+    c = CONSTANTS | changed
+    short = c["short_time_ratio"] * time
+    stretch = c["stretch_time_ratio"] * time, c["short_stretch_time_ratio"] * short
+    share = c["long_fraction"], 1.0 - c["long_fraction"]
+    return Independent(share, (time, short), stretch, c["beta"], modulus)
+
+
+def exact(law, gradient, times=TIMES):
+    """Return σ in a start-up, (n, 4), by an implicit method."""
+    found = solve_ivp(
+        lambda t, y: law.change(y, gradient),
+        (0, times[-1]), law.rest(), "Radau", times, rtol=1e-9, atol=1e-11,
+    )  # fmt: skip
+    return np.array([law.stress(y, gradient)[PLACES] for y in found.y.T])
+
+
+def fluid(modulus=1.0, time=1.0, **changed):
+    return Fluid(make_law("rolie_poly_blend", CONSTANTS | changed), modulus, time)
+
+
+def by_the_loop(protocol, rate, modulus=(1.0,), time=(1.0,), times=TIMES, **columns):
+    law = "rolie_poly_blend"
+    declared = DeclaredModel.named(law, CONSTANTS, np.array(modulus), np.array(time))
+    model = AugmentedModel(declared, [])
+    run = Run("run", times, protocol, rate, np.ones(len(times)), **columns)
+    return [np.asarray(one) for one in model.predict(model.zero(), make_batch(run.records))]
+
+
+@pytest.mark.parametrize(
+    ("kind", "rate"), [("shear", 8.0), ("uniaxial", 2.5), ("planar", 1.5), ("biaxial", 1.0)]
+)
+def test_two_modes_are_those_of_full_tensors_in_every_flow(kind, rate):
+    modes = (1000.0, 300.0), (0.01, 2.0)
+    protocol = in_flow(start_up(rate), kind)
+    stress = sum(
+        exact(independent(g, time), rate * UNIT[kind]) for g, time in zip(*modes, strict=True)
+    )
+    wanted = stress[:, 3] if kind == "shear" else stress[:, 0] - stress[:, 1]
+    scale = np.max(np.abs(wanted))
+    (of_loop,) = by_the_loop(protocol, np.full(40, rate), *modes)
+    # steps of a fit, a tenth of strain; the stretch of the long chains grows in a few
+    np.testing.assert_allclose(of_loop, wanted, atol=3e-4 * scale)
+    flows = lay_out([protocol], [TIMES], strain_step=0.05)
+    found = np.asarray(solve_batch(fluid(*modes), flows))[0]
+    np.testing.assert_allclose(found, stress, atol=3e-4 * np.max(np.abs(stress)))
+
+
+@pytest.mark.parametrize("rate", [0.05, 3.0])
+def test_short_chains_that_relax_within_a_hundredth_of_a_step_are_followed(rate):
+    """Their retraction takes 3e-5 of λ; a step at the slower rate is longer than λ."""
+    quick = {"short_time_ratio": 1e-3, "short_stretch_time_ratio": 0.03}
+    wanted = exact(independent(**quick), rate * UNIT["shear"])[:, 3]
+    flows = lay_out([start_up(rate)], [TIMES], strain_step=0.1)
+    found = np.asarray(solve_batch(fluid(**quick), flows))[0, :, 3]
+    np.testing.assert_allclose(found, wanted, atol=1e-3 * np.max(wanted))
+
+
+@pytest.mark.parametrize(("share", "time"), [(1.0, 1.0), (0.0, 0.1)])
+def test_of_one_component_it_is_rolie_poly(share, time):
+    name = "stretch_time_ratio" if share else "short_stretch_time_ratio"
+    alone = RoliePoly(CONSTANTS["beta"], CONSTANTS[name] * time, relaxation_time=time)
+    wanted = exact(alone, 5.0 * UNIT["shear"])
+    flows = lay_out([start_up(5.0)], [TIMES], strain_step=0.05)
+    found = np.asarray(solve_batch(fluid(long_fraction=share), flows))[0]
+    np.testing.assert_allclose(found, wanted, atol=3e-4 * np.max(np.abs(wanted)))
+
+
+def test_it_is_not_the_sum_of_its_components_by_themselves():
+    """Negative control: entanglements with the other component are most of a blend."""
+    flows = lay_out([start_up(5.0)], [TIMES], strain_step=0.05)
+    found = np.asarray(solve_batch(fluid(), flows))[0, :, 3]
+    apart = 0.0
+    for share, time, name in (
+        (0.3, 1.0, "stretch_time_ratio"),
+        (0.7, 0.1, "short_stretch_time_ratio"),
+    ):
+        alone = RoliePoly(CONSTANTS["beta"], CONSTANTS[name] * time, share, time)
+        apart = apart + exact(alone, 5.0 * UNIT["shear"])[:, 3]
+    assert np.max(np.abs(found - apart)) > 0.1 * np.max(apart)
+
+
+def without_stretch(gradient, times):
+    """Return σ of chains that retract at once, so that no tr A_i moves from 3, (n, 4).
+
+    The r_i then follow from 3 r_i = 2 L:A_i − Σ φ_j (½/τ_j + ½/τ_i + β r_j)(tr A_ij − 3).
+    """
+    law = independent()
+    share, one = np.array(law.share), np.eye(3)
+    lost = 0.5 / np.array(law.relaxation_time)
+    lost = lost[:, None] + lost[None, :]
+
+    def change(_, y):
+        a = y.reshape(2, 2, 3, 3)
+        excess = np.trace(a, axis1=2, axis2=3) - 3.0
+        drive = 2.0 * np.einsum("kl,j,ijkl->i", gradient, share, a)
+        drive = drive - np.sum(share * lost * excess, axis=1)
+        drawn = np.linalg.solve(3.0 * np.eye(2) + law.release * share * excess, drive)
+        carried = gradient @ a + a @ gradient.T
+        rates = lost + law.release * drawn[None, :]
+        return (
+            carried - rates[..., None, None] * (a - one) - drawn[:, None, None, None] * a
+        ).ravel()
+
+    found = solve_ivp(change, (0, times[-1]), law.rest(), "LSODA", times, rtol=1e-9, atol=1e-11)
+    return np.array([law.stress(y, gradient)[PLACES] for y in found.y.T])
+
+
+def test_with_ever_shorter_rouse_times_it_becomes_the_law_without_stretch():
+    times = np.linspace(0.2, 4.0, 20)
+    wanted = without_stretch(UNIT["shear"], times)
+    errors = []
+    for ratio in (4e-3, 2e-3):
+        short = {"stretch_time_ratio": ratio, "short_stretch_time_ratio": ratio}
+        flows = lay_out([start_up(1.0)], [times], strain_step=0.0025)
+        found = np.asarray(solve_batch(fluid(**short), flows))[0]
+        errors.append(np.max(np.abs(found - wanted)) / np.max(np.abs(wanted)))
+    # what is left is of the order of Wi τ_s/τ
+    assert errors[1] < 4e-3
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)
+
+
+def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
+    strain, frequency, one = 3.0, 1.0, np.ones(1)
+    sweep = {"strain": strain * one, "storage_modulus": one, "loss_modulus": one}
+    protocol = oscillations([strain], [frequency])
+    found = by_the_loop(protocol, strain * frequency * one, times=one, **sweep)
+    law, times = independent(), 2.0 * np.pi * np.linspace(3.0, 4.0, 201)
+    state = solve_ivp(
+        lambda t, y: law.change(y, strain * np.cos(t)), (0, times[-1]), law.rest(), "Radau", times,
+        rtol=1e-8, atol=1e-10,
+    ).y.T  # fmt: skip
+    stress = np.array([law.stress(y, 0.0)[0, 1] for y in state])
+    wave = np.exp(1j * times)
+    loss = np.trapezoid(stress * wave.real, times) / np.pi / strain
+    storage = np.trapezoid(stress * wave.imag, times) / np.pi / strain
+    np.testing.assert_allclose(
+        np.ravel(found), [storage, loss], atol=1e-3 * np.hypot(storage, loss)
+    )
+
+
+def test_no_flow_takes_a_conformation_away():
+    """Of any pair, in a reversal at Wi 20."""
+    flows = lay_out([dc.step_rates([0.0, 1.0], [20.0, -20.0])], [np.linspace(0.0, 2.0, 81)])
+    protocol, grid = jax.tree.map(lambda leaf: leaf[0], flows.parts[0])
+    states = np.asarray(solve_states_on_grid(fluid(), protocol, grid))[:, 0]
+    for first in range(0, 20, 4):
+        s11, s22, s33, s12 = states[:, first : first + 4].T + np.array([[1], [1], [1], [0]])
+        assert np.min((s11 + s22) / 2 - np.hypot((s11 - s22) / 2, s12)) > 0.0
+        assert np.min(s33) > 0.0
+
+
+@pytest.mark.slow
+def test_a_learner_told_of_it_claims_nothing_beside_it():
+    """Records of its own simulator with 0.1 % noise: that the four tensors are carried along."""
+    known = fluid()
+    runs = []
+    for rate in (1.0, 3.0, 6.0):
+        stress = simulate(known, start_up(rate), TIMES).shear_stress
+        noise = 1e-3 * np.std(stress) * np.random.default_rng(int(rate)).normal(size=40)
+        runs.append(Run(f"{rate}", TIMES, start_up(rate), np.full(40, rate), stress + noise))
+    options = {"n_folds": 0, "n_stability": 0, "max_terms": 1}
+    sparse = dc.TensorSINDy(base=known, **options).fit(dc.Dataset("blend", tuple(runs)))
+    assert sparse.terms_ == ()
+    assert sparse.score(runs) > 0.995
