@@ -7,6 +7,7 @@ from independent.folders import with_noise, write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 from independent.johnson_segalman import JohnsonSegalman
+from independent.thixotropic import Thixotropic
 
 import discover as dc
 
@@ -48,3 +49,19 @@ def test_slow_shear_of_a_giesekus_fluid_does_not_exclude_the_law_that_made_it(tm
     )
     told = [one for one in loop.explanations.likeliest_first if one.probability > 0.05]
     assert any(one.effects == ("giesekus_mobility",) for one in told)
+
+
+def test_a_slow_structure_is_not_taken_for_a_fast_one(tmp_path):
+    """Broken as much and healed as fast, it thins alike in steady flow: a minimum far off."""
+    flows = {f"at_{rate:g}.csv": start_up(rate) for rate in (0.5, 2.0, 5.0)}
+    fluid = Thixotropic(Giesekus(0.0, 100.0, 1.0), breakdown=0.25, build_up_time=2.0)
+    runs = {
+        name: Instrument().record(fluid, flow, np.linspace(0.1, 8.0, 80))
+        for name, flow in flows.items()
+    }
+    data = write_folder(tmp_path, with_noise(runs, 0.01, np.random.default_rng(0)))
+    loop = dc.close_loop(dc.load_dataset(data), BASE, effects=["thixotropy"], max_effects=1)
+    assert loop.verdict == "effects_added"
+    constants = loop.stages[0].parameters
+    assert constants["breakdown"].value == pytest.approx(0.25, rel=0.05)
+    assert constants["build_up_time"].value == pytest.approx(2.0, rel=0.1)

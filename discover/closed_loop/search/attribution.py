@@ -18,7 +18,7 @@ _RUNAWAY = 1e9
 
 _STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
 
-_FINITE = 4.0
+TRIED_AT = 4.0
 """Multiple of an effect's first trial at which it shows."""
 
 _INNER_STRETCHES = (0.0, 1.0 / 30.0, 1.0 / 6.0, 5.0)
@@ -131,7 +131,7 @@ def attribute(
             position = model.slices[waiting[i].name].start
             start = fit.theta.copy()
             start[position] = np.clip(
-                _FINITE * model.first_trial[position], model.low[position], model.high[position]
+                TRIED_AT * model.first_trial[position], model.low[position], model.high[position]
             )
             candidates[i].start = start
             leading.append(i)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.search.attribution import CandidateScore, with_other_inner
+from discover.closed_loop.search.attribution import TRIED_AT, CandidateScore, with_other_inner
 from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE, evidence
 from discover.closed_loop.search.left_out import (
     FEWEST_FOLDS,
@@ -14,6 +14,7 @@ from discover.closed_loop.search.left_out import (
     part_errors,
     run_errors,
 )
+from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, intervals
 from discover.statistics.residual import summarise
@@ -29,6 +30,9 @@ FEWEST_SAMPLES = 5
 """Samples beyond the constants to be fitted, below which any law fits."""
 
 _RESTARTED = 3
+_FAR = 10.0
+"""Ratio to its first trial from which an inner time or exponent counts as far off."""
+
 
 _INSIDE = 0.25
 """Share of the largest amplitude from which one that stands there is tried again."""
@@ -121,6 +125,7 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
         for effect in model.effects:
             if model.positions(effect.name)[0] in fits[i].free:
                 others = with_other_inner(model, fits[i].theta, effect)
+                others += _from_first_trial(model, fits[i].theta, effect)
                 starts += others
                 owners += [i] * len(others)
     for i in order:
@@ -135,6 +140,26 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
         if fit.usable and fit.cost < fits[i].cost:
             fits[i] = fit
     return fits
+
+
+def _from_first_trial(
+    model: AugmentedModel, theta: np.ndarray, effect: AbstractEffect
+) -> list[np.ndarray]:
+    """Return parameters with an effect as it is first tried, if its inner ones are far from there.
+
+    A structure that breaks a hundred times as much and heals a hundred times as fast thins alike in
+    steady flow, and from there no step leads to the slow one.
+    """
+    amplitude, *inner = model.positions(effect.name)
+    first = model.zero()
+    ratio = [theta[at] / first[at] for at in inner if first[at] > 0.0 and theta[at] > 0.0]
+    if not any(max(r, 1.0 / r) > _FAR for r in ratio):
+        return []
+    other = theta.copy()
+    other[inner] = first[inner]
+    start = TRIED_AT * model.first_trial[amplitude]
+    other[amplitude] = np.clip(start, model.low[amplitude], model.high[amplitude])
+    return [other]
 
 
 def _from_inside(model: AugmentedModel, fit: Fit) -> list[np.ndarray]:
