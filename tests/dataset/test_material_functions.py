@@ -9,6 +9,7 @@ from discover.dataset.checking.folder import check_folder
 from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.data import load_study_data
+from discover.study.in_memory import data_in_memory
 
 TABLES = {
     "flow_curve.csv": "shear_rate_1_s,stress_kPa,N1_Pa\n1,0.02,5\n0.1,0.003,0.1\n10,0.1,90\n",
@@ -39,6 +40,8 @@ def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
     data = load_study_data(study(folder))
     assert data.fit.names == (name,)
     assert not len(data.held_out)
+    # from Python too
+    assert data_in_memory(load_dataset(folder)).fit.names == (name,)
 
 
 @pytest.mark.parametrize("name", SWEEPS)
