@@ -1,6 +1,7 @@
 """Constants that the records leave open are said to be open, however small the noise."""
 
 import numpy as np
+import pytest
 from independent.folders import write_table
 
 import discover as dc
@@ -38,3 +39,18 @@ def test_with_its_normal_stress_both_are_told(tmp_path):
     for (low, high), truth in zip(found, (MODULUS, TIME), strict=True):
         assert low < truth < high
         assert high - low < 0.05 * truth
+
+
+@pytest.mark.slow
+def test_what_a_flow_curve_leaves_open_is_not_replaced_by_more_effects(tmp_path):
+    """A structure in closed form: how fast it breaks no steady state knows; that it broke, all."""
+    rates = np.geomspace(0.05, 20.0, 40)
+    stress = 100.0 * rates / (1.0 + 0.5 * rates) + rates
+    off = 1.0 + 0.01 * np.random.default_rng(0).standard_normal(40)
+    write_table(tmp_path / "flow_curve.csv", {"shear_rate_1_s": rates, "stress_Pa": stress * off})
+    base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0, 1.0)
+    loop = dc.close_loop(dc.load_dataset(tmp_path), base)
+    assert loop.verdict == "effects_added"
+    assert [stage.effect for stage in loop.stages] == ["thixotropy"]
+    low, high = loop.stages[0].parameters["build_up_time"].ci95
+    assert high > 100.0 * max(low, 1.0)

@@ -12,17 +12,13 @@ import numpy as np
 
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.augment import taken_out
-from discover.closed_loop.search.evidence import criterion
+from discover.closed_loop.search.evidence import WINDOW, criterion
 from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise
 
 BEAM_WIDTH = 8
 """Explanations that are carried side by side, by default."""
-
-WINDOW = 20.0
-"""An explanation so many times less probable than the best is no longer carried: Occam's window
-[Madigan & Raftery 1994, J. Am. Stat. Assoc. 89, 1535]."""
 
 _SLACK = 2.0  # of the criterion, for fits that only ranked
 _TWIN = 1e-3

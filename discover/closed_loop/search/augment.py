@@ -125,11 +125,13 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
         for effect in model.effects:
             if model.positions(effect.name)[0] in fits[i].free:
                 others = with_other_inner(model, fits[i].theta, effect)
-                others += _from_first_trial(model, fits[i].theta, effect)
                 starts += others
                 owners += [i] * len(others)
     for i in order:
         inside = _from_inside(model, fits[i])
+        for effect in model.effects:
+            if model.positions(effect.name)[0] in fits[i].free:
+                inside += _from_first_trial(model, fits[i].theta, effect)
         starts += inside
         owners += [i] * len(inside)
     if not starts:

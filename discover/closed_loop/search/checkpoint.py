@@ -87,6 +87,7 @@ def _state(search: SearchState) -> dict[str, Any]:
         "left_out": search.left_out,
         "not_named": search.not_named,
         "refused": sorted(search.refused),
+        "left_open": sorted(search.left_open),
         "unasked": sorted(search.unasked),
         "seen": search.seen.to_json(),
         "degrees": {name: asdict(found) for name, found in search.degrees.items()},
@@ -121,6 +122,7 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.left_out = state["left_out"]
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
+    search.left_open = set(state.get("left_open", ()))
     search.unasked = set(state.get("unasked", ()))
     search.seen = SeenSets.from_json(state.get("seen", {}))
     search.degrees = {

@@ -16,6 +16,7 @@ from discover.closed_loop.search.taking_out import (
     drop_undecided_effects,
     hold_against_modes,
     refuse,
+    restore_left_open,
 )
 from discover.dataset import Run
 from discover.effects import AbstractEffect
@@ -94,6 +95,9 @@ class Search(CurrentModel):
             self.rounds = 0
             say(f"no finding: {self.not_named[refused]}")
             self.checkpoint.save(self)
+        restored = restore_left_open(self)
+        if restored:
+            say(f"put back, for what stands in its place is far less likely: {restored}")
         if whole:
             hold_against_modes(self, say)
         for name in self.active:

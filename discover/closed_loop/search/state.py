@@ -42,6 +42,8 @@ class SearchState:
         open; and why, in a sentence without its stop.
     refused
         Those of them that were in the model and are no candidates any more.
+    left_open
+        Those of them of which nothing but the data's silence about a constant speaks.
     seen
         Every set of effects that was fitted.
     unasked
@@ -65,6 +67,7 @@ class SearchState:
         self.known: dict[int, tuple[float, float]] = {}
         self.not_named: dict[str, str] = {}
         self.refused: set[str] = set()
+        self.left_open: set[str] = set()
         self.unasked: set[str] = set()
         self.seen = SeenSets()
         self.degrees = {name: Degree() for name in model.declared.by_mode}

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from discover.closed_loop.search.augment import drop_undecided
 from discover.closed_loop.search.current_model import CurrentModel
+from discover.closed_loop.search.evidence import WINDOW, criterion
 from discover.closed_loop.search.mode_dependence import names_not_needed
 from discover.closed_loop.search.physical_range import at_an_end, undetermined
-from discover.forward.least_squares import (
-    intervals,
-)
+from discover.forward.least_squares import intervals
+from discover.statistics.residual import judged_cost, summarise
 
 
 def hold_against_modes(search: CurrentModel, say: Callable[[str], None]) -> None:
@@ -44,12 +46,15 @@ def refuse(search: CurrentModel) -> str:
     bounds = intervals(search.model, search.batch, search.fit)
     longest = search.batch.longest
     for name in names:
-        reason = at_an_end(search.model, search.fit.theta, [name]) or undetermined(
-            search.model, search.fit.theta, bounds, name, longest
+        reason = at_an_end(search.model, search.fit.theta, [name])
+        open_ = (
+            "" if reason else undetermined(search.model, search.fit.theta, bounds, name, longest)
         )
-        if not reason:
+        if not (reason or open_):
             continue
-        search.not_named[name] = reason
+        if open_:
+            search.left_open.add(name)
+        search.not_named[name] = reason or open_
         search.refused.add(name)
         search.fit = search.without(name)
         search.active.remove(name)
@@ -73,3 +78,42 @@ def drop_undecided_effects(search: CurrentModel) -> list[str]:
         search.fit_path()
         search.leave_out()
     return dropped
+
+
+def restore_left_open(search: CurrentModel) -> str:
+    """Put back what was refused for an open constant if what replaced it is far less likely.
+
+    A flow curve shows how far a structure is broken, and not how fast: its constants are no
+    finding. That it is there is not excluded by this. Where the search went on without it and
+    explains the runs by other effects, yet with so many more constants that they are beyond Occam's
+    window, to name these would be false. Returns what was put back; empty for nothing.
+    """
+    if not search.left_open or not search.active or not search.explained:
+        return ""
+    weight = np.asarray(search.batch.weight)
+    effective = summarise(search.fit.residual, weight).effective_samples
+
+    def worth(cost: float, free: int, effects: int) -> float:
+        return criterion(cost, free, effects, effective, search.n_candidates)
+
+    cost = judged_cost(search.fit.residual, weight)
+    own = worth(cost, len(search.fit.free), len(search.active))
+    impossible = search.refused - search.left_open
+    instead = [
+        one
+        for one in search.seen
+        if search.left_open & set(one.effects) and not impossible & set(one.effects)
+    ]
+    if not instead:
+        return ""
+    best = min(instead, key=lambda one: worth(one.cost, len(one.free), len(one.effects)))
+    if worth(best.cost, len(best.free), len(best.effects)) > own - 2.0 * np.log(WINDOW):
+        return ""
+    search.refused -= set(best.effects)
+    search.left_open -= set(best.effects)
+    search.active = list(best.effects)
+    search.unasked = set(search.active)
+    search.fit = search.fitted(search.active, best.theta(search.model))
+    search.fit_path()
+    search.leave_out()
+    return ", ".join(best.effects)
