@@ -288,8 +288,8 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
 def _frequency(flow: Flow) -> float:
     """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
-    if flow.is_steady:
-        return 0.0
+    if flow.is_of_states:
+        return flow.frequency or 0.0
     whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
     return max(whole, flow.frequency or 0.0)
 

@@ -17,6 +17,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from discover.forward.fluids import (
+    FOLLOWED,
+    dynamics_of_modes,
+    solved_on_grid,
+    with_cheap_tangents,
+)
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
@@ -80,6 +86,8 @@ def _recorded(total, protocol):
 def _solve_run(problem, active, coefficients, inner, protocol, grid):
     if protocol.control == "steady":
         return _steady_run(problem, active, coefficients, inner, protocol, grid)
+    if protocol.control not in FOLLOWED:
+        return _solved_run(problem, active, coefficients, inner, protocol, grid)
     columns = 1 + coefficients.shape[0] + inner.shape[0]
     # Exact for the linear relaxation of the known law; where that too is unknown, a rate of this
     # size is still the natural split, and the split decides accuracy only.
@@ -95,6 +103,33 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
     return observed[grid.sample_index]
 
 
+def _solved_run(problem, active, coefficients, inner, protocol, grid):
+    """Return what `_solve_run` does where the rate is solved for."""
+
+    def recorded(*numbers):
+        observed = _observed_where_solved(problem, active, numbers, protocol, grid)
+        return observed, observed
+
+    columns, value = jax.jacfwd(recorded, argnums=(0, 1), has_aux=True)(coefficients, inner)
+    return jnp.concatenate([value[..., None], *columns], axis=-1)
+
+
+def _observed_where_solved(problem, active, numbers, protocol, grid):
+    law = with_cheap_tangents(partial(_law_of_numbers, problem.library), (active, problem.base))
+    modes = problem.modulus, problem.relaxation_time, problem.solvent_viscosity
+
+    def make(numbers):
+        return dynamics_of_modes(partial(law, numbers), *modes, protocol)
+
+    return solved_on_grid(make, numbers, protocol, grid).observed
+
+
+def _law_of_numbers(library, given, numbers, stress, rate):
+    (active, base), (coefficients, inner) = given, numbers
+    terms = evaluate_active(library, active, stress, rate_of_deformation(rate), inner)
+    return base.stress_rate(stress, rate) - jnp.tensordot(coefficients, terms, axes=1)
+
+
 def _steady_run(problem, active, coefficients, inner, protocol, grid):
     """Return what `_solve_run` does of steady states, by the implicit function."""
 
@@ -104,7 +139,7 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
         columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
         return jnp.concatenate([value[:, None], *columns], axis=1)
 
-    return jax.vmap(at)(grid.times[grid.sample_index])
+    return jax.vmap(at)(grid.sample_times)
 
 
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
@@ -115,8 +150,8 @@ def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inne
 
 
 def _known_less_terms(problem, active, coefficients, inner, stress, rate):
-    terms = evaluate_active(problem.library, active, stress, rate_of_deformation(rate), inner)
-    return problem.base.stress_rate(stress, rate) - jnp.tensordot(coefficients, terms, axes=1)
+    given, numbers = (active, problem.base), (coefficients, inner)
+    return _law_of_numbers(problem.library, given, numbers, stress, rate)
 
 
 def _observed(problem, protocol, time, state):
@@ -146,8 +181,8 @@ def observe(
 
     Returns
     -------
-    σ12, N1, N2 in Pa, and their derivatives with respect to coefficients, then inner parameters.
-    Not finite where the trial law runs away.
+    What is recorded, N1 and N2, and their derivatives with respect to coefficients, then inner
+    parameters. Not finite where the trial law runs away.
     """
     run = partial(_solve_run, problem, active, coefficients, inner)
     observed = problem.flows.over(run)
@@ -172,7 +207,10 @@ def predict_many(
                 lambda time: _observed_in_steady_flow(
                     problem, active, protocol, time, coefficients, inner
                 )
-            )(grid.times[grid.sample_index])
+            )(grid.sample_times)
+        if protocol.control not in FOLLOWED:
+            numbers = coefficients, inner
+            return _observed_where_solved(problem, active, numbers, protocol, grid)
         mode = partial(_known_less_terms, problem, active, coefficients, inner)
 
         def field(t, stress, _):
