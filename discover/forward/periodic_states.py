@@ -32,7 +32,8 @@ _MIRROR = (1.0, 1.0, 1.0, -1.0)
 class _Half(NamedTuple):
     """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends.
 
-    The last once more for each mode, without the factor of the states, shape (s, k).
+    The last once more for each mode where that is asked for, without the factor of the states,
+    shape (s, k).
     """
 
     stress: Float[Array, "s k"]
@@ -208,7 +209,8 @@ def periodic_state(
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
-    solve, half = _half_cycle(fixed, wave, width), _half_cycle(dynamics, wave, width)
+    solve = _half_cycle(fixed, wave, width, by_mode=True)
+    half = _half_cycle(dynamics, wave, width, by_mode=True)
     slowness = frequency * fixed.modes.relaxation_time
 
     def turned(now, unit):
@@ -285,7 +287,7 @@ def _end_with_derivative(half, stress, levels, felt) -> tuple[_Half, Float[Array
     return found, jnp.moveaxis(tangents, 2, 0)
 
 
-def _half_cycle(dynamics: Dynamics, wave, width):
+def _half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
     """Return the function from state and strain amplitude to what half a cycle makes of them."""
     combined = dynamics.combined
     weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
@@ -300,6 +302,9 @@ def _half_cycle(dynamics: Dynamics, wave, width):
 
     def sheared(stress, rate):
         return dynamics.sheared(stress, rate, None)[0]
+
+    def of_modes(stress):
+        return stress[3] * dynamics.modes.modulus if by_mode else jnp.zeros(0)
 
     mirror = jnp.ones(4 + dynamics.variables).at[:4].set(jnp.array(_MIRROR))[:, None]
 
@@ -322,21 +327,21 @@ def _half_cycle(dynamics: Dynamics, wave, width):
 
             felt = jnp.stack([first, middle, middle, last])
             factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
-            stress, _ = w.step(stress, stage, (felt, factors))
+            stress, _ = w.step(stress, stage, (felt, factors), 1 if by_mode else 4)
             after = combined("modulus_factor", at_end) * sheared(stress, middle)
             levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
             left = [a * b for a, b in zip(left, kept, strict=True)]
             recorded = combined("modulus_factor", levels) * sheared(stress, last)
-            return (stress, levels, left), (recorded, stress[3] * dynamics.modes.modulus)
+            return (stress, levels, left), (recorded, of_modes(stress))
 
         begun = combined("modulus_factor", levels) * sheared(stress, rate[0])
-        begun_with = stress[3] * dynamics.modes.modulus
+        begun_by_mode = of_modes(stress)
         start = (stress, list(levels), [jnp.ones_like(level) for level in levels])
-        (stress, levels, left), (recorded, of_modes) = jax.lax.scan(
+        (stress, levels, left), (recorded, each) = jax.lax.scan(
             step, start, (rate[:-2:2], rate[1::2], rate[2::2])
         )
         recorded = jnp.concatenate([begun[None], recorded])
-        of_modes = jnp.concatenate([begun_with[None], of_modes])
-        return _Half(mirror * stress, tuple(levels), tuple(left), recorded, of_modes)
+        each = jnp.concatenate([begun_by_mode[None], each])
+        return _Half(mirror * stress, tuple(levels), tuple(left), recorded, each)
 
     return half

@@ -41,7 +41,7 @@ def noisy(values, seed, size=None):
 
 
 def creep(law, stress, off=None):
-    """Creep at a stress, and recovery from a time on."""
+    """Creep at a stress, and recovery right after one of the samples."""
     levels = [(0.0, stress)] if off is None else [(0.0, stress), (off, 0.0)]
     strain = noisy(strain_at(law, levels, SOLVENT, TIMES), int(stress))
     imposed = np.where((off or np.inf) >= TIMES, stress, 0.0)
@@ -84,7 +84,7 @@ def found_by_sindy(runs, library=LIBRARY):
 def few_samples():
     return [
         creep(GIESEKUS, 40.0).window(np.arange(40) % 4 == 0),
-        *sweep(GIESEKUS, [0.1, 2.0]).records,
+        *sweep(GIESEKUS, np.array([0.1, 2.0])).records,
     ]
 
 
@@ -136,7 +136,7 @@ def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
     ("runs", "term", "constant"),
     [
         (lambda: [creep(GIESEKUS, 20.0), creep(GIESEKUS, 60.0)], "sigma.sigma", 0.3),
-        (lambda: [creep(GIESEKUS, 60.0, off=8.0)], "sigma.sigma", 0.3),
+        (lambda: [creep(GIESEKUS, 60.0, off=TIMES[30])], "sigma.sigma", 0.3),
         (lambda: [sweep(GIESEKUS, np.geomspace(0.05, 10.0, 14))], "sigma.sigma", 0.3),
         (
             lambda: [creep(modes(PhanThienTanner, 0.2), s) for s in (20.0, 60.0)],

@@ -95,7 +95,6 @@ def train(
         # the whole library of degree one, whatever the study's: fewer terms are surer, not truer
         dense = TensorDense(
             use_normal_stresses=options.use_normal_stresses,
-            solvent_viscosity=model.solvent_viscosity,
             progress=progress,
             **shared,
         ).fit(list(runs))

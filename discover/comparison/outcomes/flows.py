@@ -160,6 +160,19 @@ class Flow:
         return cumulative_simpson(self.rate, x=self.times, initial=0.0)
 
     @property
+    def largest_rate(self) -> float:
+        """Largest rate without its sign, in 1/s.
+
+        At a given stress the mean rate of the second half of the record, the samples halved: the
+        slope from sample to sample is of noise.
+        """
+        if self.records_strain and len(self.times) > 2:
+            middle = len(self.times) // 2
+            moved = abs(self.strain[-1] - self.strain[middle])
+            return float(moved / (self.times[-1] - self.times[middle]))
+        return float(np.max(np.abs(self.rate)))
+
+    @property
     def title(self) -> str:
         """The flow in the field's notation."""
         amplitudes = np.asarray(self._imposed.amplitudes)

@@ -320,7 +320,7 @@ def _next(comparison: Comparison) -> str:
         return "Measure in shear: extension alone does not say what the fluid does there."
     if names := _open(comparison):
         return f"Measure {names}: nothing else decides between laws that give the same σ12."
-    rates = [float(np.max(np.abs(f.rate))) for f in comparison.flows_of("training")]
+    rates = [flow.largest_rate for flow in comparison.flows_of("training")]
     unit = "" if comparison.noise is not None else " 1/s"
     return (
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "

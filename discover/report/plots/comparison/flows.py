@@ -31,6 +31,9 @@ from discover.words import listed
 
 START_UP_SHOWN = 10.0
 
+# Values within this factor are shown within it above and below
+_NARROW = 4.0
+
 # A strain of creep that goes through more than one and a half decades is drawn in decades
 _DECADES = 1.5 * np.log(10.0)
 
@@ -238,6 +241,9 @@ def _set_scales(panel, flow: Flow, quantity: str, truth_too: bool = False) -> No
     if _in_decades(flow, quantity):
         panel.set_yscale("log")
         panel.autoscale(axis="y")
+        low, high = panel.get_ylim()
+        if high < _NARROW * low:  # within a decade the labels of an axis would crowd
+            panel.set_ylim(low / _NARROW, high * _NARROW)
     in_time = not flow.is_of_states and (truth_too or not flow.is_truth)
     # in creep the stress is constant, and not the rate
     pace = np.ones_like(flow.times) if flow.records_strain else flow.rate
