@@ -147,10 +147,8 @@ def jumps(protocol: FlowProtocol) -> bool:
     if protocol.control != "stress":
         return False
     width = np.diff(np.asarray(protocol.table_times))
-    steps = np.abs(np.diff(np.asarray(protocol.table_rates)))
-    # a jump takes a small share of the time beside it
-    at_once = width < 2.0 * _AT_ONCE * np.max(width)
-    return jumps_at_start(protocol) or bool(np.any(at_once & (steps > _JUMP * np.max(steps))))
+    # a jump takes a small share of the time to the next sample
+    return jumps_at_start(protocol) or bool(np.any(width[:-1] < 2.0 * _AT_ONCE * width[1:]))
 
 
 def jumps_at_start(protocol: FlowProtocol) -> bool:
