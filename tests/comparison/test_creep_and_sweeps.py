@@ -120,11 +120,13 @@ def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
     rebuild = Rebuild.everything(law)
     along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
     # what it misses is its own departure from the law that made them, and the noise
-    assert float(jnp.max(jnp.abs(problem.missed_by(along.recorded)[0]))) < 0.1
+    missed = problem.missed_by(along.recorded)[0]
+    assert float(jnp.max(jnp.abs(missed))) < 0.05 * float(jnp.max(problem.target[0]))
     direction, step = jax.random.normal(jax.random.key(2), rebuild.start.shape), 1e-6
+    trials = [rebuild.start + s * direction for s in (step, -step)]
     ends = [
-        states_and_jacobian(rebuild.start + s * direction, rebuild, problem)[0].recorded
-        for s in (step, -step)
+        problem.missed_by(states_and_jacobian(trial, rebuild, problem)[0].recorded)
+        for trial in trials
     ]
     expected = (ends[0] - ends[1]) / (2.0 * step)
     size = float(jnp.max(jnp.abs(expected)))
