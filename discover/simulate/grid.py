@@ -21,8 +21,10 @@ _FEWEST_HISTORY_STEPS = 100
 # Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
 _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
 
-# Of a run at a given stress: steps of a jump, growth of those after it, steps between samples
-_JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.08, 2
+# Of a run at a given stress: steps of a jump, growth of those after it, steps between samples. With
+# growth by 0.08 creep of 9 modes over five decades without solvent, in 60 samples, errs by 5 %, with
+# 0.04 by 5e-5
+_JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.04, 2
 
 # Half a cycle of an oscillation: at most this much strain in a step, at least this many steps, and
 # a limit that only a strain given in the wrong unit reaches
@@ -187,7 +189,10 @@ def stress_grid(
     begins, end = float(protocol.begins), float(times[-1])
     knots = np.asarray(protocol.table_times)
     levels = np.asarray(protocol.table_rates)
-    knots_inside = knots[(knots >= begins) & (knots <= end)]
+    # a record of thousands at one level has a knot at each sample, and no kink there
+    slope = np.diff(levels) / np.diff(knots)
+    bends = np.concatenate([[True], np.diff(slope) != 0.0, [True]]) if len(knots) > 1 else True
+    knots_inside = knots[(knots >= begins) & (knots <= end) & bends]
     gap = float(np.min(np.diff(times))) if len(times) > 1 else end
     parts = [np.array([begins]), times, knots_inside]
     jumps = (np.diff(knots) < 0.5 * gap) & (np.diff(levels) != 0.0)
