@@ -21,9 +21,9 @@ _FEWEST_HISTORY_STEPS = 100
 # Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
 _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
 
-# Of a run at a given stress: steps of a jump, growth of those after it, steps between samples. With
-# growth by 0.08 creep of 9 modes over five decades without solvent, in 60 samples, errs by 5 %, with
-# 0.04 by 5e-5
+# Of a run at a given stress: steps of a jump, growth of those after it, steps between samples.
+# With growth by 0.08 creep of 9 modes over five decades in 60 samples errs by 5 %, with 0.04 by
+# 5e-5 (no solvent)
 _JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.04, 2
 
 # Half a cycle of an oscillation: at most this much strain in a step, at least this many steps, and
