@@ -69,8 +69,8 @@ def main() -> None:
 
     @eqx.filter_jit
     def variational(weights, problem):
-        states, jacobian = states_and_jacobian(weights, rebuild, problem)
-        residual = problem.misses(states)
+        along, jacobian = states_and_jacobian(weights, rebuild, problem)
+        residual = problem.missed_by(along.recorded)
         n = residual.shape[1]
         return 2.0 / n * jnp.einsum("rn,rnp->p", residual, jacobian)
 

@@ -130,8 +130,8 @@ def everything_at_once(problem, seed: int, known: bool):
     @residual.def_jvp
     def _(primals, tangents):
         weights, data = primals
-        states, jacobian = states_and_jacobian(weights, rebuild, data)
-        return data.misses(states).ravel(), (jacobian @ tangents[0]).ravel()
+        along, jacobian = states_and_jacobian(weights, rebuild, data)
+        return data.missed_by(along.recorded).ravel(), (jacobian @ tangents[0]).ravel()
 
     solution = optx.least_squares(
         residual,

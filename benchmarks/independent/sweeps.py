@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from independent.material import RateLaw
+
 SAMPLES = 128
 """Of one cycle."""
 
@@ -25,6 +27,31 @@ def first_harmonic(times: np.ndarray, stress: np.ndarray, frequency: float) -> c
     """Return G′ + iG″ times the strain of a stress over one cycle, for the strain sin ωt."""
     turn = np.exp(-1j * frequency * times)
     return complex(2j * np.mean(stress * turn))
+
+
+def modulus_of(law: RateLaw, strain: float, frequency: float, cycles: int) -> complex:
+    """Return G′ + iG″ in Pa of a law after so many cycles of a strain γ₀ sin ωt.
+
+    Parameters
+    ----------
+    law
+        Of the modes.
+    strain, frequency, cycles
+        γ₀, ω in rad/s, and how many cycles are waited for.
+    """
+    scale = law.scale()
+
+    def rate(t):
+        return strain * frequency * np.cos(frequency * t)
+
+    def change(t, scaled):
+        return law.change(scale * scaled, rate(t)) / scale
+
+    times, values = oscillating(change, law.rest() / scale, frequency, cycles)
+    pairs = zip(times, (scale[:, None] * values).T, strict=True)
+    stress = np.array([law.stress(state, rate(t))[0, 1] for t, state in pairs])
+    # least squares by sine and cosine, evenly sampled over whole cycles
+    return first_harmonic(times, stress, frequency) / strain
 
 
 def giesekus_modulus(

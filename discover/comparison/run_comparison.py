@@ -8,7 +8,7 @@ from discover.comparison.comparison import Comparison, SweepPoint
 from discover.comparison.description import data_in_words, known_in_words
 from discover.comparison.equations import known_equation
 from discover.comparison.fitting.prepared import (
-    at_rates,
+    prepared,
     require_one_known_law,
     settled_by,
     thinned_to,
@@ -73,7 +73,7 @@ def compare(
         If the study asks for something that its data cannot give.
     """
     options = study.compare
-    data = at_rates(load_study_data(study, seed) if data is None else data)
+    data = prepared(load_study_data(study, seed) if data is None else data)
     if made is None:  # estimators that are fitted already saw every sample
         data = thinned_to(data, options.most_samples)
     require_teacher(study)

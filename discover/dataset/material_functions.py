@@ -1,7 +1,7 @@
 """Tables of material functions beside the runs, as runs that can be fitted with them."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from discover.errors import InputError
 from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import (
     imposed_stress,
-    jumps_at_start,
+    jumps,
     oscillations,
     steady_rates,
 )
@@ -225,27 +225,23 @@ TABLES = tuple(_READERS)
 modes and is fitted or judged only where that is asked for."""
 
 
-def at_measured_rate(run: Run) -> Run:
-    """Return a run at a given stress as one that follows the rate derived from its strain.
+def as_compared(runs: Iterable[Run]) -> list[Run]:
+    """Return runs as learners take them.
 
-    A flow curve stays what it is, for its steady states are solved for.
+    One at a given stress that never jumps follows the rate derived from its strain. Where it jumps,
+    as in creep, no finite rate follows: the stress is imposed, and the strain is what is observed.
+    Oscillations become a record of each modulus; a flow curve stays what it is.
 
-    Raises
-    ------
-    InputError
-        If the stress was put on at once, which no finite rate follows, or it holds moduli.
+    Parameters
+    ----------
+    runs
+        Of any control.
     """
-    if run.protocol.control in ("rate", "steady"):
+    return [_followed(record) for run in runs for record in run.records]
+
+
+def _followed(run: Run) -> Run:
+    if run.protocol.control != "stress" or jumps(run.protocol):
         return run
-    if run.protocol.control == "oscillation":
-        raise InputError(
-            f"{run.name} holds moduli of oscillations, which a learner that follows a rate in time "
-            "cannot fit. discover close-loop fits them; leave it out here."
-        )
-    if jumps_at_start(run.protocol):
-        raise InputError(
-            f"{run.name} is a creep test: its strain jumps with the stress, and no rate can be "
-            "followed through a jump. discover close-loop fits it; leave it out here."
-        )
     protocol = in_flow(sampled_rate(run.time, run.rate), run.flow)
     return replace(run, protocol=protocol, rate_is_measured=True)

@@ -10,8 +10,9 @@ from jaxtyping import Float
 
 from discover.dataset.columns import as_column
 from discover.errors import InputError
+from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
-from discover.protocols.kinematics import MODULI, FlowKind, RecordedQuantity
+from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
 
 SLOWEST_RATE = 1e-12
@@ -45,7 +46,7 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
         Of the flow.
     """
     size = np.full(len(values), np.sqrt(np.mean(values**2)))
-    if protocol.control in ("steady", "oscillation"):
+    if protocol.control in STATES:
         largest = float(np.max(np.abs(values), initial=0.0))
         size = np.maximum(np.abs(values), _LEAST_STEADY * largest)
     return np.where(size > 0, size, 1.0)
@@ -164,6 +165,10 @@ class Run:
         if self.rate_before != 0.0 and self.from_rest and self.time[-1] > 0.0:
             begun = after_steady_flow(self.protocol, self.rate_before, float(self.time[-1]))
             object.__setattr__(self, "protocol", begun)
+        unpaced = self.protocol.control == "stress" and self.protocol.table_strains is None
+        if unpaced and self.strain is not None:
+            paced = paced_by(self.protocol, self.time, self.strain)
+            object.__setattr__(self, "protocol", paced)
 
     def __len__(self) -> int:
         return self.time.shape[0]
@@ -256,7 +261,7 @@ class Run:
     @property
     def records(self) -> "tuple[Run, ...]":
         """What of the run is fitted or judged by default: itself, or the moduli of oscillations."""
-        if self.protocol.control != "oscillation":
+        if self.protocol.control != "oscillation" or self.name != self.source:
             return (self,)
         return tuple(replace(self, name=self.source).observing(modulus) for modulus in MODULI)
 

@@ -8,12 +8,12 @@ from scipy.optimize import minimize_scalar
 
 from discover.dataset.run import SLOWEST_RATE, Run
 from discover.protocols.control import jumps_at_start
+from discover.protocols.kinematics import STATES
 
 # share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
 # many where the stress was commanded, and noise
 _PERIODIC = 0.7
 _VARYING = "varying rate"
-_STATES = ("steady", "oscillation")
 
 
 def run_line(run: Run) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def run_line(run: Run) -> dict[str, Any]:
         "flow": _oscillating(run) if wave and flow == _VARYING else flow,
         "samples": len(run),
         # of states, time counts the samples
-        "duration_s": None if run.protocol.control in _STATES else float(run.time[-1]),
+        "duration_s": None if run.protocol.control in STATES else float(run.time[-1]),
         "largest_rate_1_s": float(np.max(np.abs(run.rate))),
         "frequency_rad_s": wave[0] if wave else None,
         "strain_amplitude": wave[1] / wave[0] if wave else None,

@@ -1,6 +1,7 @@
 """Periodic states of a fluid in oscillatory shear, and the moduli of their first harmonic."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -29,12 +30,17 @@ _MIRROR = (1.0, 1.0, 1.0, -1.0)
 
 
 class _Half(NamedTuple):
-    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends."""
+    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends.
+
+    The last once more for each mode where that is asked for, without the factor of the states,
+    shape (s, k).
+    """
 
     stress: Float[Array, "s k"]
     levels: tuple[Float[Array, "..."], ...]
     left: tuple[Float[Array, "..."], ...]
     wave: Float[Array, " s"]
+    of_modes: Float[Array, "s k"]
 
 
 class _Iterate(NamedTuple):
@@ -96,7 +102,7 @@ def complex_modulus(
         return 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
 
     def improved(now: _Iterate) -> _Iterate:
-        found, jacobian = _with_derivative(half, now)
+        found, jacobian = _end_with_derivative(half, now.modes.stress, now.levels, now.felt)
         # what changed beside the modes since may cost its share
         modes, better = next_approximation(now.modes, found.stress, jacobian, _SHARE * now.moved)
         levels = tuple(
@@ -157,6 +163,103 @@ def complex_modulus(
     return jnp.where(end.change < _TOLERANCE, found, jnp.nan)
 
 
+class _Solving(NamedTuple):
+    """An approximation, its last change, and the derivatives of half a cycle and its harmonic."""
+
+    modes: Approximation
+    change: Float[Array, ""]
+    jacobian: Float[Array, "k s s"]
+    harmonics: Complex[Array, "s k"]
+
+
+class PeriodicState(NamedTuple):
+    """Where a cycle of an oscillation begins and ends, at zero strain, and its moduli.
+
+    Attributes
+    ----------
+    stress
+        Dimensionless, of the modes, shape (s, k).
+    modulus
+        G′ + iG″ in Pa of the first harmonic.
+    """
+
+    stress: Float[Array, "s k"]
+    modulus: Complex[Array, ""]
+
+
+def periodic_state(
+    dynamics: Dynamics,
+    fixed: Dynamics,
+    strain: Float[Array, ""],
+    frequency: Float[Array, ""],
+    phase: Float[Array, " m"],
+) -> PeriodicState:
+    """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
+
+    They are those of the implicit function: none passes through the iteration.
+
+    Parameters
+    ----------
+    dynamics
+        The fluid; no state changes with it, and nothing gives way in series.
+    fixed
+        The same, through which no derivative passes.
+    strain, frequency, phase
+        As in `complex_modulus`.
+    """
+    wave = frequency * jnp.cos(phase)
+    width = (phase[2] - phase[0]) / frequency
+    solve = _half_cycle(fixed, wave, width, by_mode=True)
+    half = _half_cycle(dynamics, wave, width, by_mode=True)
+    slowness = frequency * fixed.modes.relaxation_time
+
+    def turned(now, unit):
+        """Return where half a cycle ends, its harmonics, and how a direction moves both."""
+
+        def of(stress):
+            end = solve(stress, (), strain)
+            of_mode = jax.vmap(first_harmonic, in_axes=(-1, None))
+            return end.stress, of_mode(end.of_modes, phase[::2])
+
+        direction = unit[:, None] * jnp.ones(now.shape)
+        return jax.jvp(of, (now,), (direction,))
+
+    def improved(now: _Solving) -> _Solving:
+        units = jnp.eye(len(now.modes.stress))
+        (end, _), (ends, harmonics) = jax.vmap(
+            partial(turned, now.modes.stress), out_axes=(None, 0)
+        )(units)
+        jacobian = jnp.moveaxis(ends, 2, 0)
+        following, better = next_approximation(now.modes, end, jacobian)
+        change = relative_change(now.modes, following, slowness, _TOLERANCE)
+        change = jnp.where(jnp.all(better), change, jnp.inf)
+        return _Solving(following, change, jacobian, harmonics)
+
+    size, modes = fixed.rest()[0].shape
+    end = jax.lax.while_loop(
+        lambda now: (
+            (now.modes.number < _MOST)
+            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
+        ),
+        improved,
+        _Solving(
+            first_approximation(fixed.rest()[0]),
+            jnp.asarray(jnp.inf),
+            jnp.zeros((modes, size, size)),
+            jnp.zeros((size, modes), dtype=complex),
+        ),
+    )
+    end = jax.lax.stop_gradient(end)
+    found = half(end.modes.stress, (), strain)
+    # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
+    matrix = jnp.eye(size) - jnp.swapaxes(end.jacobian, 1, 2)
+    step = jnp.linalg.solve(matrix, (found.stress - end.modes.stress).T[:, :, None])[:, :, 0].T
+    recorded = found.wave + dynamics.viscosity * strain * wave[::2]
+    whole = first_harmonic(recorded, phase[::2]) + jnp.sum(end.harmonics * step)
+    whole = jnp.where(end.change < _TOLERANCE, whole / strain, jnp.nan)
+    return PeriodicState(end.modes.stress + step, whole)
+
+
 def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Complex[Array, ""]:
     """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
 
@@ -172,21 +275,19 @@ def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Com
     return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
 
-def _with_derivative(half, now: _Iterate) -> tuple[_Half, Float[Array, "k s s"]]:
+def _end_with_derivative(half, stress, levels, felt) -> tuple[_Half, Float[Array, "k s s"]]:
     """Return half a cycle, and of each mode the derivative of its end: direction, component."""
 
     def along(unit):
-        direction = unit[:, None] * jnp.ones(now.modes.stress.shape)
-        of_stress = jax.jvp(
-            lambda stress: half(stress, now.levels, now.felt), (now.modes.stress,), (direction,)
-        )
-        return of_stress[0], of_stress[1].stress
+        direction = unit[:, None] * jnp.ones(stress.shape)
+        end, moved = jax.jvp(lambda stress: half(stress, levels, felt), (stress,), (direction,))
+        return end, moved.stress
 
-    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(now.modes.stress)))
+    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(stress)))
     return found, jnp.moveaxis(tangents, 2, 0)
 
 
-def _half_cycle(dynamics: Dynamics, wave, width):
+def _half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
     """Return the function from state and strain amplitude to what half a cycle makes of them."""
     combined = dynamics.combined
     weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
@@ -205,6 +306,9 @@ def _half_cycle(dynamics: Dynamics, wave, width):
     tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
     mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
 
+    def of_modes(stress):
+        return stress[3] * dynamics.modes.modulus if by_mode else jnp.zeros(0)
+
     def half(stress, levels, amplitude) -> _Half:
         rate = amplitude * wave
 
@@ -217,28 +321,28 @@ def _half_cycle(dynamics: Dynamics, wave, width):
             slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
             w = dynamics.weights_of_step(weights, width, slow[1])
 
-            def remainder(stress, rate, now):
+            def stage(stress, given):
+                rate, now = given
                 change = slow[1] * dynamics.change(stress, rate, now, None)
-                return w.remainder(stress, change, dynamics.decay)
+                return w.remainder(stress, change, dynamics.decay), ()
 
-            n1 = remainder(stress, first, slow[0])
-            n2 = remainder(w.second(stress, n1), middle, slow[1])
-            n3 = remainder(w.third(stress, n1, n2), middle, slow[1])
-            n4 = remainder(w.fourth(stress, n1, n3), last, slow[2])
-            stress = w.end(stress, n1, n2, n3, n4)
+            felt = jnp.stack([first, middle, middle, last])
+            factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
+            stress, _ = w.step(stress, stage, (felt, factors), 1 if by_mode else 4)
             after = combined("modulus_factor", at_end) * sheared(stress, middle)
             levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
             left = [a * b for a, b in zip(left, kept, strict=True)]
-            return (stress, levels, left), combined("modulus_factor", levels) * sheared(
-                stress, last
-            )
+            recorded = combined("modulus_factor", levels) * sheared(stress, last)
+            return (stress, levels, left), (recorded, of_modes(stress))
 
         begun = combined("modulus_factor", levels) * sheared(stress, rate[0])
+        begun_by_mode = of_modes(stress)
         start = (stress, list(levels), [jnp.ones_like(level) for level in levels])
-        (stress, levels, left), recorded = jax.lax.scan(
+        (stress, levels, left), (recorded, each) = jax.lax.scan(
             step, start, (rate[:-2:2], rate[1::2], rate[2::2])
         )
         recorded = jnp.concatenate([begun[None], recorded])
-        return _Half(mirror * stress, tuple(levels), tuple(left), recorded)
+        each = jnp.concatenate([begun_by_mode[None], each])
+        return _Half(mirror * stress, tuple(levels), tuple(left), recorded, each)
 
     return half

@@ -30,7 +30,7 @@ from discover.forward.batches import (
 )
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
-from discover.forward.imposed_stress import strain_at_stress
+from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.integrator import integrate
 from discover.forward.periodic_start import Cycle
 from discover.forward.periodic_states import complex_modulus, first_harmonic
@@ -237,7 +237,8 @@ class Program:
                 imposed = (imposed - nothing) / (unit - nothing)
         inertia = _where_in_shear(flow, inertia, jnp.zeros(()))
         imposed = _where_in_shear(flow, imposed, run.imposed)
-        return strain_at_stress(dynamics, run.times, imposed, inertia, flow)[run.sample_index]
+        answer = answer_to_stress(dynamics, run.times, imposed, inertia, flow)
+        return answer.strain[run.sample_index]
 
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
         """Return the stress after an effect of the torque's signal, where that is recorded."""

@@ -1,6 +1,7 @@
 """What a learner is told of the fluid before it fits."""
 
 import inspect
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.checking import check_law
@@ -123,3 +125,29 @@ def known_part(estimator: Any) -> KnownPart:
 
 def _same(value: Any, default: Any) -> bool:
     return value is default or (np.ndim(value) == 0 and bool(value == default))
+
+
+def require_known_rate(known: KnownPart, runs: Sequence[Run]) -> None:
+    """Refuse runs without a rate beside a known law that carries more than its stress.
+
+    Parameters
+    ----------
+    known
+        What the learner is told.
+    runs
+        What it is to learn from.
+
+    Raises
+    ------
+    InputError
+        If there is such a run.
+    """
+    if known.law is None or not (known.law.variables or known.law.retracts):
+        return
+    for run in runs:
+        if run.protocol.control not in ("rate", "steady"):
+            raise InputError(
+                f"The run {run.name!r} has no rate that is known beforehand, and a learner does "
+                f"not solve for it beside {type(known.law).__name__}, which has more than a "
+                "stress. Leave the run out, or use close_loop, which takes it."
+            )

@@ -122,12 +122,14 @@ class RunPrediction:
         return labelled_draws(self, seed)
 
     def predict(self, X: Iterable[Run]) -> Float[np.ndarray, " rows"]:
-        """Return σ12 in Pa at the samples of all runs, one run after the other.
+        """Return what is recorded at the samples of all runs, one run after the other.
+
+        σ12 in Pa, in extension the tensile stress; of creep the strain, of a sweep G′ and then G″.
 
         Parameters
         ----------
         X
-            Runs or a data set; of their stresses nothing is used.
+            Runs or a data set; of their records nothing is used but a stress that was imposed.
 
         Raises
         ------
@@ -140,13 +142,13 @@ class RunPrediction:
         return np.concatenate(self._predict_runs(as_runs(X, self.fluid_.relaxation_time)))
 
     def score(self, X: Iterable[Run], y=None, sample_weight=None) -> float:
-        """Return one minus the relative error of σ12, averaged over runs: 1 is perfect.
+        """Return one minus the relative error of what is recorded, averaged over runs.
 
         The error of a run is the root-mean-square of prediction minus measurement over the
-        root-mean-square of the measurement, so that predicting no stress scores 0, and noise of
-        2 % leaves 0.98 to the true law. It is not R²: a relative error is what rheologists quote,
-        and it does not depend on the mean of a signal that oscillates about zero. A law that runs
-        away scores minus infinity.
+        root-mean-square of the measurement, so that 1 is perfect, predicting nothing scores 0, and
+        noise of 2 % leaves 0.98 to the true law. It is not R²: a relative error is what rheologists
+        quote, and it does not depend on the mean of a signal that oscillates about zero. A law that
+        runs away scores minus infinity.
 
         Parameters
         ----------
@@ -167,4 +169,4 @@ class RunPrediction:
 
     @abstractmethod
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        """Return σ12 in Pa of each run."""
+        """Return what is recorded of each run."""

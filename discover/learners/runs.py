@@ -1,11 +1,11 @@
-"""The runs that a learner takes, each as one that follows a rate in time."""
+"""The runs that a learner takes."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from discover.dataset.material_functions import at_measured_rate
+from discover.dataset.material_functions import as_compared
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.first_use import require_double
@@ -14,16 +14,16 @@ from discover.protocols import settled
 
 
 def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
-    """Return the runs as a list, each as one that follows a rate in time.
+    """Return the runs as a list, each as `as_compared` has it.
 
-    One at a given stress follows its measured rate. One that starts periodic gets as many cycles
-    before it as the longest relaxation time, of these in s, needs.
+    One that starts periodic gets as many cycles before it as the longest relaxation time, of these
+    in s, needs.
 
     Raises
     ------
     InputError
-        If there is none, one is something else or follows no rate (a flow curve, a creep test), a
-        mode is too slow to become periodic, or JAX computes in single precision.
+        If there is none, one is something else, a mode is too slow to become periodic, or JAX
+        computes in single precision.
     """
     require_double()
     if isinstance(runs, Run):
@@ -46,5 +46,4 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
                 "folder or make a synthetic data set."
             )
     longest = float(np.max(np.asarray(relaxation_time)))
-    followed = [at_measured_rate(run) for run in listed]
-    return [replace(run, protocol=settled(run.protocol, longest)) for run in followed]
+    return [replace(run, protocol=settled(run.protocol, longest)) for run in as_compared(listed)]

@@ -10,11 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from discover.forward.fluids import observed_on_grid
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.simulate.flow_batch import FlowBatch
-from discover.simulate.solve import observed_on_grid
 from discover.statistics.weighted_quantiles import weighted_quantiles
 
 QUANTITIES = ("sigma12", "N1", "N2")

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.protocols.kinematics import STATES, Control
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
 # A step of stress: over this share of the time to the next sample. A jump of the record exceeds
@@ -37,8 +38,13 @@ def oscillations(
     strains, frequencies
         Amplitude and rad/s of each, shape (n,).
     """
-    amplitudes = np.asarray(strains, dtype=float) * np.asarray(frequencies, dtype=float)
-    return replace(steady_rates(amplitudes), control="oscillation", modulus="storage_modulus")
+    strains = np.asarray(strains, dtype=float)
+    return replace(
+        steady_rates(strains * np.asarray(frequencies, dtype=float)),
+        control="oscillation",
+        modulus="storage_modulus",
+        table_strains=jnp.asarray(strains),
+    )
 
 
 def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:
@@ -90,6 +96,59 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
         control="stress",
         begins=jnp.asarray(begins),
     )
+
+
+def drawn_against(
+    control: Control,
+    time: Float[np.ndarray, " n"],
+    rate: Float[np.ndarray, " n"],
+    strain: Float[np.ndarray, " n"],
+) -> tuple[str, Float[np.ndarray, " n"]]:
+    """Return what a record is drawn against, in words with the unit, and its values.
+
+    Time where it goes on in time, of a flow curve the rate, of oscillations frequency or amplitude,
+    whichever varies.
+
+    Parameters
+    ----------
+    control
+        What is imposed.
+    time, rate, strain
+        Of the samples, shape (n,).
+    """
+    if control not in STATES:
+        return "time (s)", time
+    if control == "steady":
+        return "shear rate (1/s)", np.abs(rate)
+    frequency = rate / strain
+    if np.max(frequency) > (1.0 + 1e-6) * np.min(frequency) and np.ptp(strain) == 0.0:
+        return "frequency (rad/s)", frequency
+    return "strain amplitude", strain
+
+
+def paced_by(
+    protocol: FlowProtocol, times: Float[np.ndarray, " n"], strain: Float[np.ndarray, " n"]
+) -> FlowProtocol:
+    """Return a protocol at a given stress whose integration keeps pace with a recorded strain.
+
+    Parameters
+    ----------
+    protocol
+        From `imposed_stress`.
+    times, strain
+        Of the samples, shape (n,).
+    """
+    recorded = np.interp(np.asarray(protocol.table_times), times, strain)
+    return replace(protocol, table_strains=jnp.asarray(recorded))
+
+
+def jumps(protocol: FlowProtocol) -> bool:
+    """Return whether a stress that is imposed jumps at any time, as in creep and in recovery."""
+    if protocol.control != "stress":
+        return False
+    width = np.diff(np.asarray(protocol.table_times))
+    # a jump takes a small share of the time to the next sample
+    return jumps_at_start(protocol) or bool(np.any(width[:-1] < 2.0 * _AT_ONCE * width[1:]))
 
 
 def jumps_at_start(protocol: FlowProtocol) -> bool:

@@ -29,6 +29,9 @@ Control = Literal["rate", "stress", "steady", "oscillation"]
 """What a protocol imposes: a rate, a stress, rates each held until the flow is steady, or
 oscillations each gone on until they are periodic."""
 
+STATES: tuple[Control, ...] = ("steady", "oscillation")
+"""Controls of which each sample is a state of its own, and time only counts them."""
+
 KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
 """Flows by name; the first is the default everywhere."""
 

@@ -53,6 +53,9 @@ class FlowProtocol(eqx.Module):
         only counts the samples.
     modulus
         Which modulus is recorded of oscillations.
+    table_strains
+        Strain that belongs to the table, shape (m,): the amplitude of oscillations; at a given
+        stress the strain recorded, which only sets the pace of the integration. None elsewhere.
     """
 
     table_times: Float[Array, " m"]
@@ -65,6 +68,7 @@ class FlowProtocol(eqx.Module):
     kinematics: Kinematics | None = None
     control: Control = eqx.field(static=True, default="rate")
     modulus: RecordedQuantity | None = eqx.field(static=True, default=None)
+    table_strains: Float[Array, " m"] | None = None
 
     def velocity_gradient(self, time: Float[Array, ""]) -> VelocityGradient:
         """Return L(t) in 1/s: its four components, or the scalar shear rate in simple shear."""
@@ -93,6 +97,11 @@ class FlowProtocol(eqx.Module):
         table = _interpolate(time, self.table_times, self.table_rates)
         waves = self.amplitudes * jnp.cos(self.frequencies * time + self.phases)
         return table + jnp.sum(waves)
+
+    def strain_in_table(self, time: Float[Array, ""]) -> Float[Array, ""]:
+        """Return the strain that belongs to the table, such as the amplitude of an oscillation."""
+        assert self.table_strains is not None
+        return _interpolate(jnp.asarray(time), self.table_times, self.table_strains)
 
     def strain(self, time: Float[Array, ""]) -> Float[Array, ""]:
         """Return the strain since t = 0, exactly integrated."""
@@ -293,8 +302,10 @@ def stack_protocols(protocols: Sequence[FlowProtocol]) -> FlowProtocol:
     m = max(p.table_times.shape[0] for p in protocols)
     c = max(p.amplitudes.shape[0] for p in protocols)
     flows = of_one_kind([p.kinematics for p in protocols])
+    # at a given stress it has paced the grid by now
+    bare = [replace(p, table_strains=None) if p.control == "stress" else p for p in protocols]
     stacked = [
-        replace(_padded(p, m, c), kinematics=flow) for p, flow in zip(protocols, flows, strict=True)
+        replace(_padded(p, m, c), kinematics=flow) for p, flow in zip(bare, flows, strict=True)
     ]
     return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
 
@@ -303,6 +314,9 @@ def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
     # in numpy: every operation of JAX's outside a program is a program of its own to compile
     times, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     rows = entries - times.size
+    strains = protocol.table_strains
+    if strains is not None:
+        strains = np.pad(np.asarray(strains), (0, rows), mode="edge")
     waves = (0, cosines - protocol.amplitudes.shape[0])
     amplitudes, frequencies, phases = (
         jnp.asarray(np.pad(np.asarray(v), waves))
@@ -315,6 +329,7 @@ def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
         amplitudes=amplitudes,
         frequencies=frequencies,
         phases=phases,
+        table_strains=None if strains is None else jnp.asarray(strains),
     )
 
 
@@ -334,6 +349,13 @@ def shear_rates(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float
 def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return the strain since t = 0 at many times in s, shape (n,)."""
     return _at_many(FlowProtocol.strain, protocol, times)
+
+
+def strains_in_table(
+    protocol: FlowProtocol, times: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return the strains of the table at many times, such as amplitudes, shape (n,)."""
+    return _at_many(FlowProtocol.strain_in_table, protocol, times)
 
 
 def _at_many(function, protocol, times):

@@ -26,7 +26,8 @@ def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
     flows
         From `lay_out`.
     """
-    if not fluid.law.retracts:
+    followed = all(protocols.control in ("rate", "steady") for protocols, _ in flows.parts)
+    if not fluid.law.retracts or not followed:
         return flows
     pieces, coarse = 1, np.asarray(solve_batch(fluid, flows))
     while pieces < _MOST_PIECES:

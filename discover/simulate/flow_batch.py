@@ -13,6 +13,9 @@ from jaxtyping import Array, Bool, Float, Int
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 
+# Of its strain, what an oscillation keeps that is to be still: without any it has no modulus
+_SMALL_STRAIN = 1e-3
+
 
 class FlowBatch(eqx.Module):
     """Flows and their grids, those of one control together, for each has a program of its own.
@@ -38,8 +41,13 @@ class FlowBatch(eqx.Module):
 
     @property
     def n_steps(self) -> int:
-        """Steps of all runs."""
-        return sum(grid.times.size for _, grid in self.parts)
+        """Steps of all runs; of oscillations those of one half cycle for each state."""
+        return sum(
+            grid.times.size
+            if grid.phase is None
+            else grid.sample_index.size * grid.phase.shape[-1] // 2
+            for _, grid in self.parts
+        )
 
     def over(self, function: Callable[..., Any], *batched: Any) -> Any:
         """Return what a function makes of each flow and its grid, runs in their order.
@@ -89,15 +97,25 @@ class FlowBatch(eqx.Module):
         return FlowBatch(tuple(parts), self.rows)
 
     def faster(self, factor: Float[Array, " runs"]) -> "FlowBatch":
-        """Return the flows with the rate of each multiplied; their grids stay."""
+        """Return the flows with the rate of each multiplied; their grids stay.
+
+        Oscillations keep their frequency, and some strain. A given stress may fall but not rise:
+        not every fluid bears more.
+        """
         parts = []
         for (protocols, grids), rows in zip(self.parts, self.rows, strict=True):
             own = factor[jnp.asarray(rows)][:, None]
-            changed = eqx.tree_at(
-                lambda flow: (flow.table_rates, flow.amplitudes),
-                protocols,
-                (protocols.table_rates * own, protocols.amplitudes * own),
-            )
+            if protocols.control == "stress":
+                own = jnp.minimum(own, 1.0)
+            oscillates = protocols.table_strains is not None
+            if oscillates:
+                own = jnp.maximum(own, _SMALL_STRAIN)
+
+            def moved(flow, oscillates=oscillates):
+                strains = [flow.table_strains] if oscillates else []
+                return [flow.table_rates, flow.amplitudes, *strains]
+
+            changed = eqx.tree_at(moved, protocols, [own * leaf for leaf in moved(protocols)])
             parts.append((changed, grids))
         return FlowBatch(tuple(parts), self.rows)
 
@@ -125,11 +143,11 @@ def lay_out(
     **limits
         As `make_grids` takes them.
     """
-    controls = list(dict.fromkeys(protocol.control for protocol in protocols))
+    kinds = [(protocol.control, protocol.modulus) for protocol in protocols]
     n = max(n_samples, *(len(sampled) for sampled in times))
     parts, rows = [], []
-    for control in controls:
-        own = tuple(i for i, protocol in enumerate(protocols) if protocol.control == control)
+    for kind in dict.fromkeys(kinds):
+        own = tuple(i for i, other in enumerate(kinds) if other == kind)
         flows = [protocols[i] for i in own]
         grids = make_grids(flows, [times[i] for i in own], **limits)
         parts.append((stack_protocols(flows), _with_samples(grids, n)))
@@ -142,8 +160,5 @@ def _with_samples(grids: IntegrationGrid, n: int) -> IntegrationGrid:
     more = ((0, 0), (0, n - index.shape[1]))
     if not more[1][1]:
         return grids
-    return IntegrationGrid(
-        grids.times,
-        jnp.asarray(np.pad(index, more, mode="edge")),
-        jnp.asarray(np.pad(mask, more)),
-    )
+    longer = jnp.asarray(np.pad(index, more, mode="edge")), jnp.asarray(np.pad(mask, more))
+    return IntegrationGrid(grids.times, *longer, grids.phase)

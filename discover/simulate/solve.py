@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
@@ -134,10 +135,18 @@ def simulate(
 
     Raises
     ------
+    InputError
+        If the flow is not at a given rate.
     SimulationError
         If no solution to this tolerance was found within 100,000 steps.
     """
     times = np.asarray(times, dtype=float)
+    if protocol.control in ("stress", "oscillation"):
+        raise InputError(
+            "simulate takes flows at a given rate, in time or steady; got one of control "
+            f"{protocol.control!r}. A learned law's predict() and compare() take runs of any "
+            "control."
+        )
     if protocol.control == "steady":
         return _steady(fluid, protocol, times)
     end = float(times[-1])
@@ -228,15 +237,6 @@ def solve_on_grid(
     return jnp.asarray(solution.ys)[grid.sample_index]
 
 
-def observed_on_grid(
-    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
-) -> Float[Array, "n 3"]:
-    """Return the recorded stress, N1 and N2 in Pa at the samples of one grid, shape (n, 3)."""
-    stress = solve_on_grid(fluid, protocol, grid)
-    s11, s22, s33, _ = stress.T
-    return jnp.stack([protocol.recorded_stress(stress.T), s11 - s22, s22 - s33], axis=-1)
-
-
 def solve_states_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> Float[Array, "n k s"]:
@@ -262,7 +262,7 @@ def _in_steady_flow(fluid, protocol, grid, observe):
         state = steady_state(fluid, protocol.velocity_gradient(time))
         return state if observe is None else observe(time, state, (fluid, protocol))
 
-    return jax.vmap(at)(grid.times[grid.sample_index])
+    return jax.vmap(at)(grid.sample_times)
 
 
 @compiled

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from discover.comparison import compare
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
 from discover.errors import InputError
@@ -180,16 +179,14 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
 
 
-def test_the_comparison_refuses_creep_that_its_learners_cannot_follow(tmp_path):
-    folder = write(tmp_path, {"creep.csv": TABLES["creep.csv"]})
-    with pytest.raises(InputError, match=r"is a creep test: .* discover close-loop fits it"):
-        compare(study(folder))
+def test_an_estimator_takes_creep_as_its_strain_and_a_sweep_as_its_moduli(tmp_path):
+    from discover.learners.runs import as_runs
 
-
-def test_the_comparison_refuses_moduli(tmp_path):
-    folder = write(tmp_path, {"lve.csv": SWEEPS["lve.csv"]})
-    with pytest.raises(InputError, match=r"holds moduli .* discover close-loop fits them"):
-        compare(study(folder))
+    tables = load_dataset(write(tmp_path, TABLES | SWEEPS)).material_functions
+    taken = as_runs([tables["creep"], tables["amplitude_sweep"]])
+    assert [run.quantity for run in taken] == ["strain", "storage_modulus", "loss_modulus"]
+    # a second time nothing changes
+    assert [run.name for run in as_runs(taken)] == [run.name for run in taken]
 
 
 def test_an_estimator_takes_a_flow_curve_as_it_is_and_follows_the_rate_of_a_given_stress(tmp_path):

@@ -67,17 +67,19 @@ def test_the_network_is_told_of_steady_states_as_their_differences_say():
     )
     rebuild = Rebuild.everything(law)
     weights = rebuild.start
-    states, jacobian = states_and_jacobian(weights, rebuild, problem)
+    along, jacobian = states_and_jacobian(weights, rebuild, problem)
     direction = jax.random.normal(jax.random.key(2), weights.shape)
     step = 1e-5
     ends = [
-        problem.misses(states_and_jacobian(weights + s * direction, rebuild, problem)[0])
+        problem.missed_by(
+            states_and_jacobian(weights + s * direction, rebuild, problem)[0].recorded
+        )
         for s in (step, -step)
     ]
     expected = (ends[0] - ends[1]) / (2.0 * step)
     size = float(jnp.max(jnp.abs(expected)))
     np.testing.assert_allclose(jacobian @ direction, expected, atol=1e-6 * size)
-    assert bool(jnp.all(jnp.isfinite(states)))
+    assert bool(jnp.all(jnp.isfinite(along.states)))
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def law():
 @pytest.fixture(scope="module")
 def own(problem, law):
     """What that law does, with noise."""
-    seen = problem.target + problem.misses(trajectories(law, problem))
+    seen = problem.target + problem.missed_by(trajectories(law, problem).recorded)
     noise = np.random.default_rng(1).standard_normal(seen.shape)
     size = NOISE * jnp.sqrt(jnp.mean(seen**2, axis=1, keepdims=True))
     return eqx.tree_at(lambda tree: tree.target, problem, seen + size * noise)
@@ -109,7 +109,7 @@ def test_a_law_that_runs_away_at_twice_the_rate_is_taken_only_for_want_of_anothe
         (jnp.zeros(8).at[3].set(-0.05), jnp.zeros(8)),
     )
     assert endures(law, own)
-    assert np.all(np.isfinite(trajectories(wild, own)))
+    assert np.all(np.isfinite(trajectories(wild, own).states))
     assert not endures(wild, own)
     values = surprises([law, wild], own)
     assert np.isfinite(values[0])

@@ -11,6 +11,7 @@ from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
 from discover.protocols import strains
+from discover.protocols.kinematics import STATES
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
@@ -42,7 +43,7 @@ def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> li
         )
     cut = []
     for run in runs:
-        if run.protocol.control in ("steady", "oscillation"):
+        if run.protocol.control in STATES:
             cut.append(run)  # no course of a strain to be cut
             continue
         strain = np.abs(strain_of(run))

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import even
 from discover.forward.least_squares import Fit
+from discover.protocols.kinematics import STATES
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
 from discover.statistics.residual import (
     FEWEST_FAST,
@@ -73,7 +74,7 @@ class ToleratedMisfit:
 
     def _of_separate_samples(self, left: LackOfFit, rows, records) -> LackOfFit:
         """Return the same, but for a pattern in flow curves and sweeps, which no noise has."""
-        kinds = [run.protocol.control in ("steady", "oscillation") for run in self.resolution.runs]
+        kinds = [run.protocol.control in STATES for run in self.resolution.runs]
         separate = [
             (row, float(np.sqrt(np.mean(record**2))) or 1.0)
             for row, record, kind in zip(rows, records, kinds, strict=True)

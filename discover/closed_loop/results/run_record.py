@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.protocols.kinematics import Control, FlowKind
+from discover.protocols.control import drawn_against
+from discover.protocols.kinematics import STATES, Control, FlowKind
 
 
 @dataclass(frozen=True)
@@ -69,19 +70,12 @@ class RunRecord:
     @property
     def is_transient(self) -> bool:
         """Whether it goes on in time, and is no steady or periodic state."""
-        return self.control not in ("steady", "oscillation")
+        return self.control not in STATES
 
     @property
     def along(self) -> tuple[str, Float[np.ndarray, " n"]]:
         """What it is drawn against, and its values: time, shear rate, frequency or amplitude."""
-        if self.is_transient:
-            return "time (s)", self.time
-        if self.control == "steady":
-            return "shear rate (1/s)", np.abs(self.rate)
-        frequency = self.rate / self.strain
-        if np.max(frequency) > (1.0 + 1e-6) * np.min(frequency) and np.ptp(self.strain) == 0.0:
-            return "frequency (rad/s)", frequency
-        return "strain amplitude", self.strain
+        return drawn_against(self.control, self.time, self.rate, self.strain)
 
     @property
     def residual(self) -> Float[np.ndarray, "stages n"]:

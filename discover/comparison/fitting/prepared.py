@@ -1,10 +1,10 @@
 """The data of a comparison as learners take them, and what a comparison refuses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from discover.dataset import Run
-from discover.dataset.material_functions import at_measured_rate
+from discover.dataset.material_functions import as_compared
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.protocols import settled
@@ -12,10 +12,8 @@ from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
 
 
-def at_rates(data: StudyData) -> StudyData:
-    """Return data in which every run has a rate, in time or of a steady flow.
-
-    What has none is refused among the runs to fit, and set aside among those that only judge.
+def prepared(data: StudyData) -> StudyData:
+    """Return data whose runs are as learners take them.
 
     Parameters
     ----------
@@ -25,30 +23,14 @@ def at_rates(data: StudyData) -> StudyData:
     Raises
     ------
     InputError
-        If a run to fit has no rate, or if every run is to be held out in turn.
+        If every run is to be held out in turn.
     """
     if data.each:
         raise InputError(
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
             'such as held_out = ["fast.csv"].'
         )
-    followed = ("rate", "steady")
-    if all(run.protocol.control in followed for run in (*data.fit, *data.held_out)):
-        return data
-    fit = replace(data.fit, runs=tuple(at_measured_rate(run) for run in data.fit))
-    held, aside = [], dict(data.dataset.set_aside)
-    for run in data.held_out:
-        try:
-            held.append(at_measured_rate(run))
-        except InputError as error:
-            aside[run.name] = str(error).removesuffix(".")
-    held_out = replace(data.held_out, runs=tuple(held))
-    return replace(
-        data,
-        dataset=replace(data.dataset, runs=(*fit.runs, *held), set_aside=aside),
-        fit=fit,
-        held_out=held_out,
-    )
+    return _with_runs(data, as_compared)
 
 
 def settled_by(data: StudyData, relaxation_time: float) -> StudyData:
@@ -83,8 +65,12 @@ def thinned_to(data: StudyData, most: int) -> StudyData:
 
 
 def _with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
+    return _with_runs(data, lambda runs: map(change, runs))
+
+
+def _with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]) -> StudyData:
     parts = {
-        name: replace(part, runs=tuple(change(run) for run in part.runs))
+        name: replace(part, runs=tuple(change(part.runs)))
         for name in ("dataset", "fit", "held_out")
         for part in [getattr(data, name)]
     }

@@ -71,7 +71,8 @@ def corrected(
     Raises
     ------
     InputError
-        If an effect acts on a measured rate that contains it, or has a memory of the stress.
+        If an effect acts on a measured rate that contains it, or has a memory of the stress; or if
+        a run is not at a given rate in time.
     """
     runs = list(data.dataset.runs)
     for known in effects:
@@ -84,8 +85,16 @@ def corrected(
             )
     if not effects or not runs:
         return data, {}
+    other = next((run for run in runs if run.protocol.control != "rate"), None)
+    if other is not None:
+        names = ", ".join(known.name for known in effects)
+        raise InputError(
+            f"compare takes effects of an instrument ({names}) out of runs at a given rate in "
+            f"time, and {other.name} is none. Leave it out of [data], leave the effects out, or "
+            "use discover close-loop."
+        )
     batch = make_batch(runs)
-    assert isinstance(batch, RunBatch)  # a comparison has runs at a rate alone
+    assert isinstance(batch, RunBatch)  # at a rate alone
     values = [jnp.asarray(known.values, dtype=float) for known in effects]
     felt, gain, offset, missed = (
         np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, batch)

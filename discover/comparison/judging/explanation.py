@@ -9,6 +9,7 @@ import numpy as np
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.forward.fluids import FOLLOWED
 from discover.learners.registry import BANDS_ONLY
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
@@ -122,7 +123,9 @@ def _left(
             records.append(record)
             even.append(flow.even(record))
             rates.append(np.asarray(flow.rate, dtype=float))
-    found = lack_of_fit(residuals, records, expectation, rates, even)
+    # moduli that are constant are those of a linear fluid, and of no dead sensor
+    imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
+    found = lack_of_fit(residuals, records, expectation, imposed, even)
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"

@@ -272,7 +272,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
     time = mean_relaxation_time(fluid)
-    weissenberg = time * max(float(np.max(np.abs(flow.rate))) for flow in training)
+    weissenberg = time * max(flow.largest_rate for flow in training)
     deborah = time * max(_frequency(flow) for flow in training)
     protocols = [flow.protocol for flow in along]
     times = [_thinned(flow.times) for flow in along]
@@ -288,8 +288,8 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
 def _frequency(flow: Flow) -> float:
     """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
-    if flow.is_steady:
-        return 0.0
+    if flow.is_of_states:
+        return flow.frequency or 0.0
     whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
     return max(whole, flow.frequency or 0.0)
 

@@ -9,9 +9,18 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
 from discover.dataset.run import Run, sizes_of
+from discover.forward.fluids import observe
 from discover.laws.multimode import Fluid
+from discover.protocols.control import drawn_against
+from discover.protocols.kinematics import STATES
 from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
-from discover.protocols.protocol import FlowProtocol, oscillatory_shear, recorded_at, shear_rates
+from discover.protocols.protocol import (
+    FlowProtocol,
+    oscillatory_shear,
+    recorded_at,
+    shear_rates,
+    strains_in_table,
+)
 from discover.simulate.solve import ShearStress, SimulationError, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
@@ -83,7 +92,8 @@ class Flow:
     def records_shear_stress(self) -> bool:
         """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
 
-        Else it is the tensile stress, or a normal stress difference that is data of its own.
+        Else it is the tensile stress, a strain, a modulus, or a normal stress difference that is
+        data of its own.
         """
         return self.protocol.quantity == "sigma12"
 
@@ -93,19 +103,29 @@ class Flow:
         return self.protocol.flow == "shear"
 
     @property
-    def is_steady(self) -> bool:
-        """Whether it is a flow curve: each sample a steady state, and time counts them."""
-        return self.protocol.control == "steady"
+    def is_of_states(self) -> bool:
+        """Whether each sample is a steady or periodic state, and time only counts them."""
+        return self.protocol.control in STATES
+
+    @property
+    def records_strain(self) -> bool:
+        """Whether the stress is imposed, as in creep, and the strain is recorded."""
+        return self.protocol.quantity == "strain"
+
+    @property
+    def drawn(self) -> tuple[str, Float[np.ndarray, " n"]]:
+        """What the record is drawn against, in words, and its values."""
+        return drawn_against(self.protocol.control, self.times, self.rate, self.strain)
 
     @property
     def along(self) -> Float[np.ndarray, " n"]:
-        """What the record is drawn against: time in s, of a flow curve the rate in 1/s."""
-        return self.rate if self.is_steady else self.times
+        """What the record is drawn against: time in s, the rate in 1/s, frequency or amplitude."""
+        return self.drawn[1]
 
     def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """Return by what a record and its residual are multiplied so that noise has one size.
 
-        Ones but for a flow curve, whose noise is in proportion to each value.
+        Ones but for a flow curve or a sweep, whose noise is in proportion to each value.
         """
         size = sizes_of(record, self.protocol)
         return np.min(size) / size
@@ -113,6 +133,8 @@ class Flow:
     @property
     def frequency(self) -> float | None:
         """Largest angular frequency of the protocol in rad/s; None where it does not oscillate."""
+        if self.protocol.control == "oscillation":
+            return float(np.max(self.rate / self.strain))
         amplitudes = np.asarray(self._imposed.amplitudes)
         frequencies = np.abs(np.asarray(self._imposed.frequencies)[amplitudes != 0.0])
         return float(np.max(frequencies)) if frequencies.size else None
@@ -124,10 +146,31 @@ class Flow:
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
-        """Strain since the first sample, shape (n,); nan of steady states, which do not know it."""
-        if self.is_steady:
+        """Strain, shape (n,), nan of steady states, which do not know it.
+
+        Where the stress is imposed what was recorded, of oscillations the amplitude, else the
+        strain since the first sample.
+        """
+        if self.protocol.control == "steady":
             return np.full(self.times.shape, np.nan)
+        if self.records_strain:
+            return np.asarray(self.reference["sigma12"])
+        if self.is_of_states:
+            return strains_in_table(self.protocol, self.times)
         return cumulative_simpson(self.rate, x=self.times, initial=0.0)
+
+    @property
+    def largest_rate(self) -> float:
+        """Largest rate without its sign, in 1/s.
+
+        At a given stress the mean rate of the second half of the record, the samples halved: the
+        slope from sample to sample is of noise.
+        """
+        if self.records_strain and len(self.times) > 2:
+            middle = len(self.times) // 2
+            moved = abs(self.strain[-1] - self.strain[middle])
+            return float(moved / (self.times[-1] - self.times[middle]))
+        return float(np.max(np.abs(self.rate)))
 
     @property
     def title(self) -> str:
@@ -139,7 +182,7 @@ class Flow:
             i = int(np.flatnonzero(amplitudes)[0])
             size = "" if amplitudes[i] == 1 else f"{amplitudes[i]:g} "
             return f"γ̇ = {size}cos({'' if frequencies[i] == 1 else f'{frequencies[i]:g} '}t)"
-        if not np.any(amplitudes) and rates.size == 1 and not self.is_steady:
+        if not np.any(amplitudes) and rates.size == 1 and self.protocol.control == "rate":
             if self._imposed.flow != "shear":
                 return f"{self._imposed.flow} extension at ε̇ = {rates[0]:g}"
             return f"start-up at γ̇ = {rates[0]:g}"
@@ -201,12 +244,12 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference = stresses(exact[run.name], run.protocol)
     else:
         candidates = {
-            "sigma12": run.recorded,  # in extension the tensile stress, say
+            "sigma12": run.recorded,  # in extension the tensile stress, in creep the strain
             "N1": run.first_normal_stress_difference,
             "N2": run.second_normal_stress_difference,
         }
         reference = {key: value for key, value in candidates.items() if value is not None}
-    steady = run.protocol.control == "steady"
+    of_states = run.protocol.control in STATES
     return Flow(
         run.name,
         kind,
@@ -216,7 +259,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference,
         run.recorded if kind == "training" else None,
         is_truth=exact is not None,
-        training_end=float(run.time[-1]) if kind == "training" and not steady else None,
+        training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
         oscillatory=_oscillates(run.protocol, run.rate),
     )
 
@@ -241,8 +284,18 @@ def _exactly(truth: Fluid, protocol: FlowProtocol, times: np.ndarray) -> dict[st
 
 
 def _oscillates(protocol: FlowProtocol, rates: np.ndarray) -> bool:
+    if protocol.control != "rate":  # the slope of a noisy strain changes its sign at any time
+        return False
     changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
     return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
+
+
+def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
+    """Return what a fluid does in a flow, or None if it runs away."""
+    try:
+        return dict(zip(QUANTITIES, observe(fluid, flow.protocol, flow.times).T, strict=True))
+    except SimulationError:
+        return None
 
 
 def stresses(stress: ShearStress, protocol: FlowProtocol) -> dict[str, np.ndarray]:
@@ -252,14 +305,6 @@ def stresses(stress: ShearStress, protocol: FlowProtocol) -> dict[str, np.ndarra
         "N1": stress.first_normal_stress_difference,
         "N2": stress.second_normal_stress_difference,
     }
-
-
-def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
-    """Return what a fluid does in a flow, or None if its stress runs away."""
-    try:
-        return stresses(simulate(fluid, flow.protocol, flow.times), flow.protocol)
-    except SimulationError:
-        return None
 
 
 def relative_errors(prediction: Stresses | None, reference: Stresses) -> dict[str, float | None]:

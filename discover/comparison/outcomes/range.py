@@ -86,7 +86,7 @@ def place(flow: Flow, training: Sequence[Flow]) -> Placement:
     alike = [other for other in training if other.protocol.flow == kind]
     oscillates = flow.frequency is not None and len(frequencies) == len(training)
     return Placement(
-        _ratio(_largest(flow.rate), [_largest(f.rate) for f in alike or training]),
+        _ratio(flow.largest_rate, [f.largest_rate for f in alike or training]),
         _ratio(_largest(flow.strain), [_largest(f.strain) for f in alike or training]),
         _ratio(flow.frequency or 0.0, frequencies) if oscillates else None,
         "" if alike else kind,

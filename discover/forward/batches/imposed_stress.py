@@ -54,7 +54,7 @@ def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
     strain_step
         Largest strain of one step.
     """
-    grids = [stress_grid(run.protocol, run.time, run.recorded, strain_step) for run in runs]
+    grids = [stress_grid(run.protocol, run.time, strain_step) for run in runs]
     n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
     rows = []
     for run, grid in zip(runs, grids, strict=True):

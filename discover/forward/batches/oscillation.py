@@ -9,10 +9,7 @@ from jaxtyping import Array, Float
 
 from discover.dataset import Run
 from discover.protocols.kinematics import MODULI
-
-# Steps in half a cycle: at most this much strain in each, at least this many, and a limit that only
-# a strain given in the wrong unit reaches
-_FEWEST_STEPS, _MOST_STEPS = 12.0, 4000
+from discover.simulate.grid import half_cycle
 
 
 class OscillationBatch(eqx.Module):
@@ -69,9 +66,6 @@ def oscillations(
         jnp.asarray(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
         for column in zip(*sweeps, strict=True)
     )
-    # half a cycle goes through twice the amplitude
-    largest = max(float(np.max(strain)) for strain, _ in sweeps)
-    steps = int(min(np.ceil(max(2.0 * largest, _FEWEST_STEPS) / strain_step), _MOST_STEPS))
-    phase = np.linspace(0.0, np.pi, 2 * steps + 1)
+    phase = half_cycle(max(float(np.max(strain)) for strain, _ in sweeps), strain_step)
     phases = jnp.asarray(np.tile(phase, (len(sweeps), 1)))
     return OscillationBatch(strains, frequencies, phases), tuple(moduli)

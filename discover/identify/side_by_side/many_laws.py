@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from scipy.stats import norm
 from scipy.stats.qmc import LatinHypercube
 
+from discover.forward.fluids import observed_on_grid
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
@@ -20,7 +21,6 @@ from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.solve import observed_on_grid
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 

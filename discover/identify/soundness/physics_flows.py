@@ -9,12 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from discover.forward.fluids import at_samples
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.solve import solve_batch, solve_states_on_grid
+from discover.simulate.solve import solve_batch
 
 _CYCLES = 3
 _SAMPLES_A_CYCLE = 48
@@ -70,8 +71,7 @@ def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
 @compiled
 def _along(fluid, flows):
     def one(protocol, grid):
-        states = solve_states_on_grid(fluid, protocol, grid)
-        rates = jax.vmap(protocol.rate)(grid.times[grid.sample_index])
+        _, states, rates = at_samples(fluid, protocol, grid)
         at_mode = jax.vmap(partial(_energy, fluid.law), in_axes=(0, 0))
         scaled = rates[:, None] * fluid.relaxation_time
         smallest, dissipation = jax.vmap(at_mode)(states, scaled)

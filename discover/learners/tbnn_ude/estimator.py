@@ -16,11 +16,12 @@ from sklearn.utils.validation import check_is_fitted
 from discover.dataset.run import Run
 from discover.dataset.thinning import evenly_chosen
 from discover.errors import InputError
+from discover.forward.fluids import observed_in_batch
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import KnownPart, known_part
+from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
@@ -29,7 +30,7 @@ from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, t
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import law_misfit
 from discover.learners.tbnn_ude.prior import Cloud, sample_states
-from discover.learners.tbnn_ude.problem import TrainingProblem, make_problem
+from discover.learners.tbnn_ude.problem import STRAIN_STEP, TrainingProblem, make_problem
 from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
 from discover.learners.tbnn_ude.recipe_default import train_default, work
@@ -40,8 +41,9 @@ from discover.learners.tbnn_ude.spread import (
     member_predictions,
 )
 from discover.progress import Progress, by_steps
-from discover.protocols.protocol import FlowProtocol, recorded_at
-from discover.simulate.solve import solve_batch
+from discover.protocols.protocol import FlowProtocol
+from discover.simulate.enough_steps import in_enough_steps
+from discover.simulate.flow_batch import lay_out
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
 
@@ -177,6 +179,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         check_settings(self.get_params(deep=False))
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)
+        require_known_rate(known, runs)
         recipe = self._recipe()
         problem, fitted = _problem(runs, known), ""
         if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
@@ -253,16 +256,15 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         check_is_fitted(self, "fluid_")
-        fluid = self.fluid_
-        problem = make_problem(
-            runs,
-            np.asarray(fluid.modulus),
-            np.asarray(fluid.relaxation_time),
-            known_relaxation=fluid.law.linear_relaxation,
-            base=fluid.law,
+        flows = lay_out(
+            [run.protocol for run in runs],
+            [run.time for run in runs],
+            strain_step=STRAIN_STEP,
+            relaxation_time=self.fluid_.settling_time,
         )
-        stresses = np.asarray(solve_batch(self.fluid_, problem.flows))
-        return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
+        flows = in_enough_steps(self.fluid_, flows)
+        observed = np.asarray(observed_in_batch(self.fluid_, flows))
+        return [observed[i, : len(run), 0] for i, run in enumerate(runs)]
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):

@@ -21,7 +21,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.least_squares import data_scale, relative_misses
 from discover.learners.tbnn_ude.prior import cloud_of
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import side_by_side, trajectories
+from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 
 
@@ -43,8 +43,8 @@ def surprises(
     problem
         The training data.
     """
-    states = [trajectories(law, problem) for law in laws]
-    misses = [np.asarray(relative_misses(one, problem)) for one in states]
+    along = [trajectories(law, problem) for law in laws]
+    misses = [np.asarray(relative_misses(one, problem)) for one in along]
     squares = np.array([np.sum(one**2) for one in misses])
     squares = np.where(np.isfinite(squares), squares, np.inf)
     best = int(np.argmin(squares))
@@ -56,7 +56,7 @@ def surprises(
     found = np.full(len(laws), np.inf)
     usable = enduring if np.any(enduring) else np.isfinite(squares)
     for i in np.flatnonzero(usable).tolist():
-        cost = _told(laws[i], states[i], problem, precision)
+        cost = _told(laws[i], along[i], problem, precision)
         found[i] = precision * squares[i] + cost
     return found
 
@@ -65,7 +65,7 @@ def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
     """Return whether a law's stress stays finite in the training flows at twice the rate."""
     twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
     faster = eqx.tree_at(lambda tree: tree.flows, problem, twice)
-    return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster)))))
+    return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster).states))))
 
 
 def posterior_draws(
@@ -90,11 +90,11 @@ def posterior_draws(
     fits
         Largest relative misfit over that of the law.
     """
-    states = trajectories(law, problem)
-    misses = np.asarray(relative_misses(states, problem))
+    along = trajectories(law, problem)
+    misses = np.asarray(relative_misses(along, problem))
     least = float(np.sqrt(np.sum(misses**2)))
     precision = _independent(misses, np.asarray(problem.sample_mask)) / max(least**2, 1e-300)
-    rebuild, acts, columns = _sensitivities(law, states, problem)
+    rebuild, acts, columns = _sensitivities(law, along, problem)
     values, vectors = np.linalg.eigh(columns.T @ columns)
     spread = vectors / np.sqrt(1.0 + precision * np.clip(values, 0.0, None))
     start = np.asarray(rebuild.start)
@@ -115,19 +115,21 @@ def posterior_draws(
 _HALVINGS = 8
 
 
-def _told(law: TensorBasisNetwork, states, problem: TrainingProblem, precision: float) -> float:
+def _told(
+    law: TensorBasisNetwork, along: Along, problem: TrainingProblem, precision: float
+) -> float:
     """Return |w|² + ln det(1 + JᵀJ), over the weights that act."""
-    rebuild, acts, columns = _sensitivities(law, states, problem)
+    rebuild, acts, columns = _sensitivities(law, along, problem)
     values = precision * np.linalg.eigvalsh(columns.T @ columns)
     weights = np.asarray(rebuild.start)[acts]
     return float(weights @ weights + np.sum(np.log1p(np.clip(values, 0.0, None))))
 
 
 def _sensitivities(
-    law: TensorBasisNetwork, states, problem: TrainingProblem
+    law: TensorBasisNetwork, along: Along, problem: TrainingProblem
 ) -> tuple[Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
     """Return the weights of a law, which of them act, and what those change of the residuals."""
-    cloud = cloud_of(states, problem)
+    cloud = cloud_of(along, problem)
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
     varies = np.any(np.asarray(law.network_mask) > 0)

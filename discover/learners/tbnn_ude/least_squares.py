@@ -15,6 +15,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import (
+    Along,
     side_by_side,
     states_and_jacobian,
     trajectories,
@@ -39,7 +40,7 @@ _FAR_BEHIND = 5.0
 Callback = Callable[[float], None]
 Integrate = Callable[
     [Array, Rebuild, TrainingProblem],
-    tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]],
+    tuple[Along, Float[Array, "runs n p"]],
 ]
 
 
@@ -106,14 +107,14 @@ def linearise(
     The integration is a program of its own, apart from the solver's step: compiled inside it, it
     took as long again. Outside of a transformation it may be done by `side_by_side`.
     """
-    states, jacobian = integrate(weights, objective.rebuild, objective.problem)
-    return _with_prior(weights, objective, states, jacobian)
+    along, jacobian = integrate(weights, objective.rebuild, objective.problem)
+    return _with_prior(weights, objective, along, jacobian)
 
 
 @partial(compiled, runs_long=True)
-def _with_prior(weights, objective, states, jacobian):
+def _with_prior(weights, objective, along, jacobian):
     scale = data_scale(objective.problem)
-    misses = scale * objective.problem.misses(states)
+    misses = scale * objective.problem.missed_by(along.recorded)
 
     def prior(weights):
         return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
@@ -195,11 +196,9 @@ def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array
 
 
 @compiled
-def relative_misses(
-    states: Float[Array, "runs n k 4"], problem: TrainingProblem
-) -> Float[Array, "runs n"]:
-    """Return the data's residuals, whose norm is the relative misfit, from stresses at samples."""
-    return problem.misses(states) * data_scale(problem)
+def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "runs n"]:
+    """Return the data's residuals, whose norm is the relative misfit, from what is recorded."""
+    return problem.missed_by(along.recorded) * data_scale(problem)
 
 
 def minimise(

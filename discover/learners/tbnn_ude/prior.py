@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import trajectories
+from discover.learners.tbnn_ude.variational import Along, trajectories
 from discover.programs import compiled
 from tensor_library.algebra import inner
 from tensor_library.integrity_basis import integrity_basis
@@ -70,17 +70,11 @@ def sample_states(law: TensorBasisNetwork, problem: TrainingProblem) -> Cloud:
 
 
 @compiled
-def cloud_of(states: Float[Array, "runs n k 4"], problem: TrainingProblem) -> Cloud:
-    """Return states evenly spread over the samples, from the stresses of every mode there."""
-
-    def one(protocol, grid, states):
-        pick = jnp.linspace(1, states.shape[0] - 1, STATES_PER_RUN).astype(int)
-        times = grid.times[grid.sample_index][pick]
-        shear_rates = jax.vmap(protocol.rate)(times)[:, None] * problem.relaxation_time
-        return states[pick], shear_rates
-
-    stress, shear_rate = problem.flows.over(one, states)
-    stress, shear_rate = stress.reshape(-1, 4), shear_rate.reshape(-1)
+def cloud_of(along: Along, problem: TrainingProblem) -> Cloud:
+    """Return states evenly spread over the samples, of every mode there."""
+    pick = jnp.linspace(1, along.rate.shape[1] - 1, STATES_PER_RUN).astype(int)
+    stress = along.states[:, pick].reshape(-1, 4)
+    shear_rate = (along.rate[:, pick, None] * problem.relaxation_time).reshape(-1)
     rate = jax.vmap(rate_of_deformation)(shear_rate)
     basis = jax.vmap(integrity_basis)(stress, rate)
     size = jnp.sqrt(jax.vmap(jax.vmap(inner))(basis, basis))
@@ -95,7 +89,7 @@ def _weights(problem: TrainingProblem) -> Float[Array, "runs states k"]:
         return jnp.ones(shape)
     mask = problem.sample_mask
     squares = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1)
-    stress = jnp.sqrt(squares / jnp.maximum(jnp.sum(mask, axis=1), 1))
+    stress = jnp.sqrt(squares / jnp.maximum(jnp.sum(mask, axis=1), 1)) * problem.stress_of_unit
     stress = jnp.where(stress > 0.0, stress, 1.0)  # a run at rest has no scale of its own
     return jnp.broadcast_to(problem.modulus / stress[:, None, None], shape)
 

@@ -1,6 +1,7 @@
 """The training data of a network, laid out for batched integration."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import diffrax
 import equinox as eqx
@@ -9,67 +10,76 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
+from discover.forward.fluids import observed_on_grid
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
+from discover.protocols.kinematics import MODULI, STATES
+from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.solve import solve_on_grid
+
+STRAIN_STEP = 0.2
+"""Largest strain of a step of the integration."""
 
 _IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
 
 
 class TrainingProblem(eqx.Module):
-    """Recorded stress of several runs, and the modes that the network serves.
+    """Records of several runs, and the modes that the network serves.
 
     Attributes
     ----------
     flows
         The runs, on fixed time grids.
     target
-        Measured stress over the sum of the moduli, shape (runs, n).
+        What was recorded, over the sum of the moduli where it is in Pa, shape (runs, n).
     size
-        Of a flow curve's samples, whose misfits are told in units of each; 0 for other runs, of
-        which that is the root-mean-square. Shape (runs, n).
+        Of the samples of a flow curve or a sweep, whose misfits are told in units of each; 0 for
+        other runs, of which that is the root-mean-square. Shape (runs, n).
+    stress_of_unit
+        Stress over the sum of the moduli in a run, for each unit of its record: 1 where that is a
+        stress. Shape (runs,).
     sample_mask
         Which samples are looked at, shape (runs, n): False where one is padding.
     modulus, relaxation_time
         Of each mode, shape (k,); the moduli sum to one.
+    solvent_viscosity
+        Over the sum of the moduli, in s; taken off every record but a strain.
     """
 
     flows: FlowBatch
     target: Float[Array, "runs n"]
     size: Float[Array, "runs n"]
+    stress_of_unit: Float[Array, " runs"]
     sample_mask: Bool[Array, "runs n"]
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
+    solvent_viscosity: Float[Array, ""]
 
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
         """Return the fluid of a trial law, in units of the total modulus."""
         return Fluid(law, self.modulus, self.relaxation_time)
+
+    def beside(self, protocol: FlowProtocol) -> Float[Array, ""] | float:
+        """Return the viscosity beside the modes that is not taken off the record of a flow."""
+        return self.solvent_viscosity if protocol.control == "stress" else 0.0
 
     def residual(
         self,
         law: AbstractConstitutiveLaw,
         adjoint: diffrax.AbstractAdjoint | None = None,
     ) -> Float[Array, "runs n"]:
-        """Return predicted minus measured stress, zero where a sample is padding."""
-        fluid = self.fluid(law)
+        """Return what is predicted minus what was recorded, zero where a sample is padding."""
 
         def one(protocol, grid):
-            return protocol.recorded_stress(solve_on_grid(fluid, protocol, grid, adjoint).T)
+            beside = self.beside(protocol)
+            fluid = Fluid(law, self.modulus, self.relaxation_time, beside)
+            return observed_on_grid(fluid, protocol, grid, adjoint)[:, 0]
 
-        return self._missed_by(self.flows.over(one))
+        return self.missed_by(self.flows.over(one))
 
-    def misses(self, states: Float[Array, "runs n k 4"]) -> Float[Array, "runs n"]:
-        """Return predicted minus measured stress from the stresses of the modes at the samples."""
-        total = jnp.tensordot(self.modulus, states, axes=(0, 2))
-
-        def recorded(protocol, _, components):
-            return protocol.recorded_stress(components.T)
-
-        return self._missed_by(self.flows.over(recorded, total))
-
-    def _missed_by(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
+    def missed_by(self, predicted: Float[Array, "runs n"]) -> Float[Array, "runs n"]:
+        """Return what is predicted minus what was recorded, zero where a sample is padding."""
         return jnp.where(self.sample_mask, predicted - self.target, 0.0)
 
     def mean_squared_errors(
@@ -91,7 +101,7 @@ def make_problem(
     runs: Sequence[Run],
     modulus: Float[np.ndarray, " k"],
     relaxation_time: Float[np.ndarray, " k"],
-    strain_step: float = 0.2,
+    strain_step: float = STRAIN_STEP,
     phase_step: float = 0.15,
     solvent_viscosity: float = 0.0,
     known_relaxation: bool = True,
@@ -105,20 +115,21 @@ def make_problem(
     Parameters
     ----------
     runs
-        Runs whose σ12 is learned.
+        Runs whose record is learned.
     modulus, relaxation_time
         Modes, in Pa and s.
     strain_step, phase_step
         Step limits of `discover.simulate.make_grid`.
     solvent_viscosity
-        In Pa s. The solvent's stress follows from the rate alone, so it is taken off the record.
+        In Pa s. The solvent's stress follows from the rate alone, so it is taken off a record of
+        stress or moduli.
     known_relaxation
         Whether the fluid relaxes in these times, and not only in what is learned.
     base
         The known law, for steps that follow it; by default UCM.
     """
     total = float(np.sum(modulus))
-    protocols = [run.protocol for run in runs]
+    protocols = [_in_units_of(total, run.protocol) for run in runs]
     flows = lay_out(
         protocols,
         [run.time for run in runs],
@@ -129,21 +140,45 @@ def make_problem(
     if base is not None:
         flows = in_enough_steps(Fluid(base, modulus, relaxation_time), flows)
     n = max(map(len, runs))
+    unit = np.array([1.0 if run.quantity == "strain" else total for run in runs])[:, None]
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
     target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])
-    own = [run.sizes(run.recorded) * (run.protocol.control == "steady") for run in runs]
+    states = [run.protocol.control in STATES for run in runs]
+    own = [run.sizes(run.recorded) * each for run, each in zip(runs, states, strict=True)]
     size = np.stack([np.pad(sizes, (0, n - len(sizes))) for sizes in own])
     return TrainingProblem(
         flows,
-        jnp.asarray(target / total),
-        jnp.asarray(size / total),
+        jnp.asarray(target / unit),
+        jnp.asarray(size / unit),
+        jnp.asarray([_stress_of_unit(run, total) for run in runs]),
         jnp.asarray(np.arange(n) < np.array([[len(run)] for run in runs])),
         jnp.asarray(modulus / total),
         jnp.asarray(relaxation_time),
+        jnp.asarray(solvent_viscosity / total),
     )
+
+
+def _in_units_of(total: float, protocol: FlowProtocol) -> FlowProtocol:
+    """Return a protocol whose stress, where that is given, is in units of a modulus."""
+    if protocol.control != "stress":
+        return protocol
+    return replace(protocol, table_rates=protocol.table_rates / total)
+
+
+def _stress_of_unit(run: Run, total: float) -> float:
+    if run.quantity not in ("strain", *MODULI):
+        return 1.0
+    recorded = float(np.sqrt(np.mean(run.recorded**2)))
+    if run.quantity != "strain":
+        recorded /= total
+    return float(np.sqrt(np.mean(run.stress**2))) / total / recorded if recorded > 0.0 else 1.0
 
 
 def _viscous(run: Run) -> Float[np.ndarray, " n"]:
     """Return what a Newtonian fluid of unit viscosity adds to a record."""
+    if run.quantity == "loss_modulus":
+        return run.angular_frequency
+    if run.quantity in ("storage_modulus", "strain"):
+        return np.zeros(len(run))
     flow = run.protocol.kinematics
     return run.rate if flow is None else float(flow.viscous) * run.rate

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.initial_law import constant_scale, without_empty_terms
@@ -17,7 +17,7 @@ from discover.learners.tbnn_ude.prior import (
 )
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.recipe import DefaultRecipe
-from discover.learners.tbnn_ude.variational import trajectories
+from discover.learners.tbnn_ude.variational import Along, trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 
 Progress = Callable[[int, int, float], None]
@@ -39,7 +39,7 @@ class Session:
         self.misfits: list[float] = []
         self.taken: list[int] = []
         self.passed_over: list[int] = []
-        self._latest: tuple[TensorBasisNetwork, Float[Array, "runs n k 4"]] | None = None
+        self._latest: tuple[TensorBasisNetwork, Along] | None = None
         first = len(recipe.strengths) * recipe.steps + recipe.polish_steps
         trials = N_COEFFICIENTS * (START_STEPS + recipe.steps)
         search = recipe.max_tensors * (trials + _MOST_POLISHES * recipe.polish_steps)
@@ -51,8 +51,8 @@ class Session:
         if self.progress is not None:
             self.progress(min(len(self.misfits), self.total), self.total, misfit)
 
-    def states(self, law: TensorBasisNetwork) -> Float[Array, "runs n k 4"]:
-        """Return the states along the runs, of each mode."""
+    def along(self, law: TensorBasisNetwork) -> Along:
+        """Return what a law makes of the runs, and its states there."""
         # most questions are asked of the law that was trained last
         if self._latest is None or self._latest[0] is not law:
             self._latest = (law, trajectories(law, self.problem))
@@ -60,11 +60,11 @@ class Session:
 
     def cloud(self, law: TensorBasisNetwork) -> Cloud:
         """Return the points of stress and rate that a law passes."""
-        return cloud_of(self.states(law), self.problem)
+        return cloud_of(self.along(law), self.problem)
 
     def residual(self, law: TensorBasisNetwork) -> np.ndarray:
         """Return what a law misses, relative to each run, shape (runs, n)."""
-        return np.asarray(relative_misses(self.states(law), self.problem))
+        return np.asarray(relative_misses(self.along(law), self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
         """Return the relative misfit of a law; infinite where it runs away."""

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from discover.forward.fluids import observe
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
-from discover.protocols.protocol import FlowProtocol, recorded_at
-from discover.simulate.solve import SimulationError, simulate
+from discover.protocols.protocol import FlowProtocol
+from discover.simulate.solve import SimulationError
 from tensor_library.integrity_basis import TENSOR_NAMES
 
 
@@ -59,24 +60,21 @@ class MemberPredictions:
 def member_predictions(
     fluids: Sequence[Fluid], protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> MemberPredictions:
-    """Return the stresses of every member in a flow from rest.
+    """Return what is recorded of every member in a flow, and its normal stress differences.
 
     Parameters
     ----------
     fluids
         The members, as `TBNNUDE.ensemble_fluids_` holds them.
     protocol, times
-        As in `discover.simulate.simulate`.
+        As in `discover.forward.fluids.observe`.
     """
     rows = np.full((3, len(fluids), len(times)), np.nan)
     for i, fluid in enumerate(fluids):
         try:
-            stress = simulate(fluid, protocol, times)
+            rows[:, i] = observe(fluid, protocol, times).T
         except SimulationError:
             continue  # that it ran away is the answer
-        rows[0, i] = recorded_at(protocol, stress.components)
-        rows[1, i] = stress.first_normal_stress_difference
-        rows[2, i] = stress.second_normal_stress_difference
     return MemberPredictions(np.asarray(times, dtype=float), *rows)
 
 

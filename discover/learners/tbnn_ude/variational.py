@@ -8,12 +8,19 @@ hundreds.
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from discover.forward.fluids import (
+    FOLLOWED,
+    dynamics_of_modes,
+    solved_on_grid,
+    with_cheap_tangents,
+)
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
@@ -23,8 +30,26 @@ from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
 
 
-def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n k 4"]:
-    """Return the dimensionless stress of every mode at every sample.
+class Along(NamedTuple):
+    """What a law makes of the runs, at their samples.
+
+    Attributes
+    ----------
+    recorded
+        What is recorded, in units of `TrainingProblem.target`, shape (runs, n).
+    states
+        Dimensionless stress of every mode, shape (runs, n, k, 4).
+    rate
+        In 1/s, shape (runs, n).
+    """
+
+    recorded: Float[Array, "runs n"]
+    states: Float[Array, "runs n k 4"]
+    rate: Float[Array, "runs n"]
+
+
+def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
+    """Return what is recorded of a law at every sample, and its states there.
 
     Compiling an integration costs a hundred times its run, with derivatives or without. Misfits and
     states are therefore both read off the program that also trains the constants.
@@ -36,7 +61,7 @@ def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Arr
 
 def side_by_side(
     weights: Float[Array, " p"], rebuild: Rebuild, problem: TrainingProblem
-) -> tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]]:
+) -> tuple[Along, Float[Array, "runs n p"]]:
     """Return what `states_and_jacobian` does, computed for two halves of the runs in threads.
 
     Left to itself the compiled program uses two cores for longer than it takes on one: what it
@@ -66,8 +91,8 @@ def states_and_jacobian(
     problem: TrainingProblem,
     count: int | None = None,
     first: Int[Array, ""] | np.int32 | int = 0,
-) -> tuple[Float[Array, "runs n k 4"], Float[Array, "runs n p"]]:
-    """Return the stress of every mode at the samples, and what each weight changes of the record.
+) -> tuple[Along, Float[Array, "runs n p"]]:
+    """Return what is recorded and the states at the samples, and what each weight changes of it.
 
     Parameters
     ----------
@@ -118,9 +143,30 @@ def states_and_jacobian(
             by_weight, state = jax.jacrev(recorded, has_aux=True)(weights)
             return state, by_weight
 
-        return jax.vmap(at)(grid.times[grid.sample_index])
+        return jax.vmap(at)(grid.sample_times)
+
+    def solved_run(protocol, grid):
+        law = with_cheap_tangents(lambda made, w, *flow: made(w).stress_rate(*flow), rebuild)
+        modes = modulus, relaxation_time, problem.beside(protocol)
+
+        def make(w):
+            return dynamics_of_modes(partial(law, w), *modes, protocol)
+
+        def recorded(w):
+            found = solved_on_grid(make, w, protocol, grid)
+            return found.observed[:, 0], found
+
+        by_weight, found = jax.jacfwd(recorded, has_aux=True)(weights)
+        return Along(found.observed[:, 0], found.states, found.rate), by_weight
 
     def one_run(protocol, grid):
+        if protocol.control not in FOLLOWED:
+            return solved_run(protocol, grid)
+        states, by_weight = followed_run(protocol, grid)
+        recorded = protocol.recorded_stress(jnp.tensordot(modulus, states, axes=(0, 1)).T)
+        return Along(recorded, states, jax.vmap(protocol.rate)(grid.sample_times)), by_weight
+
+    def followed_run(protocol, grid):
         if protocol.control == "steady":
             return steady_run(protocol, grid)
         start = jnp.pad(fluid.rest()[..., None], ((0, 0), (0, 0), (0, n_weights)))
@@ -128,5 +174,5 @@ def states_and_jacobian(
         observed = fixed_steps(field, solver, grid.times, start, protocol, observe)
         return jax.tree.map(lambda values: values[grid.sample_index], observed)
 
-    states, jacobian = flows.over(one_run)
-    return states, jnp.where(looked_at[..., None], jacobian, 0.0)
+    along, jacobian = flows.over(one_run)
+    return along, jnp.where(looked_at[..., None], jacobian, 0.0)

@@ -17,7 +17,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import known_part
+from discover.learners.known_part import known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
@@ -175,7 +175,9 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         started = time.perf_counter()
         check_settings(self.get_params(deep=False))
         self._check_parameters()
-        runs = as_runs(X, known_part(self).relaxation_time)
+        known = known_part(self)
+        runs = as_runs(X, known.relaxation_time)
+        require_known_rate(known, runs)
         problem = self._problem(runs)
 
         def sizes(constants):

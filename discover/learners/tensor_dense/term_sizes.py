@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from discover.forward.fluids import at_samples
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
-from discover.simulate.solve import solve_states_on_grid
 from tensor_library.kinematics import rate_of_deformation
 
 _COUNTS = (1.0, 1.0, 1.0, 2.0)
@@ -31,8 +31,9 @@ def _sizes(problem: TrajectoryProblem) -> Float[Array, " n"]:
     fluid = Fluid(problem.base, problem.modulus, problem.relaxation_time, problem.solvent_viscosity)
 
     def of_run(protocol, grid):
-        states = solve_states_on_grid(fluid, protocol, grid)  # (samples, modes, s)
-        gradients = jax.vmap(protocol.velocity_gradient)(grid.times[grid.sample_index])
+        _, states, rates = at_samples(fluid, protocol, grid)  # (samples, modes, 4)
+        flow = protocol.kinematics
+        gradients = rates if flow is None else jnp.multiply.outer(rates, flow.gradient)
 
         def squares(stress, gradient, time):
             values = problem.library.evaluate(stress[:4], rate_of_deformation(gradient * time))

@@ -16,7 +16,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import KnownPart, known_part
+from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
@@ -236,6 +236,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         library = build_library() if self.library is None else self.library
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
+        require_known_rate(known, runs)
         problem = make_problem(
             runs,
             library,

@@ -111,6 +111,8 @@ def _half(problem: TrajectoryProblem, rng: np.random.Generator) -> Bool[np.ndarr
 
 def _choose(design, target, optimizer, max_terms, floor, known, worth) -> tuple[int, ...]:
     """Return the support that the extended BIC prefers of those the optimiser proposes."""
+    if not len(design):  # the half of a record of very few samples
+        return ()
     observations, n = worth * len(design), design.shape[1]
     triangular = np.asarray(np.linalg.qr(np.column_stack([design, target]), mode="r"))
     matrix, right = triangular[:, :-1], triangular[:, -1]

@@ -6,17 +6,16 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.run import Run
+from discover.forward.fluids import observed_in_batch
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.problem import make_problem
-from discover.protocols.protocol import recorded_at
-from discover.simulate.solve import solve_batch
 from tensor_library.library import TermLibrary
 
 
 def predict_runs(
     fluid: Fluid, library: TermLibrary, runs: Sequence[Run], strain_step: float
 ) -> list[Float[np.ndarray, " n"]]:
-    """Return what each run records of a fluid, in Pa, at the times of its samples.
+    """Return what each run records of a fluid at the times of its samples.
 
     The same padded layout as in the fit, so that folds share a compilation.
 
@@ -39,5 +38,5 @@ def predict_runs(
         base=fluid.law,
         strain_step=strain_step,
     )
-    stresses = np.asarray(solve_batch(fluid, problem.flows))
-    return [recorded_at(run.protocol, stresses[i, : len(run)]) for i, run in enumerate(runs)]
+    observed = np.asarray(observed_in_batch(fluid, problem.flows))
+    return [observed[i, : len(run), 0] for i, run in enumerate(runs)]

@@ -18,6 +18,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from discover.forward.fluids import (
+    FOLLOWED,
+    dynamics_of_modes,
+    solved_on_grid,
+    with_cheap_tangents,
+)
 from discover.laws.base import as_state, stress_in
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.active_terms import evaluate_active
@@ -87,6 +93,8 @@ def _recorded(total, protocol):
 def _solve_run(problem, active, coefficients, inner, protocol, grid):
     if protocol.control == "steady":
         return _steady_run(problem, active, coefficients, inner, protocol, grid)
+    if protocol.control not in FOLLOWED:
+        return _solved_run(problem, active, coefficients, inner, protocol, grid)
     columns = 1 + coefficients.shape[0] + inner.shape[0]
     start = jnp.pad(_rest(problem)[..., None], ((0, 0), (0, 0), (0, columns - 1)))
     observed = fixed_steps(
@@ -118,6 +126,35 @@ def _solver(problem, columns=False):
     return ExponentialRungeKutta4(decay[..., None] if columns else decay)
 
 
+def _solved_run(problem, active, coefficients, inner, protocol, grid):
+    """Return what `_solve_run` does where the rate is solved for."""
+
+    def recorded(*numbers):
+        observed = _observed_where_solved(problem, active, numbers, protocol, grid)
+        return observed, observed
+
+    columns, value = jax.jacfwd(recorded, argnums=(0, 1), has_aux=True)(coefficients, inner)
+    return jnp.concatenate([value[..., None], *columns], axis=-1)
+
+
+def _observed_where_solved(problem, active, numbers, protocol, grid):
+    law = with_cheap_tangents(partial(_law_of_numbers, problem.library), (active, problem.base))
+    modes = problem.modulus, problem.relaxation_time, problem.solvent_viscosity
+
+    def make(numbers):
+        return dynamics_of_modes(partial(law, numbers), *modes, protocol)
+
+    return solved_on_grid(make, numbers, protocol, grid).observed
+
+
+def _law_of_numbers(library, given, numbers, stress, rate):
+    (active, base), (coefficients, inner) = given, numbers
+    own = stress_in(stress)
+    terms = evaluate_active(library, active, own, rate_of_deformation(rate), inner)
+    added = as_state(jnp.tensordot(coefficients, terms, axes=1), stress)
+    return base.stress_rate(stress, rate) - added
+
+
 def _steady_run(problem, active, coefficients, inner, protocol, grid):
     """Return what `_solve_run` does of steady states, by the implicit function."""
 
@@ -127,7 +164,7 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
         columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
         return jnp.concatenate([value[:, None], *columns], axis=1)
 
-    return jax.vmap(at)(grid.times[grid.sample_index])
+    return jax.vmap(at)(grid.sample_times)
 
 
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
@@ -138,10 +175,8 @@ def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inne
 
 
 def _known_less_terms(problem, active, coefficients, inner, stress, rate):
-    own = stress_in(stress)
-    terms = evaluate_active(problem.library, active, own, rate_of_deformation(rate), inner)
-    added = as_state(jnp.tensordot(coefficients, terms, axes=1), stress)
-    return problem.base.stress_rate(stress, rate) - added
+    given, numbers = (active, problem.base), (coefficients, inner)
+    return _law_of_numbers(problem.library, given, numbers, stress, rate)
 
 
 def _observed(problem, protocol, time, state):
@@ -171,8 +206,8 @@ def observe(
 
     Returns
     -------
-    σ12, N1, N2 in Pa, and their derivatives with respect to coefficients, then inner parameters.
-    Not finite where the trial law runs away.
+    What is recorded, N1 and N2, and their derivatives with respect to coefficients, then inner
+    parameters. Not finite where the trial law runs away.
     """
     run = partial(_solve_run, problem, active, coefficients, inner)
     observed = problem.flows.over(run)
@@ -199,7 +234,10 @@ def predict_many(
                 lambda time: _observed_in_steady_flow(
                     problem, active, protocol, time, coefficients, inner
                 )
-            )(grid.times[grid.sample_index])
+            )(grid.sample_times)
+        if protocol.control not in FOLLOWED:
+            numbers = coefficients, inner
+            return _observed_where_solved(problem, active, numbers, protocol, grid)
         mode = partial(_known_less_terms, problem, active, coefficients, inner)
 
         def field(t, stress, _):

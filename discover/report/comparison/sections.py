@@ -130,7 +130,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             "columns": titles,
             "error_rows": tables.error_rows(comparison),
             "recorded": in_words(f.protocol.quantity for f in comparison.flows_of("training")),
-            "extension": not all(flow.records_shear_stress for flow in flows),
+            "others": in_words(q for f in flows if (q := f.protocol.quantity) != "sigma12"),
         }
 
     def classical() -> Content | None:

@@ -13,6 +13,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates
 from discover.identify.exact.relations import spell_briefly
+from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.wording import (
     SYMBOLS,
     estimate,
@@ -239,8 +240,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
         runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
         errors = {flow.name: comparison.errors(name, flow) for flow in flows}
-        shear = all(flow.records_shear_stress for flow in flows)
-        recorded = "σ12" if shear else "the recorded stress"
+        recorded = quantities_in_words(flow.protocol.quantity for flow in flows)
         said = [
             f"{symbol} by up to {percent(value)}"
             f"{_without_outliers(comparison, name, flows) if quantity == 'sigma12' else ''}"
@@ -320,7 +320,7 @@ def _next(comparison: Comparison) -> str:
         return "Measure in shear: extension alone does not say what the fluid does there."
     if names := _open(comparison):
         return f"Measure {names}: nothing else decides between laws that give the same σ12."
-    rates = [float(np.max(np.abs(f.rate))) for f in comparison.flows_of("training")]
+    rates = [flow.largest_rate for flow in comparison.flows_of("training")]
     unit = "" if comparison.noise is not None else " 1/s"
     return (
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "

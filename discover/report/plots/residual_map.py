@@ -79,8 +79,11 @@ def loop_residual_map(result: LoopResult) -> Picture | None:
 def comparison_residual_map(comparison: Comparison) -> Picture | None:
     """Return the residual of σ12 in the training runs: of the known part, and of each learner."""
     flows = [flow for flow in comparison.flows_of("training") if flow.measured is not None]
-    in_time = [flow for flow in flows if not flow.is_steady]
-    flows = in_time or flows  # what goes on in time and what does not share no axis
+    if not flows:
+        return None
+    # what goes on in time and what does not share no axis
+    axis = next((f.drawn[0] for f in flows if not f.is_of_states), flows[0].drawn[0])
+    flows = [flow for flow in flows if flow.drawn[0] == axis]
     everyone = {"before": comparison.before}
     everyone |= {learner_title(n): o.predictions for n, o in comparison.outcomes.items()}
     panels = {}
@@ -97,9 +100,13 @@ def comparison_residual_map(comparison: Comparison) -> Picture | None:
             panels[title] = rows
     if max(map(len, panels.values()), default=0) < 2:  # streaks are seen across runs
         return None
-    states = all(flow.is_steady for flow in flows)
-    logarithmic = states or all(runs_through_decades(f.times, f.rate) for f in flows)
-    label = units(comparison)[2 if states else 1]
+    states = all(flow.is_of_states for flow in flows)
+    paces = [np.ones_like(f.times) if f.records_strain else f.rate for f in flows]
+    logarithmic = states or all(
+        runs_through_decades(f.times, pace) for f, pace in zip(flows, paces, strict=True)
+    )
+    _, time_label, rate_label = units(comparison)
+    label = {"time (s)": time_label, "shear rate (1/s)": rate_label}.get(axis, axis)
     return _draw(panels, label, logarithmic, "in the order of the data")
 
 

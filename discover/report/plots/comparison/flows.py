@@ -26,9 +26,16 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import FIGURE_SYMBOLS, recorded_symbol
+from discover.report.wording import FIGURE_SYMBOLS
+from discover.words import listed
 
 START_UP_SHOWN = 10.0
+
+# Values within this factor are shown within it above and below
+_NARROW = 4.0
+
+# A strain of creep that goes through more than one and a half decades is drawn in decades
+_DECADES = 1.5 * np.log(10.0)
 
 
 def units(comparison: Comparison) -> tuple[str, str, str]:
@@ -99,8 +106,8 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
 def start_up_picture(
     comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
 ) -> Picture:
-    """Return σ12, N1 and N2 in start-up; in extension the tensile stress."""
-    stress_unit, time_label, rate_label = units(comparison)
+    """Return σ12, N1 and N2 in start-up, or else what was recorded, such as the strain of creep."""
+    stress_unit, _, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
     with figure(1, len(quantities), height=2.9) as (drawing, axes):
         shown = flow.times <= max(START_UP_SHOWN, float(flow.times[1]))
@@ -114,12 +121,9 @@ def start_up_picture(
             _mark_open(panel, comparison, quantity)
             _frame(panel, comparison, flow, quantity, shown)
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
-            panel.set_ylabel(FIGURE_SYMBOLS[drawn] + stress_unit)
-            panel.set_xlabel(rate_label if flow.is_steady else time_label)
-            if flow.is_steady:
-                _make_decades(panel, quantity)
-            elif not flow.is_truth and runs_through_decades(flow.times, flow.rate):
-                make_logarithmic(panel.xaxis)
+            panel.set_ylabel(FIGURE_SYMBOLS[drawn] + ("" if flow.records_strain else stress_unit))
+            panel.set_xlabel(_axis_of(comparison, flow))
+            _set_scales(panel, flow, quantity)
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -131,8 +135,9 @@ def start_up_picture(
 def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
-    stress_unit, time_label, rate_label = units(comparison)
-    recorded = recorded_symbol(flow.protocol.quantity for flow in flows)
+    stress_unit, _, _ = units(comparison)
+    kinds = {flow.protocol.quantity for flow in flows}
+    recorded = listed([symbol for kind, symbol in FIGURE_SYMBOLS.items() if kind in kinds])
     columns = min(4, len(flows))
     rows = -(-len(flows) // columns)
     with figure(rows, columns, height=1.8) as (drawing, axes):
@@ -150,15 +155,17 @@ def training_picture(comparison: Comparison) -> Picture:
                     )
             _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
-            if flow.is_steady:
-                _make_decades(panel, "sigma12")
-                panel.set_xlabel(rate_label)
-            elif runs_through_decades(flow.times, flow.rate):
-                make_logarithmic(panel.xaxis)
+            _set_scales(panel, flow, "sigma12", truth_too=True)
+            if flow.is_of_states:
+                panel.set_xlabel(_axis_of(comparison, flow))
         for panel, flow in zip(axes[-1], flows[(rows - 1) * columns :], strict=False):
-            panel.set_xlabel(rate_label if flow.is_steady else time_label)
-        for panel in axes[:, 0]:
-            panel.set_ylabel(recorded + stress_unit)
+            panel.set_xlabel(_axis_of(comparison, flow))
+        for place, (panel, flow) in enumerate(zip(axes.ravel(), flows, strict=False)):
+            # once a row, unless something else is recorded
+            quantity = flow.protocol.quantity
+            if place % columns == 0 or quantity != flows[place - 1].protocol.quantity:
+                unit = "" if flow.records_strain else stress_unit
+                panel.set_ylabel(FIGURE_SYMBOLS[quantity] + unit)
         legend_above(drawing, axes)
         return picture(
             drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
@@ -221,12 +228,34 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
     )
 
 
-def _make_decades(panel, quantity: str) -> None:
-    """Show a flow curve in decades of rate, and of the stress where it has one sign."""
-    make_logarithmic(panel.xaxis)
-    if quantity != "N2":
+def _axis_of(comparison: Comparison, flow: Flow) -> str:
+    """Return the label of what a flow is drawn against."""
+    _, time_label, rate_label = units(comparison)
+    if flow.protocol.control == "oscillation":
+        return flow.drawn[0]
+    return rate_label if flow.is_of_states else time_label
+
+
+def _set_scales(panel, flow: Flow, quantity: str, truth_too: bool = False) -> None:
+    """Show decades of rate, amplitude or time, and of what was recorded where it has one sign."""
+    if _in_decades(flow, quantity):
         panel.set_yscale("log")
         panel.autoscale(axis="y")
+        low, high = panel.get_ylim()
+        if high < _NARROW * low:  # within a decade the labels of an axis would crowd
+            panel.set_ylim(low / _NARROW, high * _NARROW)
+    in_time = not flow.is_of_states and (truth_too or not flow.is_truth)
+    # in creep the stress is constant, and not the rate
+    pace = np.ones_like(flow.times) if flow.records_strain else flow.rate
+    if flow.is_of_states or (in_time and runs_through_decades(flow.times, pace)):
+        make_logarithmic(panel.xaxis)
+
+
+def _in_decades(flow: Flow, quantity: str) -> bool:
+    if flow.is_of_states:
+        return quantity != "N2"
+    strain = flow.reference.get("sigma12") if flow.records_strain else None
+    return strain is not None and bool(np.min(strain) > 0.0) and np.ptp(np.log(strain)) > _DECADES
 
 
 def _mark_training(panel, flow: Flow) -> None:
@@ -247,7 +276,7 @@ def _mark_open(panel, comparison: Comparison, quantity: str) -> None:
 
 def _frame(panel, comparison: Comparison, flow: Flow, quantity: str, shown) -> None:
     """Let truth and learners, not what came before, decide the range."""
-    if flow.is_steady and quantity != "N2":
+    if _in_decades(flow, quantity):
         return  # in decades what came before hides nothing
     values = [
         stresses[quantity][shown]

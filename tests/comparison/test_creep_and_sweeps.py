@@ -1,0 +1,190 @@
+"""Creep, recovery and amplitude sweeps in learners and comparisons: records by scipy."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import Giesekus, Modes, PhanThienTanner, start_up
+from independent.imposed_stress import strain_at
+from independent.sweeps import modulus_of
+
+import discover as dc
+from discover.errors import InputError
+from discover.learners.tbnn_ude.initial_law import initial_law
+from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
+from discover.learners.tbnn_ude.variational import states_and_jacobian
+from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.sensitivities import linearise, predict_many
+from discover.protocols import imposed_stress, oscillations
+from discover.report.predictions import comparison_predictions
+from tensor_library.library import build_library
+
+MODULUS, TIME, SOLVENT, NOISE = (100.0, 30.0), (0.3, 3.0), 5.0, 0.01
+BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME, SOLVENT)
+PAIRS = list(zip(MODULUS, TIME, strict=True))
+TIMES = np.geomspace(0.05, 20.0, 40)
+LIBRARY = build_library(degree=0)
+
+
+def modes(law, constant):
+    return Modes(*(law(constant, modulus=g, relaxation_time=t) for g, t in PAIRS))
+
+
+GIESEKUS = modes(Giesekus, 0.3)
+
+
+def noisy(values, seed, size=None):
+    size = np.sqrt(np.mean(values**2)) if size is None else size
+    return values + NOISE * size * np.random.default_rng(seed).standard_normal(len(values))
+
+
+def creep(law, stress, off=None):
+    """Creep at a stress, and recovery right after one of the samples."""
+    levels = [(0.0, stress)] if off is None else [(0.0, stress), (off, 0.0)]
+    strain = noisy(strain_at(law, levels, SOLVENT, TIMES), int(stress))
+    imposed = np.where((off or np.inf) >= TIMES, stress, 0.0)
+    return dc.Run(
+        f"creep_{stress:g}", TIMES, imposed_stress(TIMES, imposed), np.gradient(strain, TIMES),
+        imposed, strain=strain,
+    )  # fmt: skip
+
+
+def sweep(law, strain):
+    n = len(strain)
+    moduli = np.array([modulus_of(law, each, 2.0, 12) for each in strain])
+    storage, loss = moduli.real, moduli.imag + SOLVENT * 2.0
+    storage, loss = noisy(storage, 1, storage), noisy(loss, 2, loss)
+    return dc.Run(
+        "amplitudes", np.arange(1.0, n + 1.0), oscillations(strain, np.full(n, 2.0)), 2.0 * strain,
+        strain * np.hypot(storage, loss), strain=strain, storage_modulus=storage,
+        loss_modulus=loss,
+    )  # fmt: skip
+
+
+def start(law, rate):
+    times = np.linspace(0.05, 10.0, 40)
+    stress = law.respond(start_up(rate), times).sigma12 + SOLVENT * rate
+    stress = noisy(stress, int(rate))
+    return dc.Run(f"at_{rate:g}", times, dc.start_up(rate), np.full(40, rate), stress)
+
+
+def compared(runs, **options):
+    data = dc.Dataset("planted", tuple(runs))
+    options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, **options}
+    return dc.compare(data, BASE, **options)
+
+
+def found_by_sindy(runs, library=LIBRARY):
+    found = dc.TensorSINDy(base=BASE, library=library).fit(runs)
+    return {term.term: term for term in found.terms_}
+
+
+def few_samples():
+    return [
+        creep(GIESEKUS, 40.0).window(np.arange(40) % 4 == 0),
+        *sweep(GIESEKUS, np.array([0.1, 2.0])).records,
+    ]
+
+
+@pytest.mark.slow
+def test_sensitivities_of_creep_and_moduli_are_their_differences():
+    problem = make_problem(few_samples(), LIBRARY, MODULUS, TIME, SOLVENT)
+    place = LIBRARY.names.index("sigma.sigma")
+    at, nothing = jnp.zeros(len(LIBRARY)).at[place].set(0.2), jnp.zeros(0)
+    residual, columns = linearise(problem, at, nothing)
+    step = 1e-5  # the difference errs by its square, and by rounding over it
+    for i in (place, LIBRARY.names.index("sigma.gammadot+gammadot.sigma")):
+        ends = [linearise(problem, at.at[i].add(s), nothing)[0] for s in (step, -step)]
+        difference = (ends[1] - ends[0]) / (2.0 * step)
+        np.testing.assert_allclose(columns[:, i], difference, rtol=1e-5, atol=1e-7)
+    # the same values come without sensitivities
+    alone = predict_many(problem, jnp.arange(len(LIBRARY)), at[None], jnp.zeros((1, 0)))[0]
+    observed = (problem.weight * problem.target).reshape(-1)
+    np.testing.assert_allclose(observed - alone, residual, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_the_network_is_told_of_creep_and_moduli_as_their_differences_say():
+    problem = make_training_problem(
+        few_samples(), np.array(MODULUS), np.array(TIME), solvent_viscosity=SOLVENT
+    )
+    law = initial_law(jax.random.key(0), 3, True, jnp.ones(8))
+    last = 0.01 * jax.random.normal(jax.random.key(1), law.network.layers[-1].weight.shape)
+    law = eqx.tree_at(  # a fluid that is nearly a Giesekus one
+        lambda tree: (tree.network.layers[-1].weight, tree.constants),
+        law,
+        (last, jnp.zeros(8).at[3].set(0.3)),
+    )
+    rebuild = Rebuild.everything(law)
+    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
+    # what it misses is its own departure from the law that made them, and the noise
+    missed = problem.missed_by(along.recorded)[0]
+    assert float(jnp.max(jnp.abs(missed))) < 0.05 * float(jnp.max(problem.target[0]))
+    direction, step = jax.random.normal(jax.random.key(2), rebuild.start.shape), 1e-6
+    trials = [rebuild.start + s * direction for s in (step, -step)]
+    ends = [
+        problem.missed_by(states_and_jacobian(trial, rebuild, problem)[0].recorded)
+        for trial in trials
+    ]
+    expected = (ends[0] - ends[1]) / (2.0 * step)
+    size = float(jnp.max(jnp.abs(expected)))
+    np.testing.assert_allclose(jacobian @ direction, expected, atol=2e-5 * size)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("runs", "term", "constant"),
+    [
+        (lambda: [creep(GIESEKUS, 20.0), creep(GIESEKUS, 60.0)], "sigma.sigma", 0.3),
+        (lambda: [creep(GIESEKUS, 60.0, off=TIMES[30])], "sigma.sigma", 0.3),
+        (lambda: [sweep(GIESEKUS, np.geomspace(0.05, 10.0, 14))], "sigma.sigma", 0.3),
+        (
+            lambda: [creep(modes(PhanThienTanner, 0.2), s) for s in (20.0, 60.0)],
+            "tr(sigma)*sigma",
+            0.2,
+        ),
+    ],
+    ids=["creep", "recovery", "sweep", "creep of a PTT fluid"],
+)
+def test_the_law_that_made_them_is_found_from_these_tests_alone(runs, term, constant):
+    terms = found_by_sindy(runs())
+    assert list(terms) == [term]
+    low, high = terms[term].ci95
+    # one of twenty intervals misses; half as wide again, one of three hundred
+    assert abs(terms[term].coefficient - constant) < 0.75 * (high - low)
+    assert high - low < 0.1 * constant
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "runs",
+    [lambda: [creep(GIESEKUS, 0.2)], lambda: [sweep(GIESEKUS, np.geomspace(1e-3, 1e-2, 14))]],
+    ids=["creep", "sweep"],
+)
+def test_small_stress_and_small_strain_give_no_term_and_determine_nothing(runs):
+    found = compared(runs())
+    assert not found.outcomes["tensor_sindy"].terms
+    assert {"N1", "N2"} <= set(found.undetermined)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held_out", ["its own", "another's"])
+def test_creep_held_out_judges_what_two_start_ups_give(held_out):
+    own = held_out == "its own"
+    # the control is the creep of another fluid
+    judge = creep(GIESEKUS if own else modes(PhanThienTanner, 0.2), 40.0)
+    found = compared([start(GIESEKUS, 1.0), start(GIESEKUS, 3.0), judge], held_out=[judge.name])
+    assert found.explanation.verdict == ("explained" if own else "unexplained")
+    if own:
+        table = comparison_predictions(found)
+        lines = table[(table["run"] == judge.name) & (table["source"] == "tensor_sindy")]
+        assert set(lines["quantity"]) == {"strain"}
+        np.testing.assert_allclose(lines["measured"], judge.strain)
+        assert (lines["low95"] <= lines["high95"]).all()
+
+
+def test_an_instrument_is_not_taken_out_of_creep():
+    with pytest.raises(InputError, match=r"takes effects of an instrument \(stress_gain\)"):
+        compared([creep(GIESEKUS, 40.0)], known_effects={"stress_gain": {"gain_error": 0.1}})

@@ -1,0 +1,77 @@
+"""Fluids at a given stress and in periodic states, with derivatives, against scipy."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent.giesekus import multimode_giesekus
+from independent.imposed_stress import strain_at
+from independent.sweeps import modulus_of
+
+from discover.errors import InputError
+from discover.forward.fluids import observe, observed_on_grid
+from discover.laws.giesekus import Giesekus
+from discover.laws.multimode import Fluid
+from discover.protocols import imposed_stress, oscillations, start_up
+from discover.protocols.protocol import recording
+from discover.simulate import SimulationError, lay_out, simulate
+
+MODULUS, TIME, SOLVENT, MOBILITY = (100.0, 30.0), (0.3, 3.0), 5.0, 0.3
+TIMES = np.concatenate([np.geomspace(0.02, 6.0, 30), 6.0 + np.geomspace(0.02, 6.0, 30)])
+STRESS = np.where(TIMES <= 6.0, 60.0, 0.0)
+STRAINS, FREQUENCY = np.array([0.1, 2.0, 10.0]), 2.0
+LAW = multimode_giesekus([MOBILITY] * 2, MODULUS, TIME)
+COUNTED = np.arange(1.0, 4.0)
+SWEEP = oscillations(STRAINS, np.full(3, FREQUENCY))
+
+
+def fluid(mobility=MOBILITY):
+    return Fluid(Giesekus(mobility), MODULUS, TIME, SOLVENT)
+
+
+def test_creep_and_recovery_of_two_modes_are_those_of_scipy():
+    exact = strain_at(LAW, [(0.0, 60.0), (6.0, 0.0)], SOLVENT, TIMES)
+    found = observe(fluid(), imposed_stress(TIMES, STRESS), TIMES)[:, 0]
+    # a jump is over in a thousandth of the first gap, and the solvent is of first order in time
+    assert np.linalg.norm(found - exact) < 5e-4 * np.linalg.norm(exact)
+
+
+def test_an_amplitude_sweep_is_where_scipy_ends():
+    exact = np.array([modulus_of(LAW, strain, FREQUENCY, 12) for strain in STRAINS])
+    exact = exact + 1j * SOLVENT * FREQUENCY
+    storage, loss = (
+        observe(fluid(), recording(SWEEP, name), COUNTED)[:, 0]
+        for name in ("storage_modulus", "loss_modulus")
+    )
+    # steps of a strain of 0.4: 5e-6 was measured
+    np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "times"), [(imposed_stress(TIMES, STRESS), TIMES), (SWEEP, COUNTED)]
+)
+def test_derivatives_forward_and_in_reverse_are_differences(protocol, times):
+    flows = lay_out([protocol], [times])
+
+    @jax.jit
+    def recorded(mobility):
+        return flows.over(partial(observed_on_grid, fluid(mobility)))[0, :, 0]
+
+    at, step = jnp.asarray(MOBILITY), 1e-4
+    columns = jax.jit(jax.jacfwd(recorded))(at)
+    differences = (recorded(at + step) - recorded(at - step)) / (2.0 * step)
+    size = float(jnp.max(jnp.abs(differences)))
+    # the difference errs by the square of the step
+    np.testing.assert_allclose(columns, differences, atol=1e-6 * size)
+    back = jax.jit(jax.grad(lambda value: jnp.sum(recorded(value) ** 2)))(at)
+    np.testing.assert_allclose(back, 2.0 * recorded(at) @ columns, rtol=1e-9)
+
+
+def test_a_stress_that_a_fluid_cannot_bear_is_said_and_a_rate_bears_no_other_control():
+    with pytest.raises(SimulationError, match="bears this stress"):
+        observe(fluid(), imposed_stress(TIMES, np.full(60, 1e200)), TIMES)
+    with pytest.raises(InputError, match="flows at a given rate"):
+        simulate(fluid(), SWEEP, COUNTED)
+    assert np.all(np.isfinite(observe(fluid(), start_up(1.0), TIMES)))  # the control
