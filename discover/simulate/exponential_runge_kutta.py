@@ -171,6 +171,8 @@ class StressWeights(NamedTuple):
         at_once
             Stages that are compiled one after another: with 4 a small one takes a quarter less.
         """
+        if self.beside:
+            return self._step_by_step(stress, stage, inputs)
         rows = [self.whole.tableau()]
         if self.trace is not None:
             rows.append(self.trace.tableau())
@@ -189,6 +191,16 @@ class StressWeights(NamedTuple):
         start = jnp.zeros((4, *stress.shape), stress.dtype)
         remainders, more = jax.lax.scan(one, start, (jnp.arange(4), rows, inputs), unroll=at_once)
         return self.end(stress, *remainders), more
+
+    def _step_by_step(self, stress, stage, inputs):
+        """Return what `step` does, where each tensor of the law has weights of its own."""
+        given = [jax.tree.map(lambda leaf, i=i: leaf[i], inputs) for i in range(4)]
+        n1, first = stage(stress, given[0])
+        n2, second = stage(self.second(stress, n1), given[1])
+        n3, third = stage(self.third(stress, n1, n2), given[2])
+        n4, fourth = stage(self.fourth(stress, n1, n3), given[3])
+        more = jax.tree.map(lambda *leaves: jnp.stack(leaves), first, second, third, fourth)
+        return self.end(stress, n1, n2, n3, n4), more
 
     def second(self, y, n1):
         """Return Y2, as `KrogstadWeights` does."""
