@@ -225,4 +225,6 @@ def _begun(
         table_times=jnp.asarray(np.concatenate([knots, [until], own_times[later]])),
         table_rates=jnp.asarray(np.concatenate([rates, [first], own_rates[later]])),
         begins=jnp.asarray(float(knots[0])),
+        # of other samples; what is recorded at a given stress, its run gives again
+        table_strains=None,
     )

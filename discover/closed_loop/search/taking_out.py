@@ -84,11 +84,11 @@ def restore_left_open(search: CurrentModel) -> str:
     """Put back what was refused for an open constant if what replaced it is far less likely.
 
     A flow curve shows how far a structure is broken, and not how fast: its constants are no
-    finding. That it is there is not excluded by this. Where the search went on without it and
-    explains the runs by other effects, yet with so many more constants that they are beyond Occam's
-    window, to name these would be false. Returns what was put back; empty for nothing.
+    finding. That it is there is not excluded by this. Where it explains the runs and what the
+    search found without it does not, or with so many more constants that these are beyond Occam's
+    window, to name the others would be false. Returns what was put back; empty for nothing.
     """
-    if not search.left_open or not search.active or not search.explained:
+    if not search.left_open or (search.explained and not search.active):
         return ""
     weight = np.asarray(search.batch.weight)
     effective = summarise(search.fit.residual, weight).effective_samples
@@ -109,11 +109,14 @@ def restore_left_open(search: CurrentModel) -> str:
     best = min(instead, key=lambda one: worth(one.cost, len(one.free), len(one.effects)))
     if worth(best.cost, len(best.free), len(best.effects)) > own - 2.0 * np.log(WINDOW):
         return ""
+    fit = search.fitted(list(best.effects), best.theta(search.model))
+    if not search.tolerated.explained(fit, best.effects):
+        return ""
     search.refused -= set(best.effects)
     search.left_open -= set(best.effects)
     search.active = list(best.effects)
     search.unasked = set(search.active)
-    search.fit = search.fitted(search.active, best.theta(search.model))
+    search.fit = fit
     search.fit_path()
     search.leave_out()
     return ", ".join(best.effects)

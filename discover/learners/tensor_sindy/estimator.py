@@ -84,8 +84,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         The known `Fluid`, in place of `modulus`, `relaxation_time`, `solvent_viscosity`,
         `base_law`, `known_relaxation` and `modulus_covariance`.
     modulus_covariance
-        Of the moduli in Pa², shape (k, k), as a sweep leaves them: intervals and bands allow for
-        it. None where the moduli are exact.
+        Of the moduli in Pa, as a sweep leaves them, shape (k, k), in Pa squared: intervals and
+        bands allow for it. None where the moduli are exact.
     use_normal_stresses
         Whether N1 and N2, where measured, join as observed rows.
     selection
