@@ -25,8 +25,10 @@ from pathlib import Path
 import numpy as np
 from independent import Giesekus, PhanThienTanner
 from independent.folders import write_table
+from independent.homogeneous import UNIT
+from independent.material import integrate
 from independent.structured import Structured
-from scipy.integrate import solve_ivp
+from independent.sweeps import modulus_of
 
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 MATERIALS = {
@@ -43,31 +45,19 @@ PLANTED = {
     "structure": {"thixotropy": {"breakdown": 0.25, "build_up_time": 2.0}},
 }
 TERMS = {"giesekus": {"sigma.sigma": 0.3}, "ptt": {"tr(sigma)*sigma": 0.2}}
-UNIT = {
-    "shear": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
-    "uniaxial": np.diag([1.0, -0.5, -0.5]),
-    "planar": np.diag([1.0, -1.0, 0.0]),
-    "biaxial": np.diag([1.0, 1.0, -2.0]),
-}
 Rate = Callable[[float], float]
 
 
 def followed(material, rate: Rate, times, kind="shear", jumps=()) -> np.ndarray:
     """Return the stress tensor with solvent at times of 0 and more, from rest, shape (n, 3, 3)."""
-    state, begins, found = material.rest(), 0.0, {0.0: material.rest()}
-    for end in [*[j for j in jumps if j < times[-1]], times[-1]]:
-        inside = np.unique(np.append(times[(times > begins) & (times <= end)], end))
-        short = np.nextafter(end, begins)
-        solved = solve_ivp(
-            lambda t, y, short=short: material.change(y, rate(min(t, short)) * UNIT[kind]),
-            (begins, end), state, method="LSODA", t_eval=inside, rtol=1e-8, atol=1e-8,
-        )  # fmt: skip
-        found |= dict(zip(solved.t, solved.y.T, strict=True))
-        state, begins = solved.y[:, -1], end
+    states = integrate(
+        lambda t, state: material.change(state, rate(t) * UNIT[kind]),
+        material.rest(), times, jumps, material.scale(),
+    )  # fmt: skip
     out = []
-    for t in times:
+    for t, state in zip(times, states, strict=True):
         gradient = rate(t) * UNIT[kind]
-        out.append(material.stress(found[t], gradient) + SOLVENT * (gradient + gradient.T))
+        out.append(material.stress(state, gradient) + SOLVENT * (gradient + gradient.T))
     return np.array(out)
 
 
@@ -81,17 +71,8 @@ def crept(material, stress: Rate, times, jumps=()) -> np.ndarray:
         rate = (stress(t) - polymer) / SOLVENT
         return np.append(material.change(y[:size], rate * UNIT["shear"]), rate)
 
-    state, begins, found = np.append(material.rest(), 0.0), 0.0, {}
-    for end in [*[j for j in jumps if j < times[-1]], times[-1]]:
-        inside = np.unique(np.append(times[(times > begins) & (times <= end)], end))
-        short = np.nextafter(end, begins)
-        solved = solve_ivp(
-            lambda t, y, short=short: change(min(t, short), y),
-            (begins, end), state, method="LSODA", t_eval=inside, rtol=1e-8, atol=1e-8,
-        )  # fmt: skip
-        found |= dict(zip(solved.t, solved.y[-1], strict=True))
-        state, begins = solved.y[:, -1], end
-    return np.array([found[t] for t in times])
+    start, scale = np.append(material.rest(), 0.0), np.append(material.scale(), 1.0)
+    return integrate(change, start, times, jumps, scale)[:, -1]
 
 
 class Folder:
@@ -224,11 +205,8 @@ def flow_curve(folder, material):
 
 def harmonics(material, strain: float, frequency: float) -> complex:
     """Return G′ + iG″ of the first harmonic of an oscillation gone on for long."""
-    period = 2.0 * np.pi / frequency
-    times = np.append(0.1 * period, (np.ceil(25.0 / period) + np.arange(128) / 128) * period)
-    stress = followed(material, lambda t: strain * frequency * np.cos(frequency * t), times)
-    turn = np.exp(-1j * frequency * times[1:])
-    return complex(2j * np.mean(stress[1:, 0, 1] * turn)) / strain
+    cycles = int(np.ceil(25.0 * frequency / (2.0 * np.pi)))
+    return modulus_of(material, strain, frequency, cycles) + 1j * frequency * SOLVENT
 
 
 def frequency_sweep(folder, material):
@@ -261,9 +239,7 @@ def extension(kind: str):
         times = np.linspace(0.05, 5.0, 80)
         for rate in (0.2, 0.4):
             stress = followed(material, lambda t, r=rate: r, times, kind)
-            # of the directions that are stretched over the one that is not
-            other = 2 if kind == "biaxial" else 1
-            tensile = stress[:, 0, 0] - stress[:, other, other]
+            tensile = stress[:, 0, 0] - stress[:, 1, 1]
             columns = {
                 "time_s": times,
                 "hencky_rate_1_s": np.full(80, rate),

@@ -22,7 +22,7 @@ from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.periodic_states import periodic_state
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.kinematics import MODULI
+from discover.protocols.kinematics import FOLLOWED, MODULI
 from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.grid import IntegrationGrid
@@ -33,9 +33,6 @@ from discover.simulate.solve import (
     solve_states_on_grid,
 )
 from tensor_library.kinematics import VelocityGradient
-
-FOLLOWED = ("rate", "steady")
-"""Controls of which the rate is known beforehand; of the others it is solved for."""
 
 Numbers = TypeVar("Numbers")
 

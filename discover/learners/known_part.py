@@ -16,6 +16,7 @@ from discover.laws.checking import check_law
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.settings import per_mode
+from discover.protocols.kinematics import FOLLOWED
 
 _HELD_BY_BASE = (
     "modulus",
@@ -145,7 +146,7 @@ def require_known_rate(known: KnownPart, runs: Sequence[Run]) -> None:
     if known.law is None or not (known.law.variables or known.law.retracts):
         return
     for run in runs:
-        if run.protocol.control not in ("rate", "steady"):
+        if run.protocol.control not in FOLLOWED:
             raise InputError(
                 f"The run {run.name!r} has no rate that is known beforehand, and a learner does "
                 f"not solve for it beside {type(known.law).__name__}, which has more than a "

@@ -29,6 +29,9 @@ Control = Literal["rate", "stress", "steady", "oscillation"]
 """What a protocol imposes: a rate, a stress, rates each held until the flow is steady, or
 oscillations each gone on until they are periodic."""
 
+FOLLOWED: tuple[Control, ...] = ("rate", "steady")
+"""Controls of which the rate is known beforehand; of the others it is solved for."""
+
 STATES: tuple[Control, ...] = ("steady", "oscillation")
 """Controls of which each sample is a state of its own, and time only counts them."""
 

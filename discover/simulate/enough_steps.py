@@ -3,6 +3,7 @@
 import numpy as np
 
 from discover.laws.multimode import Fluid
+from discover.protocols.kinematics import FOLLOWED
 from discover.simulate.flow_batch import FlowBatch
 from discover.simulate.solve import solve_batch
 
@@ -26,7 +27,7 @@ def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
     flows
         From `lay_out`.
     """
-    followed = all(protocols.control in ("rate", "steady") for protocols, _ in flows.parts)
+    followed = all(protocols.control in FOLLOWED for protocols, _ in flows.parts)
     if not fluid.law.retracts or not followed:
         return flows
     pieces, coarse = 1, np.asarray(solve_batch(fluid, flows))

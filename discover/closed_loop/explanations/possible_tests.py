@@ -17,6 +17,7 @@ from discover.protocols import (
     steady_rates,
     step_rates,
 )
+from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import shear_rates
 
 BEYOND = 3.0
@@ -60,7 +61,7 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Possible
     relaxation_time
         The longest, in s.
     """
-    at_rate = [run for run in runs if run.protocol.control in ("rate", "steady")]
+    at_rate = [run for run in runs if run.protocol.control in FOLLOWED]
     rates = [float(np.max(np.abs(run.rate))) for run in at_rate]
     rates = [rate for rate in rates if rate > 0.0]
     if not rates:

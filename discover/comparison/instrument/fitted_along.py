@@ -5,7 +5,7 @@ they settle. Both learners, and the classical laws, start from the same constant
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -87,12 +87,18 @@ class Learned:
 
 @dataclass(frozen=True)
 class _Given:
-    """Constants given a law: values, the joint fit if any, half intervals, what they gained."""
+    """Constants given a law: values, what they gained, and what is known of a joint fit if any.
+
+    Of that: half intervals of the constants, intervals of all that is fitted, by position, and what
+    errors of the moduli change.
+    """
 
     raw: dict[str, float]
-    joint: Fit | None
-    halves: Sequence[float]
     gained: float
+    joint: Fit | None = None
+    halves: Sequence[float] = ()
+    bounds: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    shifts: Float[np.ndarray, "k runs n"] | None = None
 
     def settled(self, before: Mapping[str, float]) -> bool:
         if self.joint is None:
@@ -269,14 +275,14 @@ class FittedAlong:
             settled, raw = given.settled(raw), given.raw
             if settled or rounds == _ROUNDS:
                 break
-        joint = None if given is None else given.joint
-        if joint is not None:
-            result = self._with_joint(result, joint)
+        if given is not None and given.joint is not None:
+            result = self._with_joint(result, given, given.joint)
         known = self.with_values(raw)
         fluid = Fluid(
             result.law, known.modulus, known.relaxation_time, float(known.solvent_viscosity)
         )
-        return Learned(result, fluid, self._constants(raw, joint), rounds, settled)
+        bounds = {} if given is None else given.bounds
+        return Learned(result, fluid, self._constants(raw, bounds), rounds, settled)
 
     def _given_law(self, result: LearnerResult, raw: Mapping[str, float]) -> "_Given | None":
         """Return the constants given a law; None where it cannot be integrated.
@@ -302,10 +308,13 @@ class FittedAlong:
             return None
         before = float(np.sum(model.residuals([start], self.batch)[0] ** 2))
         values = dict(zip(raw, map(float, fit.theta[free[: len(raw)]]), strict=True))
-        bounds = intervals(model, self.batch, fit, modulus_shifts(model, fit.theta, self.batch))
-        halves = [0.5 * (bounds[at][1] - bounds[at][0]) for at in free[: len(raw)]]
         gained = 1.0 - fit.cost / before if before > 0.0 else 0.0
-        return _Given(values, fit if joint else None, halves, gained)
+        if not joint:
+            return _Given(values, gained)
+        shifts = modulus_shifts(model, fit.theta, self.batch)
+        bounds = intervals(model, self.batch, fit, shifts)
+        halves = [0.5 * (bounds[at][1] - bounds[at][0]) for at in free[: len(raw)]]
+        return _Given(values, gained, fit, halves, bounds, shifts)
 
     def _vector(self, model: AugmentedModel, raw: Mapping[str, float]) -> np.ndarray:
         theta = model.zero()
@@ -345,16 +354,14 @@ class FittedAlong:
                     "one of them in [model]."
                 )
 
-    def _with_joint(self, result: LearnerResult, fit: Fit) -> LearnerResult:
+    def _with_joint(self, result: LearnerResult, given: _Given, fit: Fit) -> LearnerResult:
         """Return a sparse law with coefficients and intervals that allow for the constants."""
-        shifts = modulus_shifts(self.model, fit.theta, self.batch)
-        bounds = intervals(self.model, self.batch, fit, shifts)
         at = [self.model.positions(term.term)[0] for term in result.terms]
         terms = tuple(
             replace(
                 term,
                 coefficient=float(fit.theta[position]),
-                ci95=None if term.ci95 is None else bounds[position],
+                ci95=None if term.ci95 is None else given.bounds[position],
             )
             for term, position in zip(result.terms, at, strict=True)
         )
@@ -365,14 +372,16 @@ class FittedAlong:
             result.law.linear_relaxation,
             getattr(result.law, "base", None),
         )
-        details: dict[str, Any] = {**result.details, **self._uncertainty(fit, shifts)}
+        details: dict[str, Any] = {**result.details, **self._uncertainty(fit, given.shifts)}
         drawn = details.get("draws") or {}
         if drawn and drawn.get("method") != "linear":
             reason = "the constants fitted along are not in the draws from its likelihood"
             details["draws"] = {**drawn, "method": "none", "reason": drawn.get("reason") or reason}
         return replace(result, terms=terms, law=law, details=details)
 
-    def _uncertainty(self, fit: Fit, shifts: Float[np.ndarray, "k runs n"]) -> dict[str, Any]:
+    def _uncertainty(
+        self, fit: Fit, shifts: Float[np.ndarray, "k runs n"] | None
+    ) -> dict[str, Any]:
         """Return how uncertain the coefficients are, whatever the constants, as searches say it."""
         count = len(self.free)
         if len(fit.free) == count:
@@ -382,14 +391,16 @@ class FittedAlong:
         seen = np.asarray(self.batch.weight) > 0
         sequences = [row[kept] for row, kept in zip(rows, seen, strict=True)]
         design = fit.jacobian.reshape(len(fit.free), -1).T
-        by_moduli = shifts.reshape(len(shifts), -1).T if len(shifts) else None
+        by_moduli = None
+        if shifts is not None and len(shifts):
+            by_moduli = shifts.reshape(len(shifts), -1).T
         covariance, _, _ = least_squares_covariance(
             design, fit.residual.ravel(), sequences, by_moduli
         )
         found: dict[str, Any] = {"covariance": covariance[count:, count:].tolist()}
         found["modulus_errors"] = None
         of_modes = self.model.declared.modulus_covariance
-        if by_moduli is not None and of_modes is not None:
+        if shifts is not None and by_moduli is not None and of_modes is not None:
             root = root_of(of_modes)
             off = response(fit.jacobian, shifts)[count:]
             found["modulus_errors"] = {"root": root.tolist(), "response": off.tolist()}
@@ -403,11 +414,9 @@ class FittedAlong:
         own = modes[MODE_CONSTANTS.index(name)]
         return float(np.exp(raw)) * (float(own[0]) if len(own) == 1 else 1.0)
 
-    def _constants(self, raw: Mapping[str, float], joint: Fit | None) -> dict[str, Constant]:
-        bounds = {}
-        if joint is not None:
-            shifts = modulus_shifts(self.model, joint.theta, self.batch)
-            bounds = intervals(self.model, self.batch, joint, shifts)
+    def _constants(
+        self, raw: Mapping[str, float], bounds: Mapping[int, tuple[float, float]]
+    ) -> dict[str, Constant]:
         single = len(self.declared.modulus) == 1
         found = {}
         for name, value in raw.items():

@@ -9,8 +9,8 @@ import numpy as np
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.forward.fluids import FOLLOWED
 from discover.learners.registry import BANDS_ONLY
+from discover.protocols.kinematics import FOLLOWED
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
 

@@ -21,6 +21,7 @@ from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
+from discover.statistics import root_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -116,10 +117,10 @@ def draws(
     centre = np.array([*contender.terms.values(), *contender.inner.values()])
     if contender.drawn is None:
         assert contender.covariance is not None  # one of the two is there
-        size, axes = np.linalg.eigh(contender.covariance)
+        root = root_of(contender.covariance)
         # evenly along every axis, or the ends of a band of few draws would be a matter of luck
-        even = norm.ppf(LatinHypercube(len(size), scramble=False, rng=rng).random(n_draws))
-        drawn = centre + even @ (axes * np.sqrt(np.maximum(size, 0.0))).T
+        even = norm.ppf(LatinHypercube(len(root), scramble=False, rng=rng).random(n_draws))
+        drawn = centre + even @ root.T
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]
     split = len(names)

@@ -16,7 +16,6 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.forward.fluids import (
-    FOLLOWED,
     dynamics_of_modes,
     solved_on_grid,
     with_cheap_tangents,
@@ -25,6 +24,7 @@ from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwor
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
+from discover.protocols.kinematics import FOLLOWED
 from discover.simulate.fixed_steps import fixed_steps
 from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes

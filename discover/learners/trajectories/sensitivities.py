@@ -19,7 +19,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.forward.fluids import (
-    FOLLOWED,
     dynamics_of_modes,
     solved_on_grid,
     with_cheap_tangents,
@@ -29,6 +28,7 @@ from discover.laws.multimode import Fluid
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
+from discover.protocols.kinematics import FOLLOWED
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.fixed_steps import fixed_steps
 from discover.simulate.solve import exponential_steps
