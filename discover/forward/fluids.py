@@ -15,14 +15,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.periodic_states import periodic_state
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.protocols.kinematics import FOLLOWED, MODULI
+from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.grid import IntegrationGrid
@@ -45,15 +45,15 @@ class AtSamples(NamedTuple):
     Attributes
     ----------
     observed
-        What is recorded, and N1 and N2 in Pa, shape (n, 3). Of a modulus, which belongs to no
-        moment, N1 and N2 are zero.
+        What is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of which a
+        run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are zero.
     states
         Dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
     rate
         In 1/s, shape (n,); of an oscillation its amplitude.
     """
 
-    observed: Float[Array, "n 3"]
+    observed: Inexact[Array, "n 3"]
     states: Float[Array, "n k s"]
     rate: Float[Array, " n"]
 
@@ -79,8 +79,8 @@ def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> A
 
 def observed_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, adjoint: Any = None
-) -> Float[Array, "n 3"]:
-    """Return what is recorded, and N1 and N2 in Pa, at the samples of one grid, shape (n, 3).
+) -> Inexact[Array, "n 3"]:
+    """Return what `AtSamples.observed` holds, at the samples of one grid.
 
     Parameters
     ----------
@@ -148,6 +148,7 @@ def solved_on_grid(
     numbers: Numbers,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
+    together: bool = False,
 ) -> AtSamples:
     """Return what is seen where the rate is solved for: at a given stress, and of oscillations.
 
@@ -159,6 +160,8 @@ def solved_on_grid(
         A tree.
     protocol, grid
         As in `at_samples`.
+    together
+        Whether the samples are of use only together, and not one is solved for once another cannot.
     """
     dynamics, fixed = make(numbers), make(_fixed(numbers))
     if protocol.control == "stress":
@@ -166,15 +169,15 @@ def solved_on_grid(
 
     phase = grid.phase
     assert phase is not None  # of oscillations
+    axis = "samples" if together else None
 
     def one(time):
         strain, rate = protocol.strain_in_table(time), protocol.rate(time)
-        found = periodic_state(dynamics, fixed, strain, rate / strain, phase)
-        both = jnp.stack([found.modulus.real, found.modulus.imag])
-        recorded = both[MODULI.index(protocol.modulus)]
-        return AtSamples(recorded * jnp.array([1.0, 0.0, 0.0]), found.stress.T, rate)
+        found = periodic_state(dynamics, fixed, strain, rate / strain, phase, axis)
+        return AtSamples(found.modulus * jnp.array([1.0, 0.0, 0.0]), found.stress.T, rate)
 
-    return jax.vmap(one)(grid.sample_times)
+    found = jax.vmap(one, axis_name=axis)(grid.times)  # not those that pad a record
+    return jax.tree.map(lambda leaf: leaf[grid.sample_index], found)
 
 
 def _fixed(numbers: Numbers) -> Numbers:

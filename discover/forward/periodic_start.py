@@ -8,9 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.forward.modified_newton import (
-    FROM_REST,
     Approximation,
     first_approximation,
+    goes_on,
     next_approximation,
     relative_change,
 )
@@ -108,10 +108,7 @@ def periodic_start(
     stress, levels = rest
     start = _Iterate(first_approximation(stress), levels, jnp.asarray(jnp.inf))
     end = jax.lax.while_loop(
-        lambda now: (
-            (now.modes.number < _MOST)
-            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
-        ),
+        lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
         improved,
         start,
     )

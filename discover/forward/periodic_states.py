@@ -13,6 +13,7 @@ from discover.forward.modified_newton import (
     FROM_REST,
     Approximation,
     first_approximation,
+    goes_on,
     next_approximation,
     relative_change,
 )
@@ -151,10 +152,7 @@ def complex_modulus(
         change=jnp.asarray(jnp.inf),
     )
     end = jax.lax.while_loop(
-        lambda now: (
-            (now.modes.number < _MOST)
-            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
-        ),
+        lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
         improved,
         start,
     )
@@ -193,6 +191,7 @@ def periodic_state(
     strain: Float[Array, ""],
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
+    together: str | None = None,
 ) -> PeriodicState:
     """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
 
@@ -206,6 +205,9 @@ def periodic_state(
         The same, through which no derivative passes.
     strain, frequency, phase
         As in `complex_modulus`.
+    together
+        The name of an axis of states that are of use only together, over which this is mapped: once
+        one of them is given up, so are the others.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
@@ -235,15 +237,23 @@ def periodic_state(
         change = jnp.where(jnp.all(better), change, jnp.inf)
         return _Solving(following, change, jacobian, harmonics)
 
+    def hopeful(now: _Solving):
+        further = goes_on(now.modes, now.change, _MOST, _TOLERANCE)
+        if together is None:
+            return further
+        given_up = ~further & ~(now.change < _TOLERANCE)
+        return further & (jax.lax.pmax(given_up.astype(int), together) == 0)
+
     size, modes = fixed.rest()[0].shape
+    # the cycles from rest need no derivative
+    begun = jax.lax.fori_loop(
+        0, FROM_REST, lambda _, stress: solve(stress, (), strain).stress, fixed.rest()[0]
+    )
     end = jax.lax.while_loop(
-        lambda now: (
-            (now.modes.number < _MOST)
-            & ~((now.modes.number > FROM_REST) & (now.change < _TOLERANCE))
-        ),
+        hopeful,
         improved,
         _Solving(
-            first_approximation(fixed.rest()[0]),
+            first_approximation(begun, FROM_REST),
             jnp.asarray(jnp.inf),
             jnp.zeros((modes, size, size)),
             jnp.zeros((size, modes), dtype=complex),

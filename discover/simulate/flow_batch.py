@@ -1,8 +1,9 @@
 """Runs of several controls in one batch, with the grid of each."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,29 +11,45 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from discover.protocols.kinematics import MODULI, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 
 # Of its strain, what an oscillation keeps that is to be still: without any it has no modulus
 _SMALL_STRAIN = 1e-3
 
+# Numbers of periodic states are rounded up to multiples of this
+_STATES = 8
+
+_NEVER = -1.23456789e300
+
+
+class Shown(NamedTuple):
+    """What a run shows: a flow of its part, and of an oscillation which modulus."""
+
+    run: int
+    flow: int
+    modulus: RecordedQuantity | None
+
 
 class FlowBatch(eqx.Module):
     """Flows and their grids, those of one control together, for each has a program of its own.
 
+    G′ and G″ of one sweep are two runs of one flow: its periodic states are solved for once.
+
     Attributes
     ----------
     parts
-        Protocols and grids of each control, both with a leading axis of runs.
-    rows
-        Which runs these are.
+        Protocols and grids of each control, both with a leading axis of flows.
+    shown
+        What each run of a part shows of them.
     """
 
     parts: tuple[tuple[FlowProtocol, IntegrationGrid], ...]
-    rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    shown: tuple[tuple[Shown, ...], ...] = eqx.field(static=True)
 
     def __len__(self) -> int:
-        return sum(map(len, self.rows))
+        return sum(map(len, self.shown))
 
     @property
     def sample_mask(self) -> Bool[Array, "runs n"]:
@@ -41,7 +58,7 @@ class FlowBatch(eqx.Module):
 
     @property
     def n_steps(self) -> int:
-        """Steps of all runs; of oscillations those of one half cycle for each state."""
+        """Steps of all flows; of oscillations those of one half cycle for each state."""
         return sum(
             grid.times.size
             if grid.phase is None
@@ -49,24 +66,31 @@ class FlowBatch(eqx.Module):
             for _, grid in self.parts
         )
 
-    def over(self, function: Callable[..., Any], *batched: Any) -> Any:
+    @property
+    def is_uniform(self) -> bool:
+        """Whether all runs are of one control, and each has a flow of its own."""
+        (first, *others) = self.parts
+        return not others and len(first[1].sample_index) == len(self)
+
+    def over(self, function: Callable[..., Any]) -> Any:
         """Return what a function makes of each flow and its grid, runs in their order.
 
         Parameters
         ----------
         function
-            Of one protocol and its grid, and of a run's share of `batched`; it may return a tree
-            of arrays, whose shapes do not depend on the control.
-        *batched
-            Trees of arrays with a leading axis of runs.
+            Of one protocol and its grid; it may return a tree of arrays, whose shapes do not depend
+            on the control. Where an array is complex, a run has the part that is its modulus.
         """
-        if len(self.parts) == 1:
-            return jax.vmap(function)(*self.parts[0], *batched)
-        found = []
-        for part, rows in zip(self.parts, self.rows, strict=True):
-            own = jax.tree.map(partial(jnp.take, indices=jnp.asarray(rows), axis=0), batched)
-            found.append(jax.vmap(function)(*part, *own))
-        order = np.argsort(np.concatenate(self.rows))
+        found, told = [], None
+        for part, shown in zip(self.parts, self.shown, strict=True):
+            if told is not None:
+                part = _after(told, part)
+            of_flows = jax.vmap(function)(*part)
+            told = jax.tree.leaves(of_flows)[0]
+            found.append(jax.tree.map(partial(_of_runs, shown), of_flows))
+        if len(found) == 1:
+            return found[0]
+        order = np.argsort([one.run for shown in self.shown for one in shown])
         return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[order], *found)
 
     def with_steps_in(self, multiple: int) -> "FlowBatch":
@@ -74,12 +98,13 @@ class FlowBatch(eqx.Module):
         parts = []
         for protocols, grids in self.parts:
             times = np.asarray(grids.times)
-            more = -times.shape[1] % multiple
+            # those of oscillations are states, each of which costs many steps
+            more = -times.shape[1] % (multiple if grids.phase is None else min(multiple, _STATES))
             spacing = (times[:, -1] - times[:, -2])[:, None] if times.shape[1] > 1 else 1.0
             added = times[:, -1:] + spacing * np.arange(1, more + 1)
             longer = jnp.asarray(np.concatenate([times, added], axis=1))
             parts.append((protocols, eqx.tree_at(lambda grid: grid.times, grids, longer)))
-        return FlowBatch(tuple(parts), self.rows)
+        return FlowBatch(tuple(parts), self.shown)
 
     def in_pieces(self, count: int) -> "FlowBatch":
         """Return the flows with every step cut into so many of one length."""
@@ -94,17 +119,18 @@ class FlowBatch(eqx.Module):
                 index = count * grids.sample_index
                 grids = IntegrationGrid(jnp.asarray(cut), index, grids.sample_mask)
             parts.append((protocols, grids))
-        return FlowBatch(tuple(parts), self.rows)
+        return FlowBatch(tuple(parts), self.shown)
 
     def faster(self, factor: Float[Array, " runs"]) -> "FlowBatch":
         """Return the flows with the rate of each multiplied; their grids stay.
 
         Oscillations keep their frequency, and some strain. A given stress may fall but not rise:
-        not every fluid bears more.
+        not every fluid bears more. Of a flow that several runs show the largest factor counts.
         """
         parts = []
-        for (protocols, grids), rows in zip(self.parts, self.rows, strict=True):
-            own = factor[jnp.asarray(rows)][:, None]
+        for (protocols, grids), shown in zip(self.parts, self.shown, strict=True):
+            runs, flows = np.array([(one.run, one.flow) for one in shown]).T
+            own = jax.ops.segment_max(factor[runs], flows, len(grids.sample_index))[:, None]
             if protocols.control == "stress":
                 own = jnp.minimum(own, 1.0)
             oscillates = protocols.table_strains is not None
@@ -117,13 +143,39 @@ class FlowBatch(eqx.Module):
 
             changed = eqx.tree_at(moved, protocols, [own * leaf for leaf in moved(protocols)])
             parts.append((changed, grids))
-        return FlowBatch(tuple(parts), self.rows)
+        return FlowBatch(tuple(parts), self.shown)
 
     def some(self, first: Int[Array, ""] | np.int32 | int, count: int) -> "FlowBatch":
-        """Return so many runs from the first on; all must be of one control."""
-        (part,) = self.parts
+        """Return so many runs from the first on, of a batch that `is_uniform`."""
+        (part,), (shown,) = self.parts, self.shown
         chosen = jax.tree.map(lambda leaf: jax.lax.dynamic_slice_in_dim(leaf, first, count), part)
-        return FlowBatch((chosen,), (tuple(range(count)),))
+        return FlowBatch((chosen,), (shown[:count],))
+
+
+def _of_runs(shown: tuple[Shown, ...], of_flows: Array) -> Array:
+    """Return what each run shows of its flow, with a leading axis of runs."""
+    of_runs = of_flows
+    if len(shown) > len(of_flows):
+        of_runs = of_flows[np.array([one.flow for one in shown])]
+    if not jnp.iscomplexobj(of_runs):
+        return of_runs
+    stored = np.array([one.modulus == MODULI[0] for one in shown])
+    return jnp.where(stored.reshape(-1, *(1,) * (of_runs.ndim - 1)), of_runs.real, of_runs.imag)
+
+
+def _after(told: Array, part: Any) -> Any:
+    """Return flows as they are, to be followed after something else is told.
+
+    Left to themselves XLA's threads follow both at once, and wait for one another for ever where
+    each iterates   [seen with jaxlib 0.10.2: two loops of Newton's steps, a scan in each].
+    """
+    # a sum that no flow makes, which the compiler cannot know: zero is added, and waited for
+    never = jnp.sum(jax.lax.stop_gradient(told).real) == _NEVER
+
+    def delayed(leaf):
+        return leaf + never if eqx.is_inexact_array(leaf) else leaf
+
+    return jax.tree.map(delayed, part)
 
 
 def lay_out(
@@ -143,16 +195,26 @@ def lay_out(
     **limits
         As `make_grids` takes them.
     """
-    kinds = [(protocol.control, protocol.modulus) for protocol in protocols]
     n = max(n_samples, *(len(sampled) for sampled in times))
-    parts, rows = [], []
-    for kind in dict.fromkeys(kinds):
-        own = tuple(i for i, other in enumerate(kinds) if other == kind)
-        flows = [protocols[i] for i in own]
-        grids = make_grids(flows, [times[i] for i in own], **limits)
+    parts, shown = [], []
+    for control in dict.fromkeys(protocol.control for protocol in protocols):
+        own = [i for i, protocol in enumerate(protocols) if protocol.control == control]
+        firsts = [next(j for j in own if _is_one_flow(protocols, times, i, j)) for i in own]
+        distinct = list(dict.fromkeys(firsts))
+        flows = [replace(protocols[i], modulus=None) for i in distinct]
+        grids = make_grids(flows, [times[i] for i in distinct], **limits)
         parts.append((stack_protocols(flows), _with_samples(grids, n)))
-        rows.append(own)
-    return FlowBatch(tuple(parts), tuple(rows))
+        pairs = zip(own, firsts, strict=True)
+        shown.append(tuple(Shown(i, distinct.index(j), protocols[i].modulus) for i, j in pairs))
+    return FlowBatch(tuple(parts), tuple(shown))
+
+
+def _is_one_flow(protocols, times, i: int, j: int) -> bool:
+    """Return whether two runs are moduli of one sweep, or the same run."""
+    if i == j or protocols[i].control != "oscillation":
+        return i == j
+    alike = [jax.tree.leaves((replace(protocols[k], modulus=None), times[k])) for k in (i, j)]
+    return all(np.array_equal(a, b) for a, b in zip(*alike, strict=True))
 
 
 def _with_samples(grids: IntegrationGrid, n: int) -> IntegrationGrid:

@@ -49,6 +49,20 @@ def test_an_amplitude_sweep_is_where_scipy_ends():
     np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-5)
 
 
+def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own():
+    other = oscillations(STRAINS[:2], np.full(2, FREQUENCY))
+    shown = [(SWEEP, "loss_modulus"), (other, "storage_modulus"), (SWEEP, "storage_modulus")]
+    protocols = [recording(*pair) for pair in shown]
+    flows = lay_out(protocols, [COUNTED, COUNTED[:2], COUNTED])
+    assert len(flows) == 3
+    assert flows.n_steps == lay_out(protocols[:2], [COUNTED, COUNTED[:2]]).n_steps
+    found = flows.over(partial(observed_on_grid, fluid()))[..., 0]
+    for one, protocol, mask in zip(found, protocols, flows.sample_mask, strict=True):
+        alone = observe(fluid(), protocol, COUNTED[: int(mask.sum())])[:, 0]
+        # both end where Newton's next step would change 1e-8
+        np.testing.assert_allclose(one[mask], alone, rtol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("protocol", "times"), [(imposed_stress(TIMES, STRESS), TIMES), (SWEEP, COUNTED)]
 )

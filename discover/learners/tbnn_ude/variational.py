@@ -70,7 +70,7 @@ def side_by_side(
     n = problem.target.shape[0]
     # halves of one size share a program; of an odd number of runs the middle one is in both
     half = -(-n // 2)
-    if n < 2 or len(problem.flows.parts) > 1:  # runs of several controls are programs of their own
+    if n < 2 or not problem.flows.is_uniform:
         return states_and_jacobian(weights, rebuild, problem)
     with ThreadPoolExecutor(1) as pool:
         last = pool.submit(states_and_jacobian, weights, rebuild, problem, half, np.int32(n - half))

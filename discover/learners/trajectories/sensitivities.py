@@ -144,7 +144,7 @@ def _observed_where_solved(problem, active, numbers, protocol, grid):
     def make(numbers):
         return dynamics_of_modes(partial(law, numbers), *modes, protocol)
 
-    return solved_on_grid(make, numbers, protocol, grid).observed
+    return solved_on_grid(make, numbers, protocol, grid, together=True).observed
 
 
 def _law_of_numbers(library, given, numbers, stress, rate):
