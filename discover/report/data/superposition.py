@@ -37,7 +37,8 @@ def superposition_words(
     own
         What tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
     """
-    said = [_verdict(found, kind) for kind in found.leading]
+    # shifts that nothing determines may leave no overlap to judge
+    said = [_verdict(found, kind) for kind in found.leading if found.misfits(kind)]
     if found.verdict == "not_superposed":
         return said
     others = [kind for kind in found.tests if kind not in found.leading]
