@@ -99,7 +99,9 @@ def next_approximation(
     return following, better
 
 
-def goes_on(now: Approximation, change: Float[Array, ""], most: int, tolerance: float):
+def goes_on(
+    now: Approximation, change: Float[Array, ""], most: int, tolerance: float
+) -> Bool[Array, ""]:
     """Return whether to go through another cycle.
 
     Parameters

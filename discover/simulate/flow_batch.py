@@ -21,6 +21,7 @@ _SMALL_STRAIN = 1e-3
 # Numbers of periodic states are rounded up to multiples of this
 _STATES = 8
 
+# What no sum of stresses is
 _NEVER = -1.23456789e300
 
 
@@ -169,7 +170,7 @@ def _after(told: Array, part: Any) -> Any:
     Left to themselves XLA's threads follow both at once, and wait for one another for ever where
     each iterates   [seen with jaxlib 0.10.2: two loops of Newton's steps, a scan in each].
     """
-    # a sum that no flow makes, which the compiler cannot know: zero is added, and waited for
+    # that this is false the compiler cannot know: zero is added, and waited for
     never = jnp.sum(jax.lax.stop_gradient(told).real) == _NEVER
 
     def delayed(leaf):
