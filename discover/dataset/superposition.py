@@ -80,9 +80,13 @@ class Superposition:
         return found
 
     def verdict_of(self, kind: str) -> str:
-        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind."""
-        worst = max(self.misfits(kind).values(), default=0.0)
-        if worst <= SUPERPOSED:
+        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind.
+
+        Doubtful too where nothing overlaps: no misfit is not a small one.
+        """
+        misfits = self.misfits(kind)
+        worst = max(misfits.values(), default=0.0)
+        if misfits and worst <= SUPERPOSED:
             return "superposed"
         return "doubtful" if worst < FAILED else "not_superposed"
 

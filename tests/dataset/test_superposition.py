@@ -1,6 +1,7 @@
 """Tests at several temperatures: known shifts come back, and where there are none that is said."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,6 +169,15 @@ def test_tables_over_time_alone_give_shifts_whose_intervals_hold_the_planted_one
         assert np.max(found.error[:, 0]) < 0.02
     # of 24 intervals of 95 %, of which those of one set hang together, 5 miss in 1 of 100 cases
     assert np.sum(inside) >= 20
+
+
+def test_tables_that_do_not_overlap_once_moved_are_not_said_to_superpose():
+    tests = {"relaxation": {float(t): over_time("relaxation", *relaxation(t)) for t in NEAR}}
+    found = superpose(tests, REFERENCE)
+    far = replace(found, log_shift=found.log_shift + 20.0 * np.arange(len(found.celsius)))
+    assert found.verdict == "superposed"
+    assert far.verdict == "doubtful"
+    assert "do not overlap" in superposition_words(far)[0]
 
 
 def test_vertical_shifts_of_power_laws_are_not_determined():

@@ -37,8 +37,7 @@ def superposition_words(
     own
         What tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
     """
-    # shifts that nothing determines may leave no overlap to judge
-    said = [_verdict(found, kind) for kind in found.leading if found.misfits(kind)]
+    said = [_verdict(found, kind) for kind in found.leading]
     if found.verdict == "not_superposed":
         return said
     others = [kind for kind in found.tests if kind not in found.leading]
@@ -62,6 +61,11 @@ def superposition_words(
 
 def _verdict(found: Superposition, kind: str, led: bool = False) -> str:
     misfits = found.misfits(kind)
+    if not misfits:  # shifts that nothing determines may leave no overlap
+        return (
+            f"Whether the {_PLURALS[kind]} superpose is doubtful: moved by the shifts found, those "
+            "of neighbouring temperatures do not overlap."
+        )
     (cold, warm), size = max(misfits.items(), key=lambda item: item[1])
     worst, where = percent(size), f"{cold:g} and {warm:g} °C"
     moved = f" with the shifts of the {_PLURALS[found.leading[0]]}" if led else ""
