@@ -14,6 +14,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from discover.learners.trajectories.damped_steps import levenberg_marquardt
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled
@@ -21,11 +22,6 @@ from discover.programs import compiled
 _MOST_STEPS = 12
 _TOLERANCE = 1e-2
 """Of a mode, in widths of the prior: draws scatter by far more."""
-
-# The damping falls whenever a step does most of what it promised; by default it waits for 99 %.
-_BOLD = optx.ClassicalTrustRegion(
-    high_cutoff=0.6, low_cutoff=0.1, high_constant=10.0, low_constant=0.1
-)
 
 # As in the sparse learner's refits: the solver's first damping, one, is small beside the curvature.
 _AMPLIFICATION = 10.0
@@ -77,11 +73,9 @@ def _residual_jvp(primals, tangents):
 
 @compiled
 def _descend(layout: _Layout, start: Float[Array, " n"]):
-    solver = optx.LevenbergMarquardt(rtol=_TOLERANCE, atol=_TOLERANCE)
-    solver = eqx.tree_at(lambda s: s.search, solver, _BOLD)
     solution = optx.least_squares(
         _residual,
-        solver,
+        levenberg_marquardt(_TOLERANCE),
         start,
         args=layout,
         has_aux=True,

@@ -4,7 +4,6 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -13,6 +12,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
+from discover.learners.trajectories.damped_steps import levenberg_marquardt
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled
@@ -131,11 +131,10 @@ def _descend(
     start: Float[Array, " parameters"],
     tolerance: Float[Array, ""],
 ):
-    # a traced tolerance, so that screening and polishing share one program
-    traced: Any = tolerance
     solution = optx.least_squares(
         lambda parameters, args: _residual(parameters, *args),
-        optx.LevenbergMarquardt(rtol=traced, atol=traced),
+        # a traced tolerance, so that screening and polishing share one program
+        levenberg_marquardt(tolerance),
         start,
         args=(problem, layout),
         has_aux=True,
