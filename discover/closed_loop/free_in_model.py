@@ -9,6 +9,7 @@ together with the constants of a law and held against what was found by the crit
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 
 from discover.closed_loop.judging.before_after import strain_of
@@ -187,7 +188,7 @@ def _form(
     covariance, _ = covariance_and_noise(search.batch, fit.residual, fit.jacobian[seen])
     own = [seen.index(row) for row in rows[:count]]
     grid = np.linspace(0.0, reach, _DRAWN)
-    basis = np.asarray(spline_basis(grid, curve.largest, curve.onset))[:, :count]
+    basis = np.asarray(spline_basis(jnp.asarray(grid), curve.largest, curve.onset))[:, :count]
     value = basis @ fit.theta[[fit.free[row] for row in rows[:count]]]
     variance = np.einsum("im,mk,ik->i", basis, covariance[np.ix_(own, own)], basis)
     deviation = np.sqrt(np.clip(variance, 0.0, None))

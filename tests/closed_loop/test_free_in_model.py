@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import PhanThienTanner, PomPom, WhiteMetzner
@@ -84,6 +85,7 @@ def test_slip_with_the_third_power_of_the_stress_is_found_as_that_function(tmp_p
     assert found.error.held_out < 1.5 * NOISE < loop.error_after.held_out
 
 
+@pytest.mark.slow
 def test_a_fluid_that_stretches_is_no_function_of_one_variable(tmp_path):
     loop, _ = loop_on(tmp_path, PomPom(5.0, 0.4, **SCALE))
     assert loop.verdict == "unexplained"
@@ -93,7 +95,7 @@ def test_a_fluid_that_stretches_is_no_function_of_one_variable(tmp_path):
 @pytest.mark.parametrize("largest", [0.5, 20.0])
 def test_the_spline_is_zero_at_rest_and_follows_any_smooth_function(largest):
     x = np.linspace(0.0, largest, 200)
-    basis = np.asarray(spline_basis(x, largest, ONSET))
+    basis = np.asarray(spline_basis(jnp.asarray(x), largest, ONSET))
     assert basis.shape == (200, INTERVALS + 1)
     np.testing.assert_allclose(basis[0], 0.0, atol=1e-12)
     for function in (lambda x: x, np.sqrt, lambda x: np.log1p(x) ** 2):
