@@ -86,6 +86,7 @@ def train(
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
             modulus_covariance=model.modulus_covariance,
+            screening="exact" if options.recipe == "thorough" else "auto",
             **shared,
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files

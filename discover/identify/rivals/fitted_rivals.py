@@ -207,7 +207,8 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
             )
         )
     found.sort(key=lambda rival: rival.difference)
-    return RivalTable(tuple(found), len(fits), not any(rival.simpler for rival in found))
+    tested = len(fits) + search.n_ruled_out(size)
+    return RivalTable(tuple(found), tested, not any(rival.simpler for rival in found))
 
 
 def _in_time_order(problem, seen):

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -224,6 +225,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                 "misfit": best.misfit,
                 "coefficients": _coefficient_table(best.law, cloud),
                 "coefficients_vary": best.varies,
+                "n_constants": _count_of_numbers(best.law, best.varies),
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
                 "coefficient_spread_of_members": coefficient_spread(members, cloud),
@@ -321,6 +323,15 @@ def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
         known_relaxation=known.linear_relaxation,
         base=known.law,
     )
+
+
+def _count_of_numbers(law: TensorBasisNetwork, varies: bool) -> int:
+    """Return how many numbers of a law were fitted: constants that are not zero, and weights."""
+    count = int(np.count_nonzero(np.asarray(law.constants)))
+    if varies:
+        weights = jax.tree.leaves(eqx.filter(law.network, eqx.is_inexact_array))
+        count += sum(int(leaf.size) for leaf in weights)
+    return count
 
 
 def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:

@@ -148,9 +148,7 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
                     f"{constant_in_words(c.name, one_mode)} = {significant(c.value, 3)}"
                     for c in outcome.constants.values()
                 ),
-                "number": sum(1 + len(t.inner) for t in outcome.terms) + len(outcome.constants)
-                if sparse
-                else None,
+                "number": _number_of_constants(outcome),
                 "misfit": None if left is None else left.misfit,
                 # of moduli that may move it would say less of the misfit than classical laws' do
                 "criterion": path[chosen].get("bic_at_exact_moduli", path[chosen]["bic"])
@@ -164,6 +162,15 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
         if row["criterion"] is not None:
             row["criterion"] -= least
     return rows
+
+
+def _number_of_constants(outcome: LearnerOutcome) -> int | None:
+    """Return how many numbers of a law were fitted; None of a learner that does not say."""
+    if outcome.learner == "tensor_sindy":
+        own = sum(1 + len(term.inner) for term in outcome.terms)
+    elif (own := outcome.details.get("n_constants")) is None:
+        return None
+    return own + len(outcome.constants)
 
 
 def _mean_errors(
