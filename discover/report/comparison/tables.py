@@ -140,7 +140,6 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
         errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
         path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
         left = comparison.explanation.lack_of_fit.get(name)
-        sparse = name == "tensor_sindy"
         rows.append(
             {
                 "law": learner_title(name),
