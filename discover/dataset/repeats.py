@@ -1,4 +1,4 @@
-"""What a test repeated on the same fluid says of its error: loading, trimming and noise together."""
+"""What repeated tests say of their error: loading, trimming and noise together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A rougher copy of a problem, on which many supports are ranked before a few are fitted exactly."""
+"""A rougher copy of a problem, to rank many supports before a few are fitted exactly."""
 
 from collections.abc import Callable, Sequence
 
