@@ -23,7 +23,8 @@ def record(name, rate=2.0, factor=1.0, noise=0.0, seed=0, times=TIMES, **metadat
 
 def test_loadings_that_differ_by_a_factor_are_told_with_its_size():
     found = repeats_among([record("a", factor=1.03), record("b", factor=0.97), record("c", 5.0)])
-    assert found is not None and found.groups == (("a", "b"),)
+    assert found is not None
+    assert found.groups == (("a", "b"),)
     assert found.error == pytest.approx(0.06 / np.sqrt(2.0), rel=1e-3)
 
 
