@@ -334,7 +334,7 @@ def _rougher(
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
         problem = _problem(fewer, known)
         said.append(f"at most {samples} samples of a run were fitted")
-    limits = rough_limits(problem.flows, known.relaxation_time)
+    limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.linear_relaxation:
         rough = _problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from discover.dataset.run import Run
 from discover.dataset.thinning import thin_run
 from discover.learners.rough_grid import AFFORDABLE, WORTH_IT, rough_limits
@@ -30,7 +32,7 @@ def rough_problem(
     steps = problem.flows.n_steps
     if problem.modulus.size * steps <= AFFORDABLE:
         return None
-    limits = rough_limits(problem.flows, problem.relaxation_time)
+    limits = rough_limits(problem.flows, np.asarray(problem.relaxation_time))
     if limits is None:
         return None
     rough = make([thin_run(run, SAMPLES) for run in runs], **limits)
