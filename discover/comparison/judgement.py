@@ -26,12 +26,12 @@ from discover.comparison.judging.next_measurement import NextMeasurement, next_m
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
 from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.repeats import Repeats, repeats_among
+from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics.residual import Expectation
-from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
@@ -190,19 +190,6 @@ def _classical(study: Study, known: Known, independent: float | None) -> Sequenc
         return [*fit_classical_laws(before.model, known.flows, relaxes, independent), *fits]
     each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
     return [*classical_along(known.along, each, known.flows, independent), *fits]
-
-
-def expectation_of(
-    study: Study, model: DeclaredModel, repeats: Repeats | None = None
-) -> Expectation:
-    """Return what a complete law may leave of a study's runs, as the closed loop has it.
-
-    What repeated runs differ by is counted where nobody told the noise.
-    """
-    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
-    noise = study.loop.noise
-    told = 0.0 if repeats is None or noise is not None else repeats.error
-    return Expectation(noise, linear_error, told)
 
 
 def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:

@@ -28,7 +28,7 @@ _FEWEST_SLOTS = 5
 
 # Of each size, what a rough grid ranks first is fitted again: at least so many, and those that
 # leave little more. Of laws that may rival the one chosen, so many at most.
-_FEWEST_TAKEN, _CLOSE_BEHIND, _MOST_NEAR = 3, 1.03, 32
+_FEWEST_TAKEN, _CLOSE_BEHIND, _MOST_NEAR = 3, 1.01, 24
 
 
 def _silent(line: str) -> None:
