@@ -210,6 +210,11 @@ class Expectation:
     linear_error: float = 0.0
     repeat_error: float = 0.0
 
+    @property
+    def patterned(self) -> float:
+        """Relative size that a pattern may have which is due to the sweep or to loadings."""
+        return float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
+
     def floor(
         self,
         residual: Float[np.ndarray, "runs n"],
@@ -253,4 +258,4 @@ class Expectation:
             return error <= float(np.hypot(self.noise, self.linear_error))
         fast = summarise(np.asarray(residual)[rows], np.asarray(weight)[rows]).noise
         pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
-        return pattern <= float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
+        return pattern <= self.patterned
