@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
@@ -37,7 +37,7 @@ from discover.learners.tensor_sindy.report import (
     path_table,
     rival_table,
 )
-from discover.learners.tensor_sindy.rough_problem import SAMPLES, rough_problem
+from discover.learners.tensor_sindy.rough_problem import ranked_in_words, rough_problem
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import (
     choose_by_bic,
@@ -46,7 +46,7 @@ from discover.learners.tensor_sindy.selection import (
 )
 from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
-from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
+from discover.learners.tensor_sindy.validation import groups_of, held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.learners.trajectories.prediction import predict_runs
@@ -261,7 +261,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
 
         problem = make(runs, strain_step=self.strain_step)
         rough = rough_problem(problem, runs, make) if self.screening == "auto" else None
-        groups = _groups(runs)
+        groups = groups_of(runs)
         n_groups = int(np.max(groups)) + 1
         validates = min(n_groups, self.n_folds) > 1
         if self.selection != "bic" and not validates:
@@ -337,16 +337,13 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 problem, fit, self.uncertainty_, search.slots, self.random_state or 0
             )
         self.terms_ = recovered_terms(search, fit, self.optimizer, self.uncertainty_, self.draws_)
-        misfits = [misfit for _, misfit in search.history]
+        misfits = np.array([misfit for _, misfit in search.history])
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            loss_history=(
-                np.arange(1.0, len(misfits) + 1.0),
-                np.minimum.accumulate(np.square(misfits)),
-            ),
+            loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
                 "path": path_table(search, path, criterion, held_out, by_run),
                 "chosen": chosen,
@@ -367,7 +364,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             },
             message=(
                 f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
-                f"{fit.misfit:.2g}; {search.n_refitted} supports were refitted{_ranked_in(search)}."
+                f"{fit.misfit:.2g}; {search.n_refitted} supports were refitted"
+                f"{ranked_in_words(problem, rough, len(search.fits))}."
             ),
         )
         return self
@@ -387,26 +385,6 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 f"screening must be one of {', '.join(SCREENINGS)}; got {self.screening!r}."
             )
         check_library(self.library)
-
-
-def _ranked_in(search: SupportSearch) -> str:
-    """Return what was left out of the search to save time, in words; empty if nothing."""
-    if search.scout is None:
-        return ""
-    share = search.problem.flows.n_steps / search.scout.problem.flows.n_steps
-    return (
-        f", {len(search.fits)} of them on all samples: to save time the others were ranked on at "
-        f"most {SAMPLES} samples of a run, in {share:.2g} times fewer steps (recipe 'thorough' "
-        "fits all on all)"
-    )
-
-
-def _groups(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:
-    """Return the number of the experiment of each run: what was recorded of one goes together."""
-    named = len({run.name for run in runs}) == len(runs)
-    sources = [run.source if named else i for i, run in enumerate(runs)]
-    order = {source: i for i, source in enumerate(dict.fromkeys(sources))}
-    return np.array([order[source] for source in sources])
 
 
 def _law(library: TermLibrary, fit: Fit, known: KnownPart) -> LibraryExpansion:

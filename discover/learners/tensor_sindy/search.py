@@ -83,6 +83,7 @@ class SupportSearch:
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
         self.n_independent = float(problem.n_observations)
+        self._far: set[tuple[int, ...]] = set()
         self._models: dict[tuple[int, ...], LinearModel] = {}
         self._sparse: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
 
@@ -202,6 +203,7 @@ class SupportSearch:
         if self.scout is None or chosen.support not in self.scout.fits:
             return
         limit = within * self.scout.fits[chosen.support].misfit
+        self._far = {s for s, fit in self.scout.fits.items() if fit.misfit > limit}
         near = [
             fit
             for fit in self.scout.fits.values()
@@ -214,9 +216,7 @@ class SupportSearch:
 
     def n_ruled_out(self, size: int) -> int:
         """Return how many laws up to a size fitted so badly on the rough grid that none rivals."""
-        if self.scout is None:
-            return 0
-        return sum(len(s) <= size for s in self.scout.fits if s not in self.fits)
+        return sum(len(support) <= size for support in self._far - {*self.fits})
 
     def polish(self) -> list[Fit]:
         """Refit the best of each size, and its near ties, to the tight tolerance."""
