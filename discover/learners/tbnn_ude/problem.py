@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -106,7 +107,7 @@ def make_problem(
     solvent_viscosity: float = 0.0,
     known_relaxation: bool = True,
     base: AbstractConstitutiveLaw | None = None,
-    **limits: float,
+    **limits: Any,
 ) -> TrainingProblem:
     """Return the training problem of some runs.
 

@@ -95,7 +95,7 @@ def make_problem(
     use_normal_stresses: bool = False,
     strain_step: float = 0.1,
     modulus_covariance: Any = None,
-    **limits: float,
+    **limits: Any,
 ) -> TrajectoryProblem:
     """Return the problem of finding library terms from runs.
 
