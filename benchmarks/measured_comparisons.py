@@ -1,46 +1,28 @@
 """`discover compare` on every set of measured shear data: exit code 0, a whole page, a verdict.
 
-The default learners on whole records. A study that is done already, in the folder of results, is
-not run again, and one that was stopped goes on where it stopped. The data are not part of this
-project: set DISCOVER_DATA to the folder that holds them.
+Each study of `studies/` is run as it stands, in a process of its own, at a first start (nothing
+compiled) and at a second. A start that is done already, in the folder of results, is not run again,
+and one that was stopped goes on where it stopped. The data are not part of this project: set
+DISCOVER_DATA to the folder that holds them.
 
     python benchmarks/measured_comparisons.py --out measured
-    python benchmarks/measured_comparisons.py --out measured --only gel-laos --learners tensor_sindy
+    python benchmarks/measured_comparisons.py --out measured --only gel blood --first
 """
 
 import argparse
 import json
+import os
+import resource
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 LEARNERS = ("tensor_sindy", "tbnn_ude")
-SWEEP = 'law = "ucm"\nmodes = "lve"'
-FITTED = 'law = "ucm"\nmodulus_Pa = "fit"\nrelaxation_time_s = "fit"'
-SHEAR = "fit = {fit}\nheld_out = {held_out}"
-
+ROOT = Path(__file__).resolve().parent.parent
 STUDIES = {
-    "ldpe150r": (
-        SHEAR.format(
-            fit=[f"shear_{rate}.csv" for rate in ("0p003", "0p03", "0p3", "3")],
-            held_out=[f"shear_{rate}.csv" for rate in ("0p01", "0p1", "1")],
-        ),
-        SWEEP,
-    ),
-    "pi95k-startup": (
-        f"held_out = {[f'pi_Tm23_rate{rate}.csv' for rate in (1, 2, 5)]}",
-        SWEEP,
-    ),
-    "gel-laos": (
-        'held_out = ["gel_laos_1rads_3000Pa.csv"]\nrate = "measured"',
-        # above, the correction for inertia is off by more than 1 % of the modulus
-        f"{SWEEP}\nsweep_rad_s = [0.1, 16.0]",
-    ),
-    # the steady flow before each step is not told: compare starts every run from rest
-    "blood-steps": ('held_out = ["blood_up_0p1_10p0.csv"]\nrate = "measured"', FITTED),
-    "cpycl-laos": ("", FITTED),
+    path.stem.replace("-comparison", ""): path
+    for path in sorted((ROOT / "studies").glob("*-comparison*.toml"))
 }
 
 
@@ -49,40 +31,89 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="discover compare on measured data")
     parser.add_argument("--out", type=Path, required=True, help="folder of results")
     parser.add_argument("--only", nargs="*", choices=[*STUDIES], default=[*STUDIES])
-    parser.add_argument("--learners", nargs="*", choices=LEARNERS, default=LEARNERS)
+    parser.add_argument("--first", action="store_true", help="no second start")
     asked = parser.parse_args()
-    rows = [compare(name, asked.out, asked.learners) for name in asked.only]
-    print(f"{'data set':15} {'exit':>4} {'seconds':>8}  verdict")
+    asked.out = asked.out.resolve()  # the command runs in the folder of the project
+    starts = ("first",) if asked.first else ("first", "second")
+    rows = [compare(name, asked.out, start) for name in asked.only for start in starts]
+    print(f"{'study':22} {'start':6} {'exit':>4} {'seconds':>8} {'processor':>9}  verdict")
     for row in rows:
-        print(f"{row['name']:15} {row['exit']:4d} {row['seconds']:8.0f}  {row['verdict']}")
+        print(
+            f"{row['name']:22} {row['start']:6} {row['exit']:4d} {row['seconds']:8.0f} "
+            f"{row['processor']:9.0f}  {row['verdict']}"
+        )
         for text in row.get("missing", ()):
             print(f"{'':15} missing: {text}")
+    for name in asked.only:
+        print_laws(asked.out / f"{name}-{starts[0]}" / "comparison.json", name)
     sys.exit(any(row["exit"] or row.get("missing") for row in rows))
 
 
-def compare(name: str, out: Path, learners: Sequence[str]) -> dict:
+def compare(name: str, out: Path, start: str) -> dict:
     """Run one study by the command itself, or read what an earlier run said of it."""
-    folder = out / name
-    kept = out / f"{name}.json"
+    folder = out / f"{name}-{start}"
+    kept = out / f"{name}-{start}.json"
     if kept.is_file() and (row := json.loads(kept.read_text("utf-8")))["exit"] == 0:
         return row
     out.mkdir(parents=True, exist_ok=True)
-    data, model = STUDIES[name]
-    study = out / f"{name}.toml"
-    text = f'[data]\nfolder = "{name}"\n{data}\n[model]\n{model}\n'
-    study.write_text(f"{text}[compare]\nlearners = {list(learners)}\n", encoding="utf-8")
     command = [sys.executable, "-c", "from discover.cli import main; main()", "compare"]
-    before = time.perf_counter()
-    ended = subprocess.run([*command, str(study), "--out", str(folder)], check=False)
+    # what one study compiled is not to help another
+    own = {**os.environ, "XDG_CACHE_HOME": str(out / f"{name}-cache")}
+    before, used = time.perf_counter(), processor()
+    ended = subprocess.run(
+        [*command, str(STUDIES[name]), "--out", str(folder)], check=False, env=own, cwd=ROOT
+    )
     row = {
         "name": name,
+        "start": start,
         "exit": ended.returncode,
         "seconds": time.perf_counter() - before,
+        "processor": processor() - used,
         "verdict": verdict(folder / "comparison.json") if ended.returncode == 0 else "–",
         "missing": what_is_missing(folder) if ended.returncode == 0 else [],
     }
     kept.write_text(json.dumps(row), encoding="utf-8")
     return row
+
+
+def processor() -> float:
+    """Return the seconds of processor that ended processes of this one used."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def print_laws(file: Path, name: str) -> None:
+    """Print every law fitted to a study's runs: constants, misfit, errors on unseen runs."""
+    if not file.is_file():
+        return
+    content = json.loads(file.read_text("utf-8"))
+    inside = {flow: placed["inside"] for flow, placed in content["range"].items()}
+
+    def unseen(errors) -> str:
+        told = [
+            f"{'runs away' if (value := next(iter(row.values()))) is None else f'{value:.1%}'}"
+            f"{'' if inside[flow] else ' beyond'}"
+            for flow, row in errors.items()
+        ]
+        return ", ".join(told) or "–"
+
+    print(f"\n{name}: law, constants, misfit, unseen runs, criterion")
+    for law, fit in content["classical"].items():
+        constants = {**fit["parameters"], **fit.get("fitted_along", {})}
+        said = ", ".join(f"{key} = {value:.3g}" for key, value in constants.items())
+        misfit = "–" if fit["misfit"] is None else f"{fit['misfit']:.1%}"
+        criterion = "–" if fit["criterion"] is None else f"{fit['criterion']:.0f}"
+        print(f"  {law} ({said}): {misfit}; {unseen(fit['errors'])}; {criterion}")
+    for learner, found in content["learners"].items():
+        left = content["lack_of_fit"].get(learner, {}).get("misfit")
+        terms = " + ".join(f"{t['coefficient']:.3g} {t['term']}" for t in found["terms"])
+        path, chosen = found["details"].get("path"), found["details"].get("chosen")
+        criterion = "–"
+        if path and chosen is not None:
+            row = path[chosen]
+            criterion = f"{row.get('bic_at_exact_moduli', row['bic']):.0f}"
+        misfit = "–" if left is None else f"{left:.1%}"
+        print(f"  {learner} ({terms}): {misfit}; {unseen(found['errors'])}; {criterion}")
 
 
 def verdict(file: Path) -> str:

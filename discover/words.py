@@ -8,6 +8,11 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
+def plainly(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits, without a power of ten below a million."""
+    return f"{float(f'{value:.{digits}g}'):g}"
+
+
 def percent_of(share: float) -> str:
     """Return a share as a percentage, with two digits below a hundred and whole from there."""
     return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"

@@ -190,7 +190,7 @@ def run_close_loop(
         f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
-    conditions = material_and_temperature(data_of_study.dataset)
+    conditions = material_and_temperature(data_of_study.dataset, study.data.material)
     overlays = loop_overlays(sources, result.records, data_of_study.dataset, model.fluid)
     write_loop(
         result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays

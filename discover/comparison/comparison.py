@@ -12,6 +12,7 @@ from discover.comparison.fitting.classical import ClassicalFit
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.judging.room_left import room_left
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow, Stresses, of_recorded, relative_errors
 from discover.comparison.outcomes.outcome import LearnerOutcome, plain
@@ -143,6 +144,15 @@ class Comparison(PageView, NotebookView):
     def verdict(self) -> FitVerdict:
         """Whether a law found explains the training runs."""
         return self.explanation.verdict
+
+    @property
+    def room_left(self) -> dict[str, float]:
+        """Largest difference of N1 and N2 between laws that describe σ12 about as well."""
+        misfits = {name: one.misfit for name, one in self.explanation.lack_of_fit.items()}
+        told = {name: misfits[name] for name in self.outcomes if name in misfits}
+        return room_left(
+            self.outcomes, told, self.rivals, [*self.flows_of("training"), *self.judged]
+        )
 
     @property
     def physics(self) -> dict[str, Mapping[str, Any] | None]:
@@ -320,6 +330,7 @@ class Comparison(PageView, NotebookView):
             "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,
+            "room_left": self.room_left,
             "warnings": list(self.warnings),
             "statements": [statement.to_json() for statement in self.statements],
             "structure": None if self.structure is None else self.structure.to_json(),

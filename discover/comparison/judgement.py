@@ -26,11 +26,12 @@ from discover.comparison.judging.next_measurement import NextMeasurement, next_m
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import Statement, claimed, make_statements
 from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics.residual import Expectation
-from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
@@ -91,8 +92,9 @@ def judge(
     """
     flows, normal = known.flows, study.compare.use_normal_stresses
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
-    expectation = expectation_of(study, known.before.model)
-    explanation = explain(outcomes, flows, expectation, normal)
+    repeats = repeats_among(list(known.before.data.dataset))
+    expectation = expectation_of(study, known.before.model, repeats)
+    explanation = explain(outcomes, flows, expectation, normal, repeats)
     say("rivals: simulating laws that the data do not rule out")
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     fitted = [flow for flow in flows if flow.kind == "training"]
@@ -188,12 +190,6 @@ def _classical(study: Study, known: Known, independent: float | None) -> Sequenc
         return [*fit_classical_laws(before.model, known.flows, relaxes, independent), *fits]
     each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
     return [*classical_along(known.along, each, known.flows, independent), *fits]
-
-
-def expectation_of(study: Study, model: DeclaredModel) -> Expectation:
-    """Return what a complete law may leave of a study's runs, as the closed loop has it."""
-    linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
-    return Expectation(study.loop.noise, linear_error)
 
 
 def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:

@@ -142,7 +142,7 @@ def compare(
         known=known_equation(model),
         known_of={name: known_equation(frame.model) for name, frame in frames.items()},
         known_effects=known.effects,
-        conditions=material_and_temperature(data.dataset),
+        conditions=material_and_temperature(data.dataset, study.data.material),
         stood_for=() if known.along is None else known.along.twins,
         explanation=found.explanation,
         classical=found.classical,

@@ -8,7 +8,7 @@ _MATERIAL = ("material", "sample", "sample_label")
 _TEMPERATURE = ("temperature_C", "temperature_C_measured")
 
 
-def material_and_temperature(runs: Iterable[Run]) -> str:
+def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
     """Return material and temperature of some runs in words; empty where neither is told.
 
     Parameters
@@ -16,6 +16,8 @@ def material_and_temperature(runs: Iterable[Run]) -> str:
     runs
         With the columns ``material``, ``sample`` or ``sample_label``, and ``temperature_C`` or
         ``temperature_C_measured``, of runs.csv.
+    material
+        What a study calls the material, in place of the columns.
     """
     runs = list(runs)
     names, temperatures = [], []
@@ -23,7 +25,7 @@ def material_and_temperature(runs: Iterable[Run]) -> str:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]
         values = (run.metadata.get(key) for key in _TEMPERATURE)
         temperatures += [round(v, 0) for v in values if isinstance(v, int | float)][:1]
-    parts, told = list(dict.fromkeys(names)), sorted(set(temperatures))
+    parts, told = [material] if material else list(dict.fromkeys(names)), sorted(set(temperatures))
     spelled = [f"{value:.0f}".replace("-", "−") for value in told]
     if told:
         word = " to " if len(told) > 2 else " and "

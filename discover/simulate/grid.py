@@ -143,7 +143,7 @@ def make_grid(
     gaps = np.diff(anchors)
     limits = np.full(gaps.shape, limit)
     if growth > 0.0 and not np.any(np.asarray(protocol.amplitudes)) and np.isfinite(limit):
-        limits = np.maximum(limit, _grown(anchors, knots, rates, growth))
+        limits = np.minimum(max_step, np.maximum(limit, _grown(anchors, knots, rates, growth)))
     elif relaxation_time is not None and not np.any(np.asarray(protocol.amplitudes)):
         at = intensity * _table_rate(anchors, knots, rates)
         limits = np.minimum(max_step, _settled(anchors, at, limit, relaxation_time / _SURE))

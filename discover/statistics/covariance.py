@@ -41,8 +41,8 @@ def least_squares_covariance(
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
 
-    What no sample sees has no inverse: there (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C
-    is far larger than any finding.
+    Where a sensitivity is not finite, both are infinite. What no sample sees has no inverse: there
+    (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C is far larger than any finding.
 
     Parameters
     ----------
@@ -55,6 +55,11 @@ def least_squares_covariance(
     shared
         Z of errors Z u that all rows share, u of unit variance, beside the noise; None for none.
     """
+    if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
+        # of a law that runs away beside its fit: nothing is known of its constants
+        told = [np.nan_to_num(residual[rows], posinf=0.0, neginf=0.0) for rows in sequences]
+        nothing = np.full((columns.shape[1],) * 2, np.inf)
+        return nothing, nothing, noise_model(told, columns.shape[1])
     noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
     # columns of like size, or the pseudo-inverse would drop what is merely small
     norms = np.linalg.norm(columns, axis=0)

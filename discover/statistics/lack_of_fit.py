@@ -145,7 +145,7 @@ def what_is_left(
     rows = judging(weight)
     misfit = float(np.mean(np.sqrt(np.sum(residual[rows] ** 2, axis=1))))
     floor = expectation.floor(residual, weight, record)
-    expected = float(np.hypot(floor, expectation.linear_error))
+    expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
     known = expectation.noise is not None or tells_noise(weight)
     explained = known and expectation.explains(residual, weight, record)
     probability = noise_probability(residual, weight, record)
@@ -162,7 +162,7 @@ def what_is_left(
     elif explained and probability is not None and probability > SIGNIFICANCE:
         reason = f"what is left ({percent_of(misfit)}) {rest}"
     elif explained:
-        given = "the noise given" if expectation.noise is not None else "the linear data's error"
+        given = _PATTERNED[expectation.noise is not None, expectation.repeat_error > 0.0]
         rest = f"has a pattern no larger than {given}"
         reason = f"what is left ({percent_of(misfit)}) {rest}"
     elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
@@ -192,6 +192,15 @@ def what_is_left(
         float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
         rest,
     )
+
+
+_PATTERNED = {
+    (True, False): "the noise given",
+    (True, True): "the noise given",
+    (False, False): "the linear data's error",
+    (False, True): "the linear data's error and what repeated runs differ by",
+}
+"""What may have a pattern, by whether the noise is given and whether runs were repeated."""
 
 
 def _without_outliers(residuals, measured):

@@ -202,10 +202,18 @@ class Expectation:
         Relative noise, where it is known.
     linear_error
         Relative error of the linear data that the declared modes come from.
+    repeat_error
+        Relative error of a run as its repeats tell it, noise and loading together; 0 without any.
     """
 
     noise: float | None = None
     linear_error: float = 0.0
+    repeat_error: float = 0.0
+
+    @property
+    def patterned(self) -> float:
+        """Relative size that a pattern may have which is due to the sweep or to loadings."""
+        return float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
 
     def floor(
         self,
@@ -222,8 +230,9 @@ class Expectation:
         weight: Float[np.ndarray, "runs n"],
         measured: Float[np.ndarray, "runs n"] | None = None,
     ) -> float:
-        """Return the relative error that noise and linear error together explain."""
-        return float(np.hypot(self.floor(residual, weight, measured), self.linear_error))
+        """Return the relative error that noise, repeats and linear error together explain."""
+        floor = max(self.floor(residual, weight, measured), self.repeat_error)
+        return float(np.hypot(floor, self.linear_error))
 
     def explains(
         self,
@@ -234,9 +243,9 @@ class Expectation:
         """Return whether noise and the error of the linear data explain a residual.
 
         It may not be larger than both together. Where it has a pattern that noise has not, the
-        pattern may not be larger than the error of the linear data, the only one that has any; or
-        the whole not larger than a noise that is given, of which only who gives it knows what is in
-        it.
+        pattern may not be larger than the error of the linear data, or than what repeated runs
+        differ by, the only ones that have any; or the whole not larger than a noise that is given,
+        of which only who gives it knows what is in it.
         """
         rows = judging(weight)
         sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))
@@ -249,4 +258,4 @@ class Expectation:
             return error <= float(np.hypot(self.noise, self.linear_error))
         fast = summarise(np.asarray(residual)[rows], np.asarray(weight)[rows]).noise
         pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
-        return pattern <= STRUCTURE * self.linear_error
+        return pattern <= self.patterned

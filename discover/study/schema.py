@@ -83,6 +83,7 @@ class Data(Section):
 
     folder: str | None = None
     synthetic: Synthetic | None = None
+    material: Annotated[str, Field(max_length=80)] = ""
     fit: tuple[str, ...] | None = None
     held_out: tuple[str, ...] | Literal["each"] = ()
     clock_factor: str | None = None

@@ -33,7 +33,7 @@ def test_a_fitted_flow_is_inside():
 def test_a_faster_oscillation_is_beyond_in_rate_and_frequency():
     placed = place(oscillation(3.0, 1.5), PAPER)
     assert placed.beyond == pytest.approx({"shear rate": 1.5, "frequency": 1.5})
-    assert placed.text.startswith("beyond the fitted range: shear rate 1.5 times")
+    assert placed.text.startswith("beyond the fitted range: shear rate (Wi) 1.5 times")
 
 
 def test_a_start_up_is_beyond_in_strain_though_its_rate_was_fitted():

@@ -13,7 +13,7 @@ from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
 from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe
 from discover.learners.tbnn_ude.initial_law import initial_law
-from discover.learners.tbnn_ude.prior import sample_states
+from discover.learners.tbnn_ude.prior import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.projection import project
 from discover.protocols import oscillatory_shear
@@ -156,6 +156,23 @@ def test_projection_finds_the_two_tensors_of_a_known_network(cloud):
     found = dict(zip(projection.library.names, projection.coefficients, strict=True))
     assert found == pytest.approx({"gammadot": 0.1, "sigma.gammadot+gammadot.sigma": 0.2}, abs=1e-8)
     assert projection.misfit < 1e-8
+
+
+def test_a_mode_that_the_record_hardly_shows_does_not_choose_the_terms(cloud):
+    import equinox as eqx
+
+    law = constant_law([0, 0, 0.1, 0, 1e-3, 0, 0, 0])  # 0.1 γ̇ + 0.001 γ̇·γ̇
+    library = tl.build_library(degree=0)
+    # a slow mode's rate is a thousand times as large, and of its stress the record shows nothing
+    both = Cloud(
+        jnp.concatenate([cloud.stress, 1e3 * cloud.stress]),
+        jnp.concatenate([cloud.rate, 1e3 * cloud.rate]),
+        jnp.concatenate([cloud.size, 1e-9 * cloud.size]),
+        jnp.concatenate([cloud.weight, 1e-9 * cloud.weight]),
+    )
+    assert project(law, both, library, max_terms=1).library.names == ("gammadot",)
+    alike = eqx.tree_at(lambda c: c.weight, both, jnp.ones_like(both.weight))
+    assert project(law, alike, library, max_terms=1).library.names == ("gammadot.gammadot",)
 
 
 def test_projection_of_nothing_is_nothing(cloud):

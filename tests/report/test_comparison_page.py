@@ -12,6 +12,7 @@ from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.dataset.repeats import Repeats
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
@@ -28,6 +29,7 @@ from discover.report.wording import (
     terms_text,
 )
 from discover.statistics import LackOfFit
+from discover.statistics.residual import Expectation
 from discover.study import RunFolder
 
 NOT_THERE = (None, float("nan"), float("inf"))
@@ -268,6 +270,29 @@ def test_a_law_for_the_fitted_range_only_says_so_in_the_first_sentence(passed):
     found = comparison_verdict(replace(comparison, outcomes={"tensor_sindy": sparse}))[0]
     limited = "loses positive definiteness in run a and whose stress runs away in run b" in found
     assert limited == ("is for the fitted range only" in found) == (passed is False)
+    # also where it explains nothing: it may still be used as a description of the runs
+    left = comparison.explanation.lack_of_fit["tensor_sindy"].refuted("it misses them")
+    unexplained = replace(comparison.explanation, lack_of_fit={"tensor_sindy": left})
+    outcomes = {"tensor_sindy": sparse}
+    found = comparison_verdict(replace(comparison, outcomes=outcomes, explanation=unexplained))[0]
+    assert found.startswith("Unexplained")
+    assert ("is for the fitted range only" in found) == (passed is False)
+
+
+def test_what_is_taken_for_error_is_told_with_its_source_where_nobody_told_the_noise():
+    comparison = made_up(noise=None)
+    told = replace(
+        comparison.explanation,
+        expectation=Expectation(None, 0.017, 0.03),
+        repeats=Repeats((("a", "b"),), 0.03),
+    )
+    sure = comparison_verdict(replace(comparison, explanation=told))[1]
+    assert "1.7 % that the modes miss their own sweep by" in sure
+    assert "3 % that repeated runs differ by" in sure
+    given = replace(told, expectation=Expectation(0.02, 0.017))
+    assert (
+        "nobody told" not in comparison_verdict(replace(comparison, explanation=given))[1].lower()
+    )
 
 
 def test_a_law_as_simple_that_fits_as_well_stands_beside_the_one_found():

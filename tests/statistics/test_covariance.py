@@ -41,3 +41,17 @@ def test_what_two_that_cancel_do_together_keeps_its_deviation():
     together = np.ones(2) @ covariance @ np.ones(2)
     # 58 and 59 degrees of freedom
     assert together == pytest.approx(alone[0, 0], rel=0.03)
+
+
+def test_of_sensitivities_that_run_away_nothing_is_known_and_nothing_crashes():
+    # a comparison of blood ended here, in eigenvalues of what is not a number
+    columns = np.random.default_rng(0).normal(size=(40, 2))
+    residual = np.random.default_rng(1).normal(size=40)
+    rows = [np.arange(20), np.arange(20, 40)]
+    columns[7, 1] = np.nan
+    covariance, inverse, _ = least_squares_covariance(columns, residual, rows)
+    assert np.all(np.isinf(covariance))
+    assert np.all(np.isinf(inverse))
+    columns[7, 1] = 0.0
+    covariance, inverse, _ = least_squares_covariance(columns, residual, rows)
+    assert np.all(np.isfinite(covariance))

@@ -65,6 +65,15 @@ def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
     assert not Expectation(noise=0.005).explains(left, WEIGHT)
 
 
+def test_what_repeated_runs_differ_by_may_have_a_pattern_of_its_size_and_no_more():
+    smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
+    left = noise() + smooth  # the pattern is 1.4 %, the noise 1 %
+    assert Expectation(repeat_error=0.02).explains(left, WEIGHT)
+    assert not Expectation(repeat_error=0.01).explains(left, WEIGHT)
+    # what is left may be as large as before, and no pattern beyond it
+    assert not Expectation(repeat_error=0.02).explains(noise() + 3.0 * smooth, WEIGHT)
+
+
 def with_a_short_run(samples, miss):
     """Return noise of two long runs and a shorter one that is missed by so much, with weights."""
     residual, weight = noise()[:3].copy(), WEIGHT[:3].copy()

@@ -63,6 +63,9 @@ def test_what_is_known_of_noise_and_of_the_linear_data_is_allowed(responses):
     assert against(one)
     assert not against(one, Expectation(linear_error=0.03))
     assert not against(one, Expectation(noise=0.05))
+    # and what repeated runs differ by, as far as it goes
+    assert not against(one, Expectation(repeat_error=0.03))
+    assert against(one, Expectation(repeat_error=0.003))
 
 
 def test_a_few_samples_decide_nothing(responses):

@@ -97,6 +97,8 @@ def require_one_known_law(declared: DeclaredModel) -> None:
         )
     if declared.by_mode:
         raise InputError(
-            "[model] by_mode is for close-loop: a comparison has one set of constants for all "
-            "relaxation modes, in the known part and in each learner. Leave it out here."
+            f"[model] by_mode lets {', '.join(declared.by_mode)} differ from mode to mode, which "
+            "only close-loop can: every law that a comparison tries, checks and writes down is one "
+            "law for all modes. Leave by_mode out to compare laws with one constant, or run "
+            "discover close-loop on this study."
         )

@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from discover.comparison.outcomes.expected import expectation_of
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.maxwell import UpperConvectedMaxwell
@@ -11,6 +14,8 @@ from discover.laws.multimode import Fluid
 from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
 from discover.progress import Progress, silent
+from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
@@ -86,10 +91,12 @@ def train(
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
             modulus_covariance=model.modulus_covariance,
+            screening="exact" if options.recipe == "thorough" else "auto",
             **shared,
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files
-        return searched(sparse, seed), sparse.fluid_
+        drawn = not _surely_unexplained(sparse, runs, expectation_of(study, model))
+        return searched(sparse, seed, drawn), sparse.fluid_
     if learner == "tensor_dense":
         from discover.learners.tensor_dense import TensorDense
 
@@ -118,7 +125,29 @@ def train(
     return learn_with(learner, asked)
 
 
-def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:
+_SURELY = 1.7
+"""Of what noise and the sweep's error explain, so much more is no matter of how it is counted."""
+
+
+def _surely_unexplained(
+    sparse: "TensorSINDy", runs: Sequence[Run], expectation: Expectation
+) -> bool:
+    """Return whether the law found leaves so much that no band of its rivals will be asked for."""
+    problem = sparse.search_.problem
+    fit = sparse.path_[sparse.result_.details["chosen"]]
+    weight = np.asarray(problem.weight)[..., 0]
+    predicted = fit.predicted.reshape(problem.target.shape)[..., 0]
+    residuals, records = [], []
+    for row, weights, run in zip(predicted, weight, runs, strict=True):
+        seen = weights[: len(run)] > 0
+        size = run.sizes(run.recorded)[seen]
+        records.append(run.recorded[seen] / size)
+        residuals.append(row[: len(run)][seen] / weights[: len(run)][seen] / size - records[-1])
+    left = what_is_left(residuals, records, expectation)
+    return left.verdict == "unexplained" and left.misfit > _SURELY * left.expected
+
+
+def searched(sparse: "TensorSINDy", seed: int = 0, drawn: bool = True) -> LearnerResult:
     """Return what a fitted sparse learner found, with the rivals that its search left standing.
 
     Parameters
@@ -127,6 +156,8 @@ def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:
         Fitted here, not read from a file: its search is needed.
     seed
         Of draws within the uncertainty.
+    drawn
+        Whether to draw the constants of rivals within theirs, for bands.
     """
     from discover.identify.rivals.fitted_rivals import MOST_RIVALS, find_rivals
     from discover.learners.tensor_sindy.report import uncertainty_row
@@ -134,7 +165,8 @@ def searched(sparse: "TensorSINDy", seed: int = 0) -> LearnerResult:
     result = sparse.result_
     found = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]])
     table = found.to_json()
-    for row, rival in zip(table["rivals"][:MOST_RIVALS], found.rivals, strict=False):
+    told = table["rivals"][:MOST_RIVALS] if drawn else []
+    for row, rival in zip(told, found.rivals, strict=False):
         assert rival.fit is not None  # the search at hand refitted it
         row.update(uncertainty_row(sparse.search_, rival.fit, seed))
     table["rivals_text"] = table.pop("text")

@@ -9,6 +9,7 @@ import numpy as np
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.dataset.repeats import Repeats
 from discover.learners.registry import BANDS_ONLY
 from discover.protocols.kinematics import FOLLOWED
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
@@ -29,10 +30,26 @@ class Explanation:
     outliers
         By learner that explains the training runs, and by the key of a run held out: samples that
         do not judge it. Only runs that have some.
+    expectation
+        What a complete law may leave: the noise, where it was told, and the sweep's own error.
+    repeats
+        Runs that repeat one another; None where none does.
     """
 
     lack_of_fit: Mapping[str, LackOfFit] = field(default_factory=dict)
     outliers: Mapping[str, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
+    expectation: Expectation = field(default_factory=Expectation)
+    repeats: Repeats | None = None
+
+    @property
+    def noise_given(self) -> bool:
+        """Whether the study tells the noise."""
+        return self.expectation.noise is not None
+
+    @property
+    def sweep_error(self) -> float:
+        """Relative error with which the modes describe the sweep that they come from."""
+        return self.expectation.linear_error
 
     @property
     def verdict(self) -> FitVerdict:
@@ -56,6 +73,12 @@ class Explanation:
         """Return verdict and lack of fit as ``comparison.json`` holds them."""
         return {
             "verdict": self.verdict,
+            "noise_from": {
+                "given": self.expectation.noise,
+                "sweep": self.sweep_error,
+                "repeats": None if self.repeats is None else self.repeats.error,
+                "repeated": [] if self.repeats is None else list(map(list, self.repeats.groups)),
+            },
             "lack_of_fit": {
                 name: {
                     "misfit": one.misfit,
@@ -76,6 +99,7 @@ def explain(
     flows: Iterable[Flow],
     expectation: Expectation,
     normal_stresses_used: bool = False,
+    repeats: Repeats | None = None,
 ) -> Explanation:
     """Return whether what each learner's law leaves of the training runs is noise.
 
@@ -90,6 +114,8 @@ def explain(
         What a complete law may leave.
     normal_stresses_used
         Whether measured normal stresses were part of the fit.
+    repeats
+        Runs that repeat one another, whose error the expectation holds.
     """
     training = [flow for flow in flows if flow.kind == "training"]
     return Explanation(
@@ -97,7 +123,9 @@ def explain(
             name: _left(outcome, training, expectation, normal_stresses_used)
             for name, outcome in outcomes.items()
             if name not in BANDS_ONLY or len(outcomes) == 1
-        }
+        },
+        expectation=expectation,
+        repeats=repeats,
     )
 
 

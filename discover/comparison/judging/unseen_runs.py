@@ -1,6 +1,7 @@
 """Runs held out of a comparison: a law that they refute explains nothing."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def hold_against_unseen(
         )
         if reason:
             found[name] = found[name].refuted(reason)
-    return Explanation(found, outliers)
+    return replace(explanation, lack_of_fit=found, outliers=outliers)
 
 
 def _outliers(

@@ -13,6 +13,10 @@ MARGIN = 1.05
 peak to some per cent only."""
 
 
+_NUMBERS = {"shear rate": "shear rate (Wi)", "frequency": "frequency (De)"}
+"""What exceeds, with the number that grows as it does."""
+
+
 @dataclass(frozen=True)
 class Placement:
     """Where a flow lies against the fitted ones.
@@ -56,7 +60,10 @@ class Placement:
         """The placement in a few words."""
         if self.inside:
             return "inside the fitted range"
-        parts = [f"{name} {factor:.2g} times the largest" for name, factor in self.beyond.items()]
+        parts = [
+            f"{_NUMBERS.get(name, name)} {factor:.2g} times the largest"
+            for name, factor in self.beyond.items()
+        ]
         if self.new_flow:
             what = "shear" if self.new_flow == "shear" else f"{self.new_flow} extension"
             parts.insert(0, f"{what}, of which nothing was fitted")

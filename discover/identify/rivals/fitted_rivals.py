@@ -21,7 +21,7 @@ import pandas as pd
 from discover.identify.exact.relations import spell
 from discover.identify.rivals.evidence import LEVEL, Evidence, compare_residuals
 from discover.identify.side_by_side.laws_side_by_side import LawTerms
-from discover.learners.tensor_sindy.refit import POLISHING, Fit, refit
+from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
 from discover.notebook_view import SentenceAndTable, table_of
 
@@ -29,6 +29,9 @@ MOST_RIVALS = 8
 
 _PROMISING = 1.25
 """A screened misfit over the chosen one's beyond which a polished refit is not tried."""
+
+_TIED = 1.01
+"""A screened misfit over the chosen one's up to which a law may turn out an exact tie."""
 
 _MOST_POLISHED = 2 * BREADTH
 
@@ -180,7 +183,7 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
     ]
     limit = _PROMISING * max(chosen.misfit, search.floor)
     near = sorted((f for f in fits if f.misfit <= limit), key=lambda f: f.misfit)[:_MOST_POLISHED]
-    polished = {f.support: f for f in _polish(search, near)}
+    polished = {f.support: f for f in _polish(search, near, chosen)}
     residual = chosen.predicted[rows] - target
     order = search.complexity(chosen.support)
     found: list[FittedRival] = []
@@ -207,7 +210,8 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
             )
         )
     found.sort(key=lambda rival: rival.difference)
-    return RivalTable(tuple(found), len(fits), not any(rival.simpler for rival in found))
+    tested = len(fits) + search.n_ruled_out(size)
+    return RivalTable(tuple(found), tested, not any(rival.simpler for rival in found))
 
 
 def _in_time_order(problem, seen):
@@ -218,7 +222,17 @@ def _in_time_order(problem, seen):
     return rows, np.asarray(problem.weight * problem.target).reshape(-1)[rows]
 
 
-def _polish(search: SupportSearch, fits: list[Fit]) -> list[Fit]:
+def _polish(search: SupportSearch, fits: list[Fit], chosen: Fit) -> list[Fit]:
+    """Return fits at their minimum; where runs are costly, those that are no tie less closely."""
+    tied = fits
+    if search.scout is not None:
+        limit = _TIED * chosen.misfit + 10.0 * search.floor
+        tied = [fit for fit in fits if fit.misfit <= limit]
+    near = [fit for fit in fits if not any(fit is one for one in tied)]
+    return [*_refitted(search, tied, POLISHING), *_refitted(search, near, SCREENING**2)]
+
+
+def _refitted(search: SupportSearch, fits: list[Fit], tolerance: float) -> list[Fit]:
     if not fits:
         return []
     again = refit(
@@ -227,7 +241,7 @@ def _polish(search: SupportSearch, fits: list[Fit]) -> list[Fit]:
         [(fit.dense(search.n_terms), fit.inner) for fit in fits],
         search.scale,
         max(search.slots, max(len(fit.support) for fit in fits)),
-        tolerance=POLISHING,
+        tolerance=tolerance,
     )
     return [new if new.misfit <= old.misfit else old for new, old in zip(again, fits, strict=True)]
 

@@ -27,6 +27,7 @@ from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch
+from discover.words import percent_of, plainly
 
 _ROUNDING = 1e-6
 """Size below zero that integration error alone may give."""
@@ -179,7 +180,7 @@ def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
         passed,
         value,
         where,
-        f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {value:.3g}, in "
+        f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {plainly(value)}, in "
         f"{where}.",
     )
 
@@ -200,7 +201,7 @@ def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
         value,
         where,
         f"With the stored energy of Hookean dumbbells, (G/2)(tr A − ln det A − 3) with A = I + "
-        f"σ/G, the dissipation {verb}: at least {value:.3g} G/λ, in {where}.",
+        f"σ/G, the dissipation {verb}: at least {plainly(value)} G/λ, in {where}.",
     )
 
 
@@ -217,8 +218,8 @@ def _work(beyond: Cycles) -> PhysicsCheck:
         bool(value >= -_ROUNDING),
         float(value),
         where,
-        f"The work σ:d over the last cycle is at least {value:.3g} of the product of the largest "
-        f"stress and strain rate, in {where}.",
+        f"The work σ:d over the last cycle is at least {plainly(value)} of the product of the "
+        f"largest stress and strain rate, in {where}.",
     )
 
 
@@ -239,7 +240,7 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
     if falling.size:
         low, high = float(rates[falling[0]]), float(rates[falling[-1] + 1])
         beyond = low * slowest > weissenberg
-        where = f"shear rates from {low:.3g} to {high:.3g} 1/s"
+        where = f"shear rates from {plainly(low)} to {plainly(high)} 1/s"
         note = "beyond the rates of training" if beyond else "within the rates of training"
         return PhysicsCheck(
             name,
@@ -251,7 +252,7 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
         )
     if last < 2:
         return PhysicsCheck(name, None, None, "", "No steady shear flow was found.")
-    where = f"shear rates from {rates[0]:.3g} to {rates[last - 1]:.3g} 1/s"
+    where = f"shear rates from {plainly(rates[0])} to {plainly(rates[last - 1])} 1/s"
     text = f"The steady shear stress rises with the rate throughout {where}."
     if last < rates.size:
         text += " Beyond, no steady state follows on."
@@ -265,7 +266,7 @@ def _extension(fluid: Fluid) -> PhysicsCheck:
     longest = float(np.max(np.asarray(fluid.relaxation_time)))
     reached = _last_stable(fluid, EXTENSION_RATES)
     if reached == EXTENSION_RATES.size:
-        where = f"extension rates up to {EXTENSION_RATES[-1] / longest:.3g} 1/s"
+        where = f"extension rates up to {plainly(EXTENSION_RATES[-1] / longest)} 1/s"
         return PhysicsCheck(
             name,
             True,
@@ -320,7 +321,7 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     value = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
     text = (
         f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
-        f"{max(100.0 * value, 0.001):.2g} % (the law linearised at rest, frequencies times "
+        f"{percent_of(max(value, 1e-5))} (the law linearised at rest, frequencies times "
         "relaxation time from 0.01 to 100)"
     )
     if offset > _LINEAR_TOLERANCE:
@@ -334,16 +335,18 @@ def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
     finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)
     reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
-    box = f"De from {_DEBORAH_FACTORS[0] * deborah:.3g} to {_DEBORAH_FACTORS[-1] * deborah:.3g}"
+    least, most = (plainly(factor * deborah) for factor in _DEBORAH_FACTORS[:: _PER_RATE - 1])
+    box = f"De from {least} to {most}"
     if reached == len(_BOX_FACTORS):
         limit = weissenberg * _BOX_FACTORS[-1]
-        where = f"Wi up to {limit:.3g}, {box}"
+        where = f"Wi up to {plainly(limit)}, {box}"
         text = f"Oscillations stay finite in the whole grid tried, {where}."
         return PhysicsCheck(name, True, limit, where, text)
     failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
-        f"Oscillations stay finite up to Wi = {limit:.3g} for {box}; the stress runs away first in "
-        f"{failed[0]} (training reached Wi = {weissenberg:.3g}, De = {deborah:.3g})."
+        f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress runs away "
+        f"first in {failed[0]} (training reached Wi = {plainly(weissenberg)}, "
+        f"De = {plainly(deborah)})."
     )
     return PhysicsCheck(name, False, limit, failed[0], text)

@@ -16,6 +16,7 @@ from discover.protocols.protocol import oscillatory_shear
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.solve import solve_batch
+from discover.words import plainly
 
 _CYCLES = 3
 _SAMPLES_A_CYCLE = 48
@@ -145,4 +146,6 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
         # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
         power = np.mean((values[last] * rate)[:-1])
         work[i] = power / largest if largest > 0 else 0.0
-    return Cycles(tuple(f"oscillation at Wi = {wi:.3g}, De = {de:.3g}" for wi, de in pairs), work)
+    return Cycles(
+        tuple(f"oscillation at Wi = {plainly(wi)}, De = {plainly(de)}" for wi, de in pairs), work
+    )

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +24,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
+from discover.learners.rough_grid import WORTH_IT, rough_limits
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
@@ -183,10 +185,8 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         recipe = self._recipe()
         problem, fitted = _problem(runs, known), ""
         if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
-            fewer = [run.window(evenly_chosen(len(run), recipe.samples)) for run in runs]
-            if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
-                problem = _problem(fewer, known)
-                fitted = f"at most {recipe.samples} samples of a run were fitted"
+            problem, fitted = _rougher(problem, runs, known, recipe.samples)
+            recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
@@ -224,6 +224,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                 "misfit": best.misfit,
                 "coefficients": _coefficient_table(best.law, cloud),
                 "coefficients_vary": best.varies,
+                "n_constants": _count_of_numbers(best.law, best.varies),
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
                 "coefficient_spread_of_members": coefficient_spread(members, cloud),
@@ -312,7 +313,7 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
     return recipe.resolved if isinstance(recipe, DefaultRecipe) else DefaultRecipe().resolved
 
 
-def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
+def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
     return make_problem(
         runs,
         known.modulus,
@@ -320,7 +321,36 @@ def _problem(runs: Sequence[Run], known: KnownPart) -> TrainingProblem:
         solvent_viscosity=known.solvent_viscosity,
         known_relaxation=known.linear_relaxation,
         base=known.law,
+        **limits,
     )
+
+
+def _rougher(
+    problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
+) -> tuple[TrainingProblem, str]:
+    """Return a problem of fewer samples and longer steps, and what was left out in words."""
+    fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
+    said = []
+    if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
+        problem = _problem(fewer, known)
+        said.append(f"at most {samples} samples of a run were fitted")
+    limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
+    if limits is not None and known.linear_relaxation:
+        rough = _problem(fewer, known, **limits)
+        share = problem.flows.n_steps / rough.flows.n_steps
+        if share * WORTH_IT >= 1.0:
+            problem = rough
+            said.append(f"it was trained in {share:.2g} times fewer steps than it is judged in")
+    return problem, ", and ".join(said)
+
+
+def _count_of_numbers(law: TensorBasisNetwork, varies: bool) -> int:
+    """Return how many numbers of a law were fitted: constants that are not zero, and weights."""
+    count = int(np.count_nonzero(np.asarray(law.constants)))
+    if varies:
+        weights = jax.tree.leaves(eqx.filter(law.network, eqx.is_inexact_array))
+        count += sum(int(leaf.size) for leaf in weights)
+    return count
 
 
 def _coefficient_table(law: TensorBasisNetwork, cloud: Cloud) -> dict[str, dict[str, float]]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -106,6 +107,7 @@ def make_problem(
     solvent_viscosity: float = 0.0,
     known_relaxation: bool = True,
     base: AbstractConstitutiveLaw | None = None,
+    **limits: Any,
 ) -> TrainingProblem:
     """Return the training problem of some runs.
 
@@ -127,6 +129,8 @@ def make_problem(
         Whether the fluid relaxes in these times, and not only in what is learned.
     base
         The known law, for steps that follow it; by default UCM.
+    **limits
+        Further limits of steps, as `make_grid` takes them.
     """
     total = float(np.sum(modulus))
     protocols = [_in_units_of(total, run.protocol) for run in runs]
@@ -136,6 +140,7 @@ def make_problem(
         strain_step=strain_step,
         phase_step=phase_step,
         relaxation_time=float(np.max(relaxation_time)) if known_relaxation else None,
+        **limits,
     )
     if base is not None:
         flows = in_enough_steps(Fluid(base, modulus, relaxation_time), flows)

@@ -35,7 +35,7 @@ class Projection:
         Inner parameters of the chosen terms' closed forms.
     misfit
         Norm of what is left over that of the extra term, all four components, over the states
-        that training visited.
+        that training visited, each with the weight that the record gives its mode.
     """
 
     library: TermLibrary | None
@@ -64,7 +64,9 @@ def project(
     max_terms
         Largest number of terms.
     """
-    target = np.asarray(_own_term(law, cloud.stress, cloud.rate)).ravel()
+    # of several modes each counts as the record shows it: a slow one's h may be a million
+    weight = np.asarray(cloud.weight)[:, None]
+    target = (weight * np.asarray(_own_term(law, cloud.stress, cloud.rate))).ravel()
     norm = float(np.linalg.norm(target))
     if norm < 1e-12 or not np.isfinite(norm):
         return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
@@ -73,7 +75,7 @@ def project(
 
     def design(inner):
         return (
-            np.asarray(evaluate(cloud.stress, cloud.rate, jnp.asarray(inner)))
+            (weight[..., None] * np.asarray(evaluate(cloud.stress, cloud.rate, jnp.asarray(inner))))
             .transpose(0, 2, 1)
             .reshape(target.size, len(library))
         )

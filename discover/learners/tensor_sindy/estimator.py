@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
@@ -37,6 +37,7 @@ from discover.learners.tensor_sindy.report import (
     path_table,
     rival_table,
 )
+from discover.learners.tensor_sindy.rough_problem import ranked_in_words, rough_problem
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.selection import (
     choose_by_bic,
@@ -45,15 +46,16 @@ from discover.learners.tensor_sindy.selection import (
 )
 from discover.learners.tensor_sindy.selectors import compare_selectors
 from discover.learners.tensor_sindy.stability import Stability, selection_stability
-from discover.learners.tensor_sindy.validation import held_out_misfits, run_folds
+from discover.learners.tensor_sindy.validation import groups_of, held_out_misfits, run_folds
 from discover.learners.tensor_sindy.weighed_draws import WeighedDraws
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.learners.trajectories.prediction import predict_runs
-from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.progress import Progress, by_lines
 from discover.statistics import NoiseModel
 from tensor_library.library import TermLibrary, build_library
 
+SCREENINGS = ("auto", "exact")
 SELECTIONS = ("bic", "held_out", "one_standard_error")
 
 
@@ -102,6 +104,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         can promise. Laws that differ by less are ties.
     strain_step
         Largest strain between steps of the integration.
+    screening
+        ``"auto"``: where modes, runs and steps are many, supports are ranked on fewer samples and
+        longer steps, and the best are fitted on all; ``"exact"``: all are.
     random_state
         Seed of the division of runs into folds.
     progress
@@ -194,6 +199,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         progress: Progress | None = None,
         base: Fluid | None = None,
         modulus_covariance: Float[np.ndarray, "k k"] | None = None,
+        screening: str = "auto",
     ):
         self.library = library
         self.optimizer = optimizer
@@ -213,6 +219,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.progress = progress
         self.base = base
         self.modulus_covariance = modulus_covariance
+        self.screening = screening
 
     def fit(self, X: Iterable[Run], y=None) -> "TensorSINDy":
         """Find the law of these runs.
@@ -237,19 +244,24 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
         require_known_rate(known, runs)
-        problem = make_problem(
-            runs,
-            library,
-            known.modulus,
-            known.relaxation_time,
-            known.solvent_viscosity,
-            known.law,
-            known.linear_relaxation,
-            self.use_normal_stresses,
-            self.strain_step,
-            known.modulus_covariance,
-        )
-        groups = _groups(runs)
+
+        def make(runs: Sequence[Run], **limits: float) -> TrajectoryProblem:
+            return make_problem(
+                runs,
+                library,
+                known.modulus,
+                known.relaxation_time,
+                known.solvent_viscosity,
+                known.law,
+                known.linear_relaxation,
+                self.use_normal_stresses,
+                modulus_covariance=known.modulus_covariance,
+                **limits,
+            )
+
+        problem = make(runs, strain_step=self.strain_step)
+        rough = rough_problem(problem, runs, make) if self.screening == "auto" else None
+        groups = groups_of(runs)
         n_groups = int(np.max(groups)) + 1
         validates = min(n_groups, self.n_folds) > 1
         if self.selection != "bic" and not validates:
@@ -257,7 +269,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 f"selection={self.selection!r} needs at least two runs and two folds; got "
                 f"{n_groups} and {self.n_folds}. Use selection='bic'."
             )
-        search = SupportSearch(problem, self.optimizer, self.max_terms, self.misfit_floor)
+        search = SupportSearch(
+            problem, self.optimizer, self.max_terms, self.misfit_floor, rough=rough
+        )
         # a line for each beginning of the runs, and for each size
         quiet, search.progress = search.progress, by_lines(self.progress, 3 + search.largest)
         path = search.run()
@@ -265,7 +279,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         held_out, by_run = None, None
         if validates:
             folds = run_folds(n_groups, self.n_folds, self.random_state)[groups]
-            held_out, errors = held_out_misfits(problem, path, folds, search.scale, search.slots)
+            of_folds = problem if rough is None else rough
+            held_out, errors = held_out_misfits(of_folds, path, folds, search.scale, search.slots)
             names = [run.name for run in runs]
             by_run = [dict(zip(names, map(float, row), strict=True)) for row in errors]
         criterion = criteria_beside_modes(search, path)
@@ -276,6 +291,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         else:
             chosen = choose_by_bic(criterion)
         fit = path[chosen]
+        search.bring_near(fit)
 
         self.runs_ = tuple(runs)
         self.provenance_ = provenance_of(X, runs)
@@ -321,16 +337,13 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 problem, fit, self.uncertainty_, search.slots, self.random_state or 0
             )
         self.terms_ = recovered_terms(search, fit, self.optimizer, self.uncertainty_, self.draws_)
-        misfits = [misfit for _, misfit in search.history]
+        misfits = np.array([misfit for _, misfit in search.history])
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            loss_history=(
-                np.arange(1.0, len(misfits) + 1.0),
-                np.minimum.accumulate(np.square(misfits)),
-            ),
+            loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
                 "path": path_table(search, path, criterion, held_out, by_run),
                 "chosen": chosen,
@@ -351,7 +364,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             },
             message=(
                 f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
-                f"{fit.misfit:.2g}; {len(search.fits)} supports were refitted."
+                f"{fit.misfit:.2g}; {search.n_refitted} supports were refitted"
+                f"{ranked_in_words(problem, rough, len(search.fits))}."
             ),
         )
         return self
@@ -366,15 +380,11 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             raise InputError(
                 f"selection must be one of {', '.join(SELECTIONS)}; got {self.selection!r}."
             )
+        if self.screening not in SCREENINGS:
+            raise InputError(
+                f"screening must be one of {', '.join(SCREENINGS)}; got {self.screening!r}."
+            )
         check_library(self.library)
-
-
-def _groups(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:
-    """Return the number of the experiment of each run: what was recorded of one goes together."""
-    named = len({run.name for run in runs}) == len(runs)
-    sources = [run.source if named else i for i, run in enumerate(runs)]
-    order = {source: i for i, source in enumerate(dict.fromkeys(sources))}
-    return np.array([order[source] for source in sources])
 
 
 def _law(library: TermLibrary, fit: Fit, known: KnownPart) -> LibraryExpansion:

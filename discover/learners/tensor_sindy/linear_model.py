@@ -14,6 +14,7 @@ from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import linearise
 
 _RIDGE = 1e-9
+_RUNAWAY = 1e60
 EXHAUSTIVE_LIMIT = 50_000
 """Supports of one size that are all scored; beyond it only moves from known supports are."""
 
@@ -52,7 +53,10 @@ class LinearModel:
         c = fit.dense(n)
         residual, columns = linearise(problem, jnp.asarray(c), jnp.asarray(fit.inner))
         residual, columns = np.array(residual), np.array(columns)
-        lost = ~(np.isfinite(residual) & np.all(np.isfinite(columns), axis=1))
+        with np.errstate(invalid="ignore"):
+            # a law that runs away may end finite and yet too large to be squared
+            within = np.all(np.abs(columns) < _RUNAWAY, axis=1) & (np.abs(residual) < _RUNAWAY)
+        lost = ~within  # so is what is not a number
         if keep is not None:
             lost |= ~np.repeat(keep.reshape(-1), problem.target.shape[2])
         residual[lost], columns[lost] = 0.0, 0.0

@@ -13,7 +13,6 @@ from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.stability import Stability
 from tensor_library.library import TermLibrary
 
-_MOST_COVARIANCES = 8
 _CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
 
 
@@ -75,18 +74,8 @@ def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
             row = _describe(search, fit)
             row["difference"] = float(np.linalg.norm(fit.predicted - chosen.predicted))
             row["exact"] = exact
-            rivals.append((row, fit))
-    rivals.sort(key=lambda pair: pair[0]["difference"])
-    for row, fit in rivals[:_MOST_COVARIANCES]:
-        row.update(uncertainty_table(search, fit))
-    return [row for row, _ in rivals]
-
-
-def uncertainty_table(search: SupportSearch, fit: Fit) -> dict[str, Any]:
-    """Return how uncertain the parameters of a fit are, as `described` writes it."""
-    if not fit.support:
-        return described(None)
-    return described(parameter_uncertainty(search.problem, fit, search.floor, search.slots))
+            rivals.append(row)
+    return sorted(rivals, key=lambda row: row["difference"])
 
 
 def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:

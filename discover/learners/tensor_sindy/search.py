@@ -26,6 +26,10 @@ BREADTH = 8
 
 _FEWEST_SLOTS = 5
 
+# Of each size, what a rough grid ranks first is fitted again: at least so many, and those that
+# leave little more. Of laws that may rival the one chosen, so many at most.
+_FEWEST_TAKEN, _CLOSE_BEHIND, _MOST_NEAR = 3, 1.01, 24
+
 
 def _silent(line: str) -> None:
     # a name, so that a search can be pickled
@@ -52,6 +56,9 @@ class SupportSearch:
         Relative misfit below which data are reproduced as well as the integration allows.
     progress
         Called with a line of text.
+    rough
+        The same on a rougher grid, on which supports are ranked; only the best are then fitted on
+        `problem`. None to fit all of them there.
     """
 
     def __init__(
@@ -61,8 +68,10 @@ class SupportSearch:
         max_terms: int,
         floor: float,
         progress: Callable[[str], None] | None = None,
+        rough: TrajectoryProblem | None = None,
     ):
         self.problem = problem
+        self.scout = None if rough is None else SupportSearch(rough, optimizer, max_terms, floor)
         self.optimizer = optimizer
         self.n_terms = len(problem.library)
         self.largest = min(max_terms, self.n_terms)
@@ -74,6 +83,7 @@ class SupportSearch:
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
         self.n_independent = float(problem.n_observations)
+        self._far: set[tuple[int, ...]] = set()
         self._models: dict[tuple[int, ...], LinearModel] = {}
         self._sparse: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
 
@@ -122,8 +132,24 @@ class SupportSearch:
         """Return whether two laws predict the same of every observation, to the floor."""
         return float(np.linalg.norm(first.predicted - second.predicted)) <= self.floor
 
+    @property
+    def n_refitted(self) -> int:
+        """Number of supports that were fitted, on either grid."""
+        return len(self.fits if self.scout is None else {*self.fits, *self.scout.fits})
+
     def run(self) -> list[Fit]:
         """Return the path: the best fit of each size, from empty to as dense as is of use."""
+        if self.scout is None:
+            self._explore()
+        else:
+            self.scout.progress = self.progress
+            self.scout._explore()
+            self.scout.progress = _silent
+            self._take_over(self.scout)
+        return self.polish()
+
+    def _explore(self) -> None:
+        """Fit supports of growing size until more terms are of no use."""
         empty = self._refit([()], {}, tolerance=POLISHING)[0]
         seeds = self._grow_horizon(empty)
         risen = 0
@@ -152,7 +178,45 @@ class SupportSearch:
             risen = risen + 1 if self.criterion(best) >= self.criterion(previous) else 0
             if best.misfit <= self.floor or risen == 2:
                 break
-        return self.polish()
+
+    def _take_over(self, scout: "SupportSearch") -> None:
+        """Fit again, on the grid of this search, the best of each size that another one found."""
+        self.history, self.scale = list(scout.history), scout.scale
+        chosen: list[tuple[int, ...]] = [()]
+        for size in range(1, max(map(len, scout.fits)) + 1):
+            ranked = scout.of_size(size)
+            limit = _CLOSE_BEHIND * ranked[0].misfit
+            close = sum(fit.misfit <= limit for fit in ranked)
+            chosen += [fit.support for fit in ranked[: min(max(close, _FEWEST_TAKEN), BREADTH)]]
+        self._refit(chosen, {s: scout.fits[s] for s in chosen})
+
+    def bring_near(self, chosen: Fit, within: float = 1.5) -> None:
+        """Fit on the grid of this search every law that may rival a chosen one.
+
+        Parameters
+        ----------
+        chosen
+            A fit of this search.
+        within
+            Misfit over that of the chosen law up to which a law may.
+        """
+        if self.scout is None or chosen.support not in self.scout.fits:
+            return
+        limit = within * self.scout.fits[chosen.support].misfit
+        self._far = {s for s, fit in self.scout.fits.items() if fit.misfit > limit}
+        near = [
+            fit
+            for fit in self.scout.fits.values()
+            if fit.support not in self.fits
+            and len(fit.support) <= len(chosen.support) + 1
+            and fit.misfit <= limit
+        ]
+        near.sort(key=lambda fit: fit.misfit)
+        self._refit([f.support for f in near[:_MOST_NEAR]], {f.support: f for f in near})
+
+    def n_ruled_out(self, size: int) -> int:
+        """Return how many laws up to a size fitted so badly on the rough grid that none rivals."""
+        return sum(len(support) <= size for support in self._far - {*self.fits})
 
     def polish(self) -> list[Fit]:
         """Refit the best of each size, and its near ties, to the tight tolerance."""

@@ -5,8 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from discover.dataset.run import Run
 from discover.learners.tensor_sindy.refit import SCREENING, Fit, refit, sum_of_squares
 from discover.learners.trajectories.problem import TrajectoryProblem
+
+
+def groups_of(runs: Sequence[Run]) -> Int[np.ndarray, " runs"]:
+    """Return the number of the experiment of each run: what was recorded of one goes together."""
+    named = len({run.name for run in runs}) == len(runs)
+    sources = [run.source if named else i for i, run in enumerate(runs)]
+    order = {source: i for i, source in enumerate(dict.fromkeys(sources))}
+    return np.array([order[source] for source in sources])
 
 
 def run_folds(n_runs: int, n_folds: int, random_state: int | None) -> Int[np.ndarray, " runs"]:

@@ -95,6 +95,7 @@ def make_problem(
     use_normal_stresses: bool = False,
     strain_step: float = 0.1,
     modulus_covariance: Any = None,
+    **limits: Any,
 ) -> TrajectoryProblem:
     """Return the problem of finding library terms from runs.
 
@@ -117,6 +118,8 @@ def make_problem(
         Largest strain between two steps of the integration.
     modulus_covariance
         Of the moduli, in Pa²; None where they are exact.
+    **limits
+        Further limits of steps, as `make_grid` takes them.
 
     Raises
     ------
@@ -163,6 +166,7 @@ def make_problem(
         padded,
         strain_step=strain_step,
         relaxation_time=fluid.settling_time,
+        **limits,
     )
     return TrajectoryProblem(
         library=library,

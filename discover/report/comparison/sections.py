@@ -10,6 +10,7 @@ from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import in_words
 from discover.report.comparison import tables
+from discover.report.comparison.table_of_laws import law_rows
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
 from discover.report.wording import readable
@@ -134,7 +135,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         }
 
     def classical() -> Content | None:
-        rows = tables.law_rows(comparison) if comparison.classical else []
+        rows = law_rows(comparison) if comparison.classical else []
         judged = [comparison.placement(flow).inside for flow in comparison.judged]
         return (
             {"law_rows": rows, "inside": True in judged, "beyond": False in judged}

@@ -109,78 +109,6 @@ def without_outliers(comparison: Comparison, who: str, flow: Flow) -> str:
     return f"{percent(comparison.error_without_outliers(who, flow))} without {which}"
 
 
-def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return every law fitted to the runs, classical and learned: constants, misfit, errors.
-
-    Errors are means, of the recorded stress, over the flows that no fit saw, those inside the
-    fitted range apart from those beyond it.
-    """
-    placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
-    one_mode = comparison.known is None or len(comparison.known.modulus) == 1
-    rows = []
-    for fit in comparison.classical:
-        constants = ", ".join(
-            f"{name} = {significant(value, 3)}"
-            for name, value in (
-                *((readable(name), value) for name, value in fit.parameters.items()),
-                *((constant_in_words(name, one_mode), value) for name, value in fit.along.items()),
-            )
-        )
-        rows.append(
-            {
-                "law": fit.title,
-                "constants": constants + (", the end of its range" if fit.at_bound else ""),
-                "number": len(fit.parameters) + len(fit.along),
-                "misfit": fit.misfit,
-                "criterion": fit.criterion,
-                **_mean_errors(fit.errors, placed),
-            }
-        )
-    for name, outcome in comparison.outcomes.items():
-        errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
-        path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
-        left = comparison.explanation.lack_of_fit.get(name)
-        sparse = name == "tensor_sindy"
-        rows.append(
-            {
-                "law": learner_title(name),
-                "constants": ", ".join(
-                    f"{constant_in_words(c.name, one_mode)} = {significant(c.value, 3)}"
-                    for c in outcome.constants.values()
-                ),
-                "number": sum(1 + len(t.inner) for t in outcome.terms) + len(outcome.constants)
-                if sparse
-                else None,
-                "misfit": None if left is None else left.misfit,
-                # of moduli that may move it would say less of the misfit than classical laws' do
-                "criterion": path[chosen].get("bic_at_exact_moduli", path[chosen]["bic"])
-                if path and chosen is not None
-                else None,
-                **_mean_errors(errors, placed),
-            }
-        )
-    least = min((row["criterion"] for row in rows if row["criterion"] is not None), default=0.0)
-    for row in rows:
-        if row["criterion"] is not None:
-            row["criterion"] -= least
-    return rows
-
-
-def _mean_errors(
-    errors: Mapping[str, Mapping[str, float | None]], inside: Mapping[str, bool]
-) -> dict[str, float | None]:
-    """Return the mean error of the recorded stress inside the fitted range and beyond it."""
-    means: dict[str, float | None] = {}
-    for name, wanted in (("inside", True), ("beyond", False)):
-        flows = [flow for flow, is_inside in inside.items() if is_inside is wanted]
-        # what is recorded comes first
-        values = [next(iter(errors[flow].values())) for flow in flows]
-        said = [value for value in values if value is not None]
-        # a law that cannot be integrated through one of the flows has no mean
-        means[name] = float(np.mean(said)) if said and len(said) == len(values) else None
-    return means
-
-
 def _half(width: float | None) -> float | None:
     return None if width is None or not np.isfinite(width) else 0.5 * width
 
@@ -210,6 +138,8 @@ def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
 def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> dict[str, Any]:
     """Return a law found with the known part below it, as mathematics, and how its fit ended."""
     message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
+    if (missed := outcome.details.get("projection_misfit")) is not None and outcome.terms:
+        message += f"; the terms above miss {percent(missed)} of what the network adds"
     shown = _shown_terms(outcome)
     if len(shown) < len(outcome.terms):
         message += f". Shown are the {len(shown)} terms largest along the runs"

@@ -7,6 +7,7 @@ import numpy as np
 from discover.comparison.comparison import Comparison
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
@@ -117,9 +118,9 @@ _LIMITS = {
 
 
 def _where_usable(comparison: Comparison) -> list[str]:
-    """Return which laws that explain the data are good for nothing beyond them, and why."""
+    """Return which laws are good for nothing beyond the fitted runs, and why."""
     parts = []
-    for name in comparison.explanation.by:
+    for name in comparison.outcomes:
         checks = (comparison.physics.get(name) or {}).get("checks", ())
         failed = {c["name"]: c for c in checks if c["passed"] is False}
         why = [text.format(**failed[check]) for check, text in _LIMITS.items() if check in failed]
@@ -218,7 +219,34 @@ def _how_sure(comparison: Comparison) -> str:
                 f"{_within(name)}'s law fails {len(failed)} of the checks of physical "
                 f"soundness ({', '.join(failed)})"
             )
+    parts += _noise_from(comparison)
     return " ".join(sentence([part]) for part in parts)
+
+
+def _room(comparison: Comparison) -> list[str]:
+    """Return how far N1 and N2 move between laws that describe σ12 about as well."""
+    open_ = [s.quantity for s in comparison.statements if s.undetermined]
+    said = [
+        f"{name} differs by up to {percent(size)}{' of N1' if name == 'N2' else ''}"
+        for name, size in comparison.room_left.items()
+        if name in open_ and size >= SEPARATED
+    ]
+    which = "between laws on this page that describe σ12 about as well"
+    return [f"{which}, {' and '.join(said)}"] if said else []
+
+
+def _noise_from(comparison: Comparison) -> list[str]:
+    """Return what is taken for error of the records, and where that is known from."""
+    told = comparison.explanation
+    if comparison.noise is not None or told.noise_given or not told.lack_of_fit:
+        return []
+    changing = [one.changing for one in told.lack_of_fit.values() if one.changing is not None]
+    parts = [f"{percent(min(changing))} from sample to sample"] if changing else []
+    if told.sweep_error > 0.0:
+        parts.append(f"{percent(told.sweep_error)} that the modes miss their own sweep by")
+    if told.repeats is not None:
+        parts.append(f"{percent(told.repeats.error)} that repeated runs differ by")
+    return [f"nobody told the noise; taken for error is {listed(parts)}"] if parts else []
 
 
 def _coarse(comparison: Comparison) -> CoarseRates | None:
@@ -279,6 +307,7 @@ def _determined(comparison: Comparison) -> list[str]:
     """Return what is said of N1, N2 and the coefficients."""
     parts = []
     names = _open(comparison)
+    parts += _room(comparison)
     if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
         parts.append(
             f"since no law that was tried explains the data, nothing is determined by them, "

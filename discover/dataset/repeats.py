@@ -1,0 +1,110 @@
+"""What repeated tests say of their error: loading, trimming and noise together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from discover.dataset.run import Run
+from discover.protocols.kinematics import STATES
+from discover.protocols.protocol import shear_rates
+
+_SAME = 0.02
+"""Relative difference of rates, and of what runs.csv says of two runs, that is none."""
+
+_FEWEST_SAMPLES = 10
+
+# What a source counts or sums up of a record, and no condition of the test
+_NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_sequence_s")
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Runs that repeat one another, and by how much they differ.
+
+    Attributes
+    ----------
+    groups
+        Names of the runs of each test that was repeated.
+    error
+        Relative error of one run: root-mean-square of the difference of two, over √2 and over that
+        of the record; of several tests the root-mean-square.
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+    error: float
+
+
+def repeats_among(runs: Sequence[Run]) -> Repeats | None:
+    """Return which runs repeat one another and by how much they differ; None where none does.
+
+    Two runs are one test if their rates agree over the time that both cover, and so does every
+    number that the source gives of their conditions.
+
+    Parameters
+    ----------
+    runs
+        Runs; those of steady or periodic states and those at a given stress are passed over.
+    """
+    timed = [
+        run
+        for run in runs
+        if run.protocol.control not in (*STATES, "stress") and len(run) >= _FEWEST_SAMPLES
+    ]
+    groups: list[list[Run]] = []
+    for run in timed:
+        group = next((group for group in groups if _same_test(group[0], run)), None)
+        if group is None:
+            groups.append([run])
+        else:
+            group.append(run)
+    found = [group for group in groups if len(group) > 1]
+    if not found:
+        return None
+    squares = [
+        np.mean([_difference(one, other) ** 2 for one, other in combinations(group, 2)])
+        for group in found
+    ]
+    names = tuple(tuple(run.name for run in group) for group in found)
+    return Repeats(names, float(np.sqrt(np.mean(squares))))
+
+
+def _same_test(one: Run, other: Run) -> bool:
+    if one.protocol.flow != other.protocol.flow or one.quantity != other.quantity:
+        return False
+    numbers = [(one.rate_before, other.rate_before), (one.strain_before, other.strain_before)]
+    for name in {*one.metadata, *other.metadata} - set(_NO_CONDITION):
+        pair = one.metadata.get(name), other.metadata.get(name)
+        if any(isinstance(value, int | float) for value in pair):
+            numbers.append(pair)  # pyright: ignore[reportArgumentType]
+    if not all(_alike(*pair) for pair in numbers):
+        return False
+    times = _common_times(one, other)
+    if times is None:
+        return False
+    rates = shear_rates(one.protocol, times), shear_rates(other.protocol, times)
+    return bool(np.max(np.abs(rates[0] - rates[1])) <= _SAME * np.max(np.abs(rates[0])))
+
+
+def _alike(one: object, other: object) -> bool:
+    if not isinstance(one, int | float) or not isinstance(other, int | float):
+        return False
+    return one == other or abs(one - other) <= _SAME * max(abs(one), abs(other))
+
+
+def _common_times(one: Run, other: Run) -> np.ndarray | None:
+    """Return the times of the run with fewer samples that both cover; None where they are few."""
+    fewer, more = sorted((one, other), key=len)
+    inside = (fewer.time >= more.time[0]) & (fewer.time <= more.time[-1])
+    return fewer.time[inside] if np.count_nonzero(inside) >= _FEWEST_SAMPLES else None
+
+
+def _difference(one: Run, other: Run) -> float:
+    times = _common_times(one, other)
+    if times is None:
+        return 0.0
+    records = [PchipInterpolator(run.time, run.recorded)(times) for run in (one, other)]
+    size = float(np.sqrt(np.mean(np.square(records)))) or 1.0
+    return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size

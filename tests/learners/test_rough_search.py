@@ -1,0 +1,96 @@
+"""Ranking laws on a rough grid changes no answer; records by scipy."""
+
+import numpy as np
+import pytest
+from independent import Giesekus, start_up
+
+import discover as dc
+from discover.learners import rough_grid
+from discover.learners.tensor_sindy import rough_problem as of_search
+from discover.learners.tensor_sindy.refit import refit
+from discover.learners.trajectories.problem import make_problem
+from tensor_library.library import build_library
+
+LIBRARY = build_library(degree=0)
+MODULUS, TIME, MOBILITY = np.array([300.0, 200.0]), np.array([2.0, 0.1]), 0.3
+BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+
+
+def records(noise=0.01, seed=0):
+    """Two Giesekus modes in start-up, 90 samples to a strain of 40."""
+    generator, runs = np.random.default_rng(seed), []
+    for rate in (0.5, 2.0, 8.0):
+        times = np.geomspace(0.05, 40.0, 90) / rate
+        exact = sum(
+            modulus * Giesekus(MOBILITY).respond(start_up(rate * time), times / time).sigma12
+            for modulus, time in zip(MODULUS, TIME, strict=True)
+        )
+        off = noise * np.sqrt(np.mean(exact**2)) * generator.standard_normal(times.size)
+        rates = np.full(times.size, rate)
+        runs.append(dc.Run(f"at_{rate:g}", times, dc.start_up(rate), rates, exact + off))
+    return runs
+
+
+def make(runs, **limits):
+    return make_problem(runs, LIBRARY, MODULUS, TIME, base=BASE.law, **limits)
+
+
+def problem_of(runs, **limits):
+    return make(runs, strain_step=0.2, **limits)
+
+
+def test_a_rough_grid_ranks_laws_by_nearly_the_misfit_of_the_fine_one(monkeypatch):
+    monkeypatch.setattr(of_search, "AFFORDABLE", 0.0)
+    runs = records()
+    fine = problem_of(runs)
+    rough = of_search.rough_problem(fine, runs, make)
+    assert rough is not None
+    assert 2 * rough.flows.n_steps <= fine.flows.n_steps
+    supports = [(LIBRARY.names.index(name),) for name in ("sigma", "gammadot", "sigma.sigma")]
+    begin = [(np.zeros(len(LIBRARY)), LIBRARY.inner_default)] * 3
+    scale = np.ones(len(LIBRARY))
+    misfits = [[f.misfit for f in refit(p, supports, begin, scale, 5)] for p in (rough, fine)]
+    # sixty of ninety samples, each with its noise: the two differ by some per cent of the misfit
+    assert misfits[0] == pytest.approx(misfits[1], rel=0.1)
+    assert np.argmin(misfits[0]) == 2
+
+
+@pytest.mark.slow
+def test_the_law_found_is_that_of_a_search_on_all_samples(monkeypatch):
+    monkeypatch.setattr(of_search, "AFFORDABLE", 0.0)
+    runs = records()
+    settings = {"base": BASE, "max_terms": 2, "n_stability": 0}
+    found = [
+        dc.TensorSINDy(LIBRARY, screening=screening, **settings).fit(runs)
+        for screening in ("auto", "exact")
+    ]
+    rough, exact = found
+    assert rough.search_.scout is not None
+    assert exact.search_.scout is None
+    assert [term.term for term in rough.terms_] == ["sigma.sigma"]
+    assert rough.coefficients_ == pytest.approx(exact.coefficients_, rel=1e-6, abs=1e-9)
+    low, high = rough.terms_[0].ci95
+    assert low < MOBILITY < high
+    assert "ranked on at most 60 samples" in rough.result_.message
+    assert "to save time" not in exact.result_.message
+    # and what is told of rivals counts every law that was tried
+    assert len(rough.search_.fits) < rough.search_.n_refitted
+
+
+def test_cheap_runs_are_not_made_rougher():
+    runs = records()
+    fine = problem_of(runs)
+    assert of_search.rough_problem(fine, runs, make) is None
+
+
+def test_where_the_fine_grid_follows_the_fastest_relaxation_so_does_the_rough_one():
+    runs = records()
+    followed = problem_of(runs, max_step=0.05)
+    assert rough_grid.rough_limits(followed.flows, TIME)["max_step"] == pytest.approx(0.1)
+    # else the slowest one sets the limit
+    assert rough_grid.rough_limits(problem_of(runs).flows, TIME)["max_step"] == pytest.approx(2.0)
+
+
+def test_a_screening_that_does_not_exist_is_refused():
+    with pytest.raises(dc.InputError, match="screening must be one of auto, exact"):
+        dc.TensorSINDy(screening="none").fit(records())
