@@ -30,7 +30,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from bad_day_cases import G, LAMBDA, SCALE, Case, Runs
+from bad_day_cases import LAMBDA, SCALE, Case, G, Runs
 from bad_day_rules import CONFIDENT, HELD_OUT_DETECTABLE, judge
 from bad_days import make, without_pages, write
 from independent import Structured, Thixotropic, UpperConvectedMaxwell, oscillation, start_up

@@ -55,6 +55,8 @@ class InASolver:
 def in_a_solver(equation: Equation) -> InASolver | None:
     """Return how a law behaves at the edge of the box in which it was learned; None without one.
 
+    None too where the whole fluid has a state, which no flow of one mode brings about.
+
     Each mode goes through start-up of shear at the largest Wi, and through oscillation at the
     largest Wi and the least and the largest De. A step is stable where |1 + Δt μ| ≤ 1 for every
     eigenvalue μ of the linearised stress equation that decays.
@@ -64,7 +66,7 @@ def in_a_solver(equation: Equation) -> InASolver | None:
     equation
         The law.
     """
-    if equation.tested is None:
+    if equation.tested is None or equation.states:
         return None
     mean, box = equation.mean_relaxation_time, equation.tested.learned_in
     amplitude = box.weissenberg[1] / mean

@@ -170,5 +170,6 @@ NAMED = {
         },
         source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
         written=_written_finite,
+        contains={"rolie_poly": {"maximum_stretch": 100.0}},
     ),
 }

@@ -9,6 +9,7 @@ from independent.pom_pom import ExtendedPomPom
 from independent.rolie_poly import RoliePoly
 
 import discover as dc
+from discover.closed_loop import law_choice
 from discover.errors import InputError
 from discover.report.loop.verdict import loop_verdict
 
@@ -97,3 +98,33 @@ def test_a_law_that_none_of_them_is_stays_unexplained():
 def test_a_name_that_is_no_law_is_told():
     with pytest.raises(InputError, match=r"Unknown law 'newton'; write some of ucm"):
         chosen(runs(Giesekus(0.3), (0.3, 1.0)), names=("ucm", "newton"))
+
+
+def test_a_law_ends_no_higher_than_one_that_it_contains(monkeypatch):
+    """Of the law with slip no start but the one from the law without ends anywhere near."""
+
+    def far_off(model, nothing_known=True):
+        start = model.zero()
+        if "xi" in [p.name for p in model.declared.free_parameters]:
+            start[2:4] = 0.99, 1.99
+        return [start]
+
+    monkeypatch.setattr(law_choice, "first_starts", far_off)
+    names = ["giesekus_non_affine", "giesekus"]  # in any order
+    simple, both = chosen(runs(Giesekus(0.3), (0.5, 5.0)), names=names).laws
+    assert (simple.law, both.law) == ("giesekus", "giesekus_non_affine")
+    assert both.error.fit <= 1.0001 * simple.error.fit
+    assert both.parameters["alpha"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_control_without_that_start_it_ends_higher(monkeypatch):
+    def far_off(model, nothing_known=True):
+        start = model.zero()
+        if "xi" in [p.name for p in model.declared.free_parameters]:
+            start[2:4] = 0.99, 1.99
+        return [start]
+
+    monkeypatch.setattr(law_choice, "first_starts", far_off)
+    names = ["giesekus_non_affine"]
+    (both,) = chosen(runs(Giesekus(0.3), (0.5, 5.0)), names=names).laws
+    assert both.error.fit > 2 * NOISE
