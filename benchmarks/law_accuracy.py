@@ -140,7 +140,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--laws", nargs="+", default=list(CONSTANTS), choices=list(CONSTANTS))
     parser.add_argument("--json", action="store_true", help="one line of JSON for each law")
     parser.add_argument(
-        "--conformation", action="store_true", help="the smallest eigenvalue of the conformation instead"
+        "--conformation",
+        action="store_true",
+        help="the smallest eigenvalue of the conformation instead",
     )
     given = parser.parse_args(arguments)
     enable_x64()

@@ -48,8 +48,8 @@ class InASolver:
         smallest = f"{self.smallest_eigenvalue:.3g}{lost} (mode {self.of_mode})"
         step = f"{self.largest_step:.3g} s (mode {self.limiting_mode})"
         return (
-            f"{flows} of shear: smallest eigenvalue of the conformation {smallest}; explicit Euler of "
-            f"the stress alone is stable up to {step}."
+            f"{flows} of shear: smallest eigenvalue of the conformation {smallest}; explicit Euler "
+            f"of the stress alone is stable up to {step}."
         )
 
 
@@ -106,7 +106,7 @@ _jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(N
 def _extremes(
     law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float
 ) -> tuple[float, float]:
-    """Return the smallest eigenvalue of the conformation and the longest step; NaN if σ runs away."""
+    """Return the smallest eigenvalue of A and the longest step; NaN if σ runs away."""
     times = np.linspace(0.0, end, _SAMPLES)
 
     def rate_at(t):

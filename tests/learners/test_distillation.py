@@ -133,9 +133,9 @@ def test_a_law_with_a_structure_variable_teaches_and_is_taught():
         "duration": 6.0,
         "tests": {"pulled": in_flow(start_up(0.3), "uniaxial")},
     }
-    teacher = make_law("pom_pom", {"q": 4.0, "stretch_time_ratio": 0.3})
+    teacher = make_law("pom_pom_drag_strain", {"q": 4.0, "stretch_time_ratio": 0.3})
     flows = {"fast": start_up(8.0), **FEW}
-    itself = distil(teacher, "pom_pom", flows, **short)
+    itself = distil(teacher, "pom_pom_drag_strain", flows, **short)
     # within the steps of the fit, whose growth of the stretch has kinks
     assert itself.debiased == pytest.approx({"q": 4.0, "stretch_time_ratio": 0.3}, rel=0.02)
     assert itself.errors["pulled"]["tensile_stress"] < 0.01
