@@ -10,9 +10,9 @@ from jaxtyping import Array, Float
 from discover.laws.multimode import Fluid
 from tensor_library.kinematics import VelocityGradient
 
-# A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with a width of so many
-# steps before, and widths then grow twice as fast until they have caught up. At most so often, so
-# that there are steps left to arrive
+# A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so
+# many steps before, and widths then grow twice as fast until they have caught up. At most so often,
+# so that there are steps left to arrive
 _BACK, _MOST_AGAIN = 3.0, 20
 
 # What may be left of the rate of change, of the largest there could be
