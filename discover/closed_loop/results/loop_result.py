@@ -166,8 +166,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(
                 f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
-                "state of which nobody said how it is written. Give the effect's class the method "
-                "`written`."
+                "state of which nobody said how it is written, so it cannot be written out. Give "
+                "the effect's class the method `written`."
             )
         modulus = tuple(float(g) for g in fluid.modulus)
         relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
