@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from independent.folders import write_study
 
-from discover.closed_loop.law_choice import choose_law
+from discover.closed_loop.law_choice import choose_law, with_law
 from discover.closed_loop.runs import MOST_SAMPLES, split_runs
 from discover.compilation_cache import enable_compilation_cache
 from discover.dataset import Run
@@ -72,10 +72,13 @@ def fit_law(made: Path, law: str) -> dict:
         fitted = [name for name in names if name not in left_out]
         parts = split_runs(data.dataset, fitted, left_out, study.loop.strain, MOST_SAMPLES)[:2]
         try:
-            taken, (found,) = choose_law(declared, [law], *parts, lambda line: None)
+            # so that no law ends above one that it contains
+            tried = choose_law(declared, [*LAWS[law].contains, law], *parts, lambda line: None)[1]
         except InputError:
             return {"error": None, "seconds": time.process_time() - started}
-        assert found.error is not None
+        found = next(one for one in tried if one.law == law)
+        if found.error is None:
+            return {"error": None, "seconds": time.process_time() - started}
         if left_out:
             unseen.append(np.nan if found.error.held_out is None else found.error.held_out)
     held_out = float(np.mean(unseen)) if unseen else None
@@ -83,7 +86,7 @@ def fit_law(made: Path, law: str) -> dict:
         "error": {"fit": found.error.fit, "held_out": held_out},
         "parameters": dict(found.parameters),
         "at_end": list(found.at_end),
-        "open": open_constants(taken, parts[0]),
+        "open": open_constants(with_law(declared, law, found.parameters), parts[0]),
         "seconds": time.process_time() - started,
     }
 

@@ -32,7 +32,8 @@ def distil(
         ),
     ] = None,
     student: Annotated[
-        str | None, typer.Option("--student", help="Law to fit, such as ucm.")
+        str | None,
+        typer.Option("--student", help="Law to fit, such as ucm, or any other with a constant."),
     ] = None,
     penalty: Annotated[float, typer.Option("--penalty", help="Weight of the paper's penalty.")] = (
         0.01
@@ -69,6 +70,12 @@ def distil(
             f"{row['teacher']:<30}{row['student']:<18}{_values(row['penalised']):<28}"
             f"{_values(row['debiased']):<28}{100 * row['misfit']:>8.2f} %"
         )
+    if teacher is None:
+        return
+    typer.echo("\nWhat is lost, as a share of each (of N2, as a share of N1):")
+    for flow, errors in rows[0]["errors"].items():
+        shown = "one of the two runs away" if errors is None else _values(errors, percent=True)
+        typer.echo(f"{flow:<14}{shown}")
 
 
 def _parse_law(text: str) -> tuple[str, dict[str, float]]:
@@ -88,5 +95,7 @@ def _parse_law(text: str) -> tuple[str, dict[str, float]]:
     return name.strip(), parameters
 
 
-def _values(parameters: dict[str, float]) -> str:
+def _values(parameters: dict[str, float], percent: bool = False) -> str:
+    if percent:
+        return ", ".join(f"{key} {100 * value:.3g} %" for key, value in parameters.items())
     return ", ".join(f"{key}={value:.4f}" for key, value in parameters.items())

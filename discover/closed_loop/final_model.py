@@ -20,7 +20,7 @@ from discover.effects import (
     ModeEffect,
     StateEffect,
 )
-from discover.equations import Equation, law_parts
+from discover.equations import Equation, StatePart, law_parts
 from discover.errors import InputError
 from discover.forward import (
     MODULUS,
@@ -170,8 +170,35 @@ def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
     )
 
 
-def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid | None:
-    """Return the augmented fluid; None where it has a state that a law cannot carry.
+def states_of(
+    model: AugmentedModel, fit: Fit, active: Sequence[str]
+) -> tuple[StatePart, ...] | None:
+    """Return the states of the whole fluid; None where one of them cannot be written out.
+
+    Parameters
+    ----------
+    model, fit
+        The final model and its fit.
+    active
+        Names of the effects in it.
+    """
+    parts = []
+    for effect in model.effects:
+        if effect.name not in active or not isinstance(effect, StateEffect):
+            continue
+        at = model.positions(effect.name)
+        # at an end of its range a constant may be beyond it by a rounding
+        values = np.clip(fit.theta[at], model.low[at], model.high[at])
+        names = (parameter.name for parameter in effect.parameters)
+        try:
+            parts.append(StatePart(effect.name, dict(zip(names, map(float, values), strict=True))))
+        except InputError:
+            return None
+    return tuple(parts)
+
+
+def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
+    """Return the augmented fluid, without states that no law of one mode can carry.
 
     Parameters
     ----------
@@ -184,10 +211,10 @@ def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> F
     added = [
         (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))
         for effect in model.effects
-        if effect.name in active and isinstance(effect, ConstitutiveEffect)
+        if effect.name in active
+        and isinstance(effect, ConstitutiveEffect)
+        and not isinstance(effect, StateEffect)
     ]
-    if any(isinstance(effect, StateEffect) for effect, _ in added):
-        return None
     base = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     law = AugmentedLaw(
         base=base,

@@ -65,15 +65,16 @@ def choose_law(
             else f"No law is named to choose from; write some of {', '.join(LAWS)}."
         )
     batch, scales = make_batch(fitted), data_scales(fitted)
-    tried: list[tuple[AugmentedModel, Fit]] = []
-    for name in dict.fromkeys(names):
-        say(f"law {len(tried) + 1} of {len(names)}: {LAWS[name].title}")
-        model = AugmentedModel(_with_law(declared, name), [], scales)
-        starts = first_starts(model, nothing_known=True)
+    found: dict[str, tuple[AugmentedModel, Fit]] = {}
+    for name in _contained_first(names):
+        say(f"law {len(found) + 1} of {len(names)}: {LAWS[name].title}")
+        model = AugmentedModel(with_law(declared, name), [], scales)
+        starts = first_starts(model, nothing_known=True) + _starts_at_contained(model, found)
         free = [model.free_positions] * len(starts)
         fits = fit_batch(model, batch, starts, free)
         usable = [fit for fit in fits if fit.usable]
-        tried.append((model, min(usable, key=lambda fit: fit.cost, default=fits[0])))
+        found[name] = model, min(usable, key=lambda fit: fit.cost, default=fits[0])
+    tried = list(found.values())
     usable = [fit for _, fit in tried if fit.usable]
     if not usable:
         raise InputError(
@@ -92,20 +93,54 @@ def choose_law(
     first, lines = order[0], []
     for i in order:
         model, fit = tried[i]
-        found = _found(model, fit)
+        line = _found(model, fit)
         if fit.usable:
-            found = replace(
-                found,
+            line = replace(
+                line,
                 error=_errors(model, fit, fitted, held_out),
                 behind=float(criteria[i] - criteria[first]),
                 is_told_apart=bool(effective * np.log(costs[i] / costs[first]) > BARE_MENTION),
             )
-        lines.append(found)
+        lines.append(line)
     say(f"of {len(lines)} laws the runs ask for {lines[0].title}")
-    return _with_law(declared, lines[0].law, lines[0].parameters), tuple(lines)
+    return with_law(declared, lines[0].law, lines[0].parameters), tuple(lines)
 
 
-def _with_law(
+def _contained_first(names: Sequence[str]) -> list[str]:
+    """Return each name once, a law after those of them that it contains."""
+    left, order = list(dict.fromkeys(names)), []
+    while left:
+        ready = [name for name in left if not set(LAWS[name].contains) & set(left)]
+        order += ready or left
+        left = [name for name in left if name not in order]
+    return order
+
+
+def _starts_at_contained(
+    model: AugmentedModel, found: Mapping[str, tuple[AugmentedModel, Fit]]
+) -> list[np.ndarray]:
+    """Return the fits of the laws that this one contains, as vectors of its own.
+
+    A law then fits no worse than those, wherever other starts end.
+    """
+    declared, starts = model.declared, []
+    for name, fixed in LAWS[declared.law_name].contains.items():
+        if name not in found or not found[name][1].usable:
+            continue
+        below, fit = found[name]
+        count = len(below.declared.free_parameters)
+        known = {p.name: fit.theta[2 + i] for i, p in enumerate(below.declared.free_parameters)}
+        start = model.zero()
+        start[:2] = fit.theta[:2]
+        for i, parameter in enumerate(declared.free_parameters):
+            start[2 + i] = {**known, **fixed}.get(parameter.name, start[2 + i])
+        # known effects stand behind the constants of either law, in one order
+        start[2 + len(declared.free_parameters) :] = fit.theta[2 + count :]
+        starts.append(start)
+    return starts
+
+
+def with_law(
     declared: DeclaredModel, name: str, values: Mapping[str, float] | None = None
 ) -> DeclaredModel:
     """Return the declared model with another law, all of whose constants are fitted."""

@@ -28,6 +28,7 @@ from discover.closed_loop.final_model import (
     declared_law,
     declared_parameters,
     stage_of,
+    states_of,
 )
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.free_in_model import free_functions_in_model
@@ -264,6 +265,7 @@ def run_loop(
             told += wider_bands(records[len(fitted_runs) :], held_batch, unseen_rates)
         records = told
     fluid = augmented_fluid(model, current, [*active, *known])
+    states = states_of(model, current, [*active, *known])
     return LoopResult(
         verdict=judgement.verdict,
         error_before=errors_of(records, 0),
@@ -300,8 +302,9 @@ def run_loop(
         next_tests=following,
         laws=tried_laws,
         free_form=forms,
-        fluid=None if differ else fluid,
-        fluid_at_mean=fluid if differ else None,
+        fluid=None if differ or states != () else fluid,
+        fluid_at_mean=fluid if differ or states else None,
+        states=states or (),
         seconds=time.perf_counter() - started,
     )
 

@@ -22,6 +22,7 @@ from discover.effects.registry import (
     named_effects,
     register_effect,
 )
+from discover.effects.written_state import WrittenState
 
 __all__ = [
     "BY_MODE",
@@ -37,6 +38,7 @@ __all__ = [
     "SeriesElement",
     "SignalEffect",
     "StateEffect",
+    "WrittenState",
     "effects_table",
     "known_effects",
     "library_effects",

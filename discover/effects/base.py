@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
+from discover.effects.written_state import WrittenState
 from tensor_library.algebra import Symmetric
 from tensor_library.terms import TermShare
 
@@ -202,6 +203,17 @@ class StateEffect(ConstitutiveEffect):
         shear_rate, stress
             In 1/s and Pa.
         """
+
+    @property
+    def level_names(self) -> tuple[str, ...]:
+        """A name of each level, by that of the effect."""
+        if self.levels == 1:
+            return (self.name,)
+        return tuple(f"{self.name}_{i + 1}" for i in range(self.levels))
+
+    def written(self) -> WrittenState | None:
+        """Return the state as expressions, for exports; None where nobody said."""
+        return None
 
     def modulus_factor(
         self, values: Float[Array, " p"], state: Float[Array, "*levels"]

@@ -6,6 +6,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.effects.base import EffectParameter, StateEffect
+from discover.effects.written_state import WrittenState
+from tensor_library.isotropic_function import scalars
 
 CROSS = 2.0 / 3.0
 """Exponent of the rate of dispersions   [Cross 1965]."""
@@ -37,6 +39,28 @@ class Structure(StateEffect):
         """Return 1/t_b and (1 + (X/X_c)ⁿ)/t_b, of both structures where there are two."""
         times = values[1] if self.levels == 1 else values[1] * jnp.array([1.0, values[2]])
         return 1.0 / times, (1.0 + self._broken(values, shear_rate, stress)) / times
+
+    def written(self):
+        """Return the equation of each structure, and the factor that is s."""
+        import sympy
+
+        critical, exponent, time, slowness, share, rate, stress = scalars(
+            self.parameters[0].name,
+            "exponent",
+            "build_up_time",
+            "slowness",
+            "slow_share",
+            "shear_rate",
+            "shear_stress",
+        )
+        power = exponent if self.levels == 1 else sympy.Rational(2, 3)
+        broken = (critical * sympy.Abs(self.breaks(rate, stress))) ** power
+        levels = [scalars(name) for name in self.level_names]
+        times = [time] if self.levels == 1 else [time, slowness * time]
+        rates = ((1 - level * (1 + broken)) / t for level, t in zip(levels, times, strict=True))
+        whole = levels[0] if self.levels == 1 else (1 - share) * levels[0] + share * levels[1]
+        factor = "time_factor" if self.changes_times else "modulus_factor"
+        return WrittenState(tuple(rates), **{factor: whole})
 
     def _broken(self, values, shear_rate, stress):
         size = values[0] * jnp.abs(self.breaks(shear_rate, stress))

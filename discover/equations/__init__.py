@@ -6,6 +6,7 @@ from discover.equations.has_equation import HasEquation
 from discover.equations.json_format import equation_from_json, equation_to_json
 from discover.equations.named_part import NamedPart
 from discover.equations.rheotool_reader import read_rheotool
+from discover.equations.state_part import StatePart
 from discover.equations.term import EquationTerm
 from discover.equations.write import FORMATS, write_equation
 
@@ -16,6 +17,7 @@ __all__ = [
     "EquationTerm",
     "HasEquation",
     "NamedPart",
+    "StatePart",
     "Tested",
     "combined",
     "effect_terms",

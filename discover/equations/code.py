@@ -11,6 +11,7 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.latex_file import header_lines
+from discover.equations.structure_code import NOTHING, stepped, structure_fields
 from tensor_library.notation import Notation, printed
 from tensor_library.terms import parse_term
 
@@ -108,7 +109,7 @@ MODULUS_PA = np.array({modulus})
 RELAXATION_TIME_S = np.array({time})
 SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
-{constants}
+{constants}{structure}
 
 def extra_term(s, d{mode}{also}):
     """Return h, dimensionless, shape (3, 3), of scaled stress s and scaled rate d."""
@@ -116,14 +117,14 @@ def extra_term(s, d{mode}{also}):
 {where}    return {extra}
 
 {variables_rate}
-def stress_rate(stress, velocity_gradient{also}):
+def stress_rate(stress, velocity_gradient{also}{structured}):
     """Return d(stress)/dt of every mode in Pa/s, shape (modes, 3, 3).
 
     stress: of every mode in Pa, shape (modes, 3, 3); zero at rest.
-    velocity_gradient: in 1/s, shape (3, 3).{of_variables}
+    velocity_gradient: in 1/s, shape (3, 3).{of_variables}{structure_of}
     """
     rate = np.empty_like(stress)
-    for k, (modulus, time) in enumerate(zip(MODULUS_PA, RELAXATION_TIME_S)):
+    for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times})):
         s, gradient = stress[k] / modulus, time * velocity_gradient
         d = gradient + gradient.T
         change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode}{also_k})
@@ -131,9 +132,9 @@ def stress_rate(stress, velocity_gradient{also}):
     return rate
 
 
-def total_stress(stress, velocity_gradient):
+def total_stress(stress, velocity_gradient{structured}):
     """Return the extra stress in Pa, shape (3, 3): all modes and the solvent."""
-    return stress.sum(axis=0) + SOLVENT_VISCOSITY_PA_S * (velocity_gradient + velocity_gradient.T)
+    return {total}
 
 
 def simulate_shear(shear_rate, times, step=0.02):
@@ -150,17 +151,17 @@ def simulate_shear(shear_rate, times, step=0.02):
         return g
 
     def change(t, state):
-        stress = state[:, :9].reshape(-1, 3, 3)
+        stress = state[:, :9].reshape(-1, 3, 3){taken}
         return {change}
 
     def components(t, state):
-        total = total_stress(state[:, :9].reshape(-1, 3, 3), gradient(t))
+        total = total_stress(state[:, :9].reshape(-1, 3, 3), gradient(t){last})
         return total[0, 1], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]
 
-    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size}))
+    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size})){begun}
     rows = [components(t, state)]
     for end in times[1:]:
-        fastest = max(1.0 / RELAXATION_TIME_S.min(), abs(shear_rate(t)), abs(shear_rate(end)))
+        fastest = max({fastest}, abs(shear_rate(t)), abs(shear_rate(end)))
         n = max(1, int(np.ceil((end - t) * fastest / step)))
         h = (end - t) / n
         for _ in range(n):
@@ -201,10 +202,10 @@ tested = {tested}
 {constants}
 {where}extra_term = {extra}
 stress_rate = d + gradient @ s + s @ gradient.T{relaxation} - extra_term
-{variables_rate}'''
+{variables_rate}{structure}'''
 
 _NUMPY_RATES = '''
-def variables_rate(stress, velocity_gradient, variables):
+def variables_rate(stress, velocity_gradient, variables{structured}):
     """Return the rates of change of {names} in 1/s, shape (modes, {count}).
 
     Parameters as of `stress_rate`.
@@ -213,7 +214,7 @@ def variables_rate(stress, velocity_gradient, variables):
         scaled_rates(
             stress[k] / modulus, time * (velocity_gradient + velocity_gradient.T), k, variables[k]
         ) / time
-        for k, (modulus, time) in enumerate(zip(MODULUS_PA, RELAXATION_TIME_S))
+        for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times}))
     ])
 
 
@@ -237,7 +238,14 @@ def numpy_code(equation: Equation) -> str:
     InputError
         If the equation has a named law of which nobody said how it is written.
     """
-    return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))", rates=_NUMPY_RATES)
+    return filled(
+        _NUMPY_TEMPLATE,
+        equation,
+        CodeNotation(),
+        "np.zeros((3, 3))",
+        rates=_NUMPY_RATES,
+        structure=structure_fields(equation, CodeNotation(), "numpy"),
+    )
 
 
 def sympy_code(equation: Equation) -> str:
@@ -268,13 +276,9 @@ def sympy_code(equation: Equation) -> str:
         constants,
         "",
         _SYMPY_RATES,
+        structure_fields(equation, _SympyCodeNotation(), "sympy"),
     )
 
-
-_CHANGE_OF_BOTH = """np.hstack([
-            stress_rate(stress, gradient(t), state[:, 9:]).reshape(-1, 9),
-            variables_rate(stress, gradient(t), state[:, 9:]),
-        ])"""
 
 _OF_VARIABLES = """
     variables: {names} of every mode, dimensionless, shape (modes, number); zero at rest."""
@@ -288,6 +292,7 @@ def filled(
     constants: str | None = None,
     indent: str = "    ",
     rates: str = "",
+    structure: Mapping[str, str] = NOTHING,
 ) -> str:
     """Return a module: a template with the law in a notation.
 
@@ -305,6 +310,8 @@ def filled(
         Of the lines before h.
     rates
         A template of what says how structure variables change, for a law that has some.
+    structure
+        Fields of the states of the whole fluid, from `structure_fields`.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
@@ -328,6 +335,7 @@ def filled(
                 count=len(variables),
                 where=where,
                 rates=", ".join(text for _, text in function.spell_rates(notation, letters)),
+                **structure,
             )
     return template.format(
         header="\n".join(header_lines(equation)) or "No record of where it was tested.",
@@ -344,8 +352,8 @@ def filled(
         also_k=", variables[k]" if variables else "",
         of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
         variables_rate=changing,
-        change=_CHANGE_OF_BOTH if variables else "stress_rate(stress, gradient(t)).reshape(-1, 9)",
-        size=9 + len(variables),
+        **structure,
+        **stepped(equation, len(variables)),
         where=where,
         extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
     )

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from discover.equations.latex import law_latex
+from discover.equations.latex import SEPARATOR, law_latex
 from discover.equations.mathml import law_element
 from discover.equations.named_part import NamedPart
+from discover.equations.state_part import StatePart
 from discover.equations.term import EquationTerm, Interval
+from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
@@ -92,6 +94,8 @@ class Equation(NotebookView):
     named
         A law that is no sum of terms, to whose h the terms are added; its constants may differ from
         mode to mode. None for UCM.
+    states
+        Of the whole fluid, which multiply the stress or the relaxation times of all modes.
 
     Examples
     --------
@@ -113,6 +117,7 @@ class Equation(NotebookView):
     notes: tuple[str, ...] = ()
     tested: Tested | None = None
     named: NamedPart | None = None
+    states: tuple[StatePart, ...] = ()
 
     def __post_init__(self):
         numbers = [*self.modulus, *self.relaxation_time]
@@ -148,8 +153,14 @@ class Equation(NotebookView):
         Raises
         ------
         InputError
-            If constants differ from mode to mode.
+            If constants differ from mode to mode, or the fluid has a state of its own.
         """
+        if self.states:
+            raise InputError(
+                f"{', '.join(part.effect for part in self.states)} gives the whole fluid a state, "
+                "which no law of one mode carries. Export the equation: the text in Python, "
+                "SymPy, UFL or LaTeX has that state's equation too."
+            )
         law = None if self.named is None else self.named.built()
         if law is not None and not self.terms:
             return law
@@ -185,14 +196,15 @@ class Equation(NotebookView):
         return Fluid(self.law(), self.modulus, self.relaxation_time, self.solvent_viscosity)
 
     def sympy(self) -> "sympy.Expr":
-        """Return h as a SymPy expression over non-commuting tensors."""
+        """Return h of a mode as a SymPy expression over non-commuting tensors."""
         from discover.equations.symbolic import extra_term_expression
 
         return extra_term_expression(self.terms, self.named)
 
     def latex(self) -> str:
-        """Return the dimensionless law as one LaTeX equation."""
-        return law_latex(self.terms, self.linear_relaxation, named=self.named)
+        """Return the dimensionless law as one LaTeX equation, and that of states behind it."""
+        law = law_latex(self.terms, self.linear_relaxation, named=self.named)
+        return SEPARATOR.join([law, *(part.own.equation for part in self.states)])
 
     def modes_table(self) -> pd.DataFrame:
         """Return G_k in Pa and λ_k in s, one line for each mode, and what differs by mode."""
@@ -211,6 +223,9 @@ class Equation(NotebookView):
             yield self.modes_table()
         if self.solvent_viscosity:
             yield f"Solvent viscosity {self.solvent_viscosity:.4g} Pa s."
+        for part in self.states:
+            values = ", ".join(f"{name} = {value:.4g}" for name, value in part.values.items())
+            yield f"A state of the whole fluid: {part.effect} ({values})."
         yield from () if self.tested is None else self.tested.lines
         yield from self.notes
 

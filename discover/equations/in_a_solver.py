@@ -25,7 +25,8 @@ class InASolver:
     weissenberg
         Largest Wi of the box, at which the flows were.
     smallest_eigenvalue, of_mode
-        Of I + σ_k/G_k, dimensionless, and its mode counted from 1; NaN where the law ran away.
+        Of the conformation, dimensionless (I + σ_k/G_k; of chains that end, I + σ_k/(k G_k)), and
+        its mode counted from 1; NaN where the law ran away.
     largest_step, limiting_mode
         Longest stable step of explicit Euler for the stress of a mode, in s; infinite where nothing
         decays.
@@ -47,13 +48,15 @@ class InASolver:
         smallest = f"{self.smallest_eigenvalue:.3g}{lost} (mode {self.of_mode})"
         step = f"{self.largest_step:.3g} s (mode {self.limiting_mode})"
         return (
-            f"{flows} of shear: smallest eigenvalue of I + stress/G {smallest}; explicit Euler of "
-            f"the stress alone is stable up to {step}."
+            f"{flows} of shear: smallest eigenvalue of the conformation {smallest}; explicit Euler "
+            f"of the stress alone is stable up to {step}."
         )
 
 
 def in_a_solver(equation: Equation) -> InASolver | None:
     """Return how a law behaves at the edge of the box in which it was learned; None without one.
+
+    None too where the whole fluid has a state, which no flow of one mode brings about.
 
     Each mode goes through start-up of shear at the largest Wi, and through oscillation at the
     largest Wi and the least and the largest De. A step is stable where |1 + Δt μ| ≤ 1 for every
@@ -64,7 +67,7 @@ def in_a_solver(equation: Equation) -> InASolver | None:
     equation
         The law.
     """
-    if equation.tested is None:
+    if equation.tested is None or equation.states:
         return None
     mean, box = equation.mean_relaxation_time, equation.tested.learned_in
     amplitude = box.weissenberg[1] / mean
@@ -94,13 +97,16 @@ def _rate(law: AbstractConstitutiveLaw, stress: Float[Array, " s"], shear_rate: 
     return law.stress_rate(stress, shear_rate)
 
 
+_conformations: Callable = jax.jit(
+    jax.vmap(lambda law, stress: law.conformation(stress), in_axes=(None, 0))
+)
 _jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(None, 0, 0)))
 
 
 def _extremes(
     law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float
 ) -> tuple[float, float]:
-    """Return the smallest eigenvalue of I + σ/G and the longest step; NaN if σ runs away."""
+    """Return the smallest eigenvalue of A and the longest step; NaN if σ runs away."""
     times = np.linspace(0.0, end, _SAMPLES)
 
     def rate_at(t):
@@ -112,10 +118,10 @@ def _extremes(
     )  # fmt: skip
     if not found.success or not np.all(np.isfinite(found.y)):
         return np.nan, np.inf
-    s11, s22, s33, s12 = found.y[:4]
-    in_plane = 1.0 + 0.5 * (s11 + s22) - np.hypot(0.5 * (s11 - s22), s12)
+    a11, a22, a33, a12 = np.asarray(_conformations(law, jnp.asarray(found.y[:4].T))).T
+    in_plane = 0.5 * (a11 + a22) - np.hypot(0.5 * (a11 - a22), a12)
     rates = rate_at(times)
     mu = np.linalg.eigvals(np.asarray(_jacobians(law, jnp.asarray(found.y.T), rates)))
     decaying = mu[mu.real < -_TRUE_RATE]
     steps = -2.0 * decaying.real / np.abs(decaying) ** 2
-    return float(min(in_plane.min(), 1.0 + s33.min())), float(steps.min(initial=np.inf))
+    return float(min(in_plane.min(), a33.min())), float(steps.min(initial=np.inf))

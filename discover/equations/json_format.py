@@ -6,6 +6,7 @@ from pydantic import Field
 
 from discover.equations.equation import Box, Equation, Tested
 from discover.equations.named_part import NamedPart
+from discover.equations.state_part import StatePart
 from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.validation import Section, validated
@@ -44,6 +45,11 @@ class _Named(Section):
     constants: tuple[dict[str, float], ...] = Field(min_length=1, max_length=1000)
 
 
+class _State(Section):
+    effect: str = Field(max_length=200)
+    parameters: dict[str, float]
+
+
 class _Law(Section):
     format: Literal["discover law 1"]
     title: str = ""
@@ -54,6 +60,7 @@ class _Law(Section):
     solvent_viscosity_Pa_s: float = Field(default=0.0, ge=0)
     tested: _Tested | None = None
     named: _Named | None = None
+    states: tuple[_State, ...] = Field(default=(), max_length=100)
 
 
 def equation_to_json(equation: Equation) -> dict[str, Any]:
@@ -61,7 +68,9 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
     tested, named = equation.tested, equation.named
     # only where there is one: results without stay as they were
     below = {"law": named.law, "constants": [dict(c) for c in named.constants]} if named else None
-    return ({} if below is None else {"named": below}) | {
+    states = [{"effect": s.effect, "parameters": dict(s.values)} for s in equation.states]
+    beside = ({} if below is None else {"named": below}) | ({"states": states} if states else {})
+    return beside | {
         "format": FORMAT,
         "title": equation.title,
         "notes": list(equation.notes),
@@ -128,6 +137,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
                 tested.worst_errors,
             ),
             named=None if named is None else NamedPart(named.law, named.constants),
+            states=tuple(StatePart(state.effect, state.parameters) for state in law.states),
         )
     except ValueError as error:
         raise InputError(f"{where}: {error} {again}") from None

@@ -2,6 +2,7 @@
 
 from discover.equations.equation import Equation
 from discover.equations.latex import PREAMBLE, SEPARATOR, latex_letters, law_latex
+from discover.equations.state_part import StatePart
 from tensor_library.latex import LatexNotation, latex_number
 
 
@@ -16,6 +17,8 @@ def equation_latex(equation: Equation, digits: int = 9) -> str:
     if where:
         rows = " \\\\\n".join("  " + one.replace(" = ", " &= ", 1) for one in where)
         lines.append(f"\\begin{{align}}\n{rows}\n\\end{{align}}\n")
+    for part in equation.states:
+        lines.append(_state(part, digits))
     letters = {} if named is None else latex_letters(named, LatexNotation(digits))
     if named is not None:
         lines += [f"% {letters[n]}: {n} of the law {named.law}" for n in named.constants[0]]
@@ -33,6 +36,17 @@ def equation_latex(equation: Equation, digits: int = 9) -> str:
         "\\,\\mathrm{Pa\\,s}\n\\end{align}\n"
     )
     return "\n".join(lines)
+
+
+def _state(part: StatePart, digits: int) -> str:
+    """Return the equation of a state of the whole fluid, with its numbers."""
+    numbers = ",\\quad ".join(
+        f"{p.symbol} = {latex_number(part.values[p.name], digits)}"
+        + (rf"\,\mathrm{{{p.unit}}}" if p.unit else "")
+        for p in part.own.parameters
+    )
+    lines = [f"% {part.effect}, of the whole fluid", "\\begin{gather}"]
+    return "\n".join([*lines, f"  {part.own.equation} \\\\", f"  {numbers}", "\\end{gather}\n"])
 
 
 def header_lines(equation: Equation) -> list[str]:

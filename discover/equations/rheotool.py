@@ -216,6 +216,11 @@ def rheotool_text(
     InputError
         If rheoTool has no such law.
     """
+    if equation.states:
+        raise InputError(
+            f"{', '.join(part.effect for part in equation.states)} gives the whole fluid a state: "
+            "rheoTool has it not. Write --format python or --format ufl, which have its equation."
+        )
     models = [rheotool_model(equation.mode(k), tolerance) for k in range(len(equation.modulus))]
     lines = [f"// {line}" for line in ("Written by discover.", *header_lines(equation))]
     lines += [f"// {note}" for note in dict.fromkeys(n for model in models for n in model.notes)]

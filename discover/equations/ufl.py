@@ -4,6 +4,7 @@ from typing import Any
 
 from discover.equations.code import CodeNotation, filled
 from discover.equations.equation import Equation
+from discover.equations.structure_code import structure_fields
 
 _TEMPLATE = '''"""Constitutive law in UFL, written by discover. Needs ufl, which comes with FEniCSx.
 
@@ -26,7 +27,7 @@ MODULUS_PA = {modulus}
 RELAXATION_TIME_S = {time}
 SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
-{constants}
+{constants}{structure}
 
 def extra_term(s, d{mode}{also}):
     """Return h, dimensionless, of scaled stress s and scaled rate d."""
@@ -34,19 +35,19 @@ def extra_term(s, d{mode}{also}):
 {where}    return {extra}
 
 {variables_rate}
-def stress_rate(stress, velocity_gradient, k{also}):
+def stress_rate(stress, velocity_gradient, k{also}{structured}):
     """Return the material derivative of the stress of mode k, from 0, in Pa/s."""
-    modulus, time = MODULUS_PA[k], RELAXATION_TIME_S[k]
+    modulus, time = MODULUS_PA[k], {time_factor}RELAXATION_TIME_S[k]
     s, gradient = stress / modulus, time * velocity_gradient
     d = gradient + gradient.T
     change = d + dot(gradient, s) + dot(s, gradient.T){relaxation} - extra_term(s, d{of_mode}{also})
     return modulus / time * change
 
 
-def total_stress(stresses, velocity_gradient):
+def total_stress(stresses, velocity_gradient{structured}):
     """Return the extra stress in Pa of the stresses of all modes, a list, and the solvent."""
     rate = velocity_gradient + velocity_gradient.T
-    return sum(stresses, SOLVENT_VISCOSITY_PA_S * rate)
+    return {sum_of_all}
 
 
 def in_space(plane):
@@ -56,12 +57,12 @@ def in_space(plane):
 
 
 _RATES = '''
-def variables_rate(stress, velocity_gradient, mode, variables):
+def variables_rate(stress, velocity_gradient, mode, variables{structured}):
     """Return the material derivatives of {names} of a mode in 1/s, a list; each is 0 at rest.
 
     variables: {names} of this mode, scalar fields of their own.
     """
-    modulus, time = MODULUS_PA[mode], RELAXATION_TIME_S[mode]
+    modulus, time = MODULUS_PA[mode], {time_factor}RELAXATION_TIME_S[mode]
     s, gradient = stress / modulus, time * velocity_gradient
     d, unit = gradient + gradient.T, ufl.Identity(3)
 {where}    return [rate / time for rate in [{rates}]]
@@ -102,4 +103,6 @@ def ufl_code(equation: Equation) -> str:
         If the equation has a named law of which nobody said how it is written.
     """
     nothing = "ufl.as_tensor([[0.0] * 3] * 3)"
-    return filled(_TEMPLATE, equation, _UflNotation(), nothing, rates=_RATES)
+    notation = _UflNotation()
+    fields = structure_fields(equation, notation, "ufl")
+    return filled(_TEMPLATE, equation, notation, nothing, rates=_RATES, structure=fields)

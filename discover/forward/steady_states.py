@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.steady_states import STEPS, linearly_implicit_step, pseudo_time_step
+from discover.simulate.steady_states import STEPS, approach, approach_step, arrived
 
 
 def steady_states(
@@ -41,15 +41,15 @@ def _approach(dynamics: Dynamics, rate, flow):
     intensity = 1.0 if flow is None else flow.intensity
     weissenberg = intensity * jnp.abs(rate) * modes.relaxation_time
 
-    def step(carry, number):
-        stress, levels, felt = carry
+    def changes(levels, felt):
         slow = dynamics.combined("time_factor", levels)
+        return lambda state: dynamics.change(state, felt, slow, flow)
 
-        def change(state):
-            return dynamics.change(state, felt, slow, flow)
-
-        stress = linearly_implicit_step(change, stress, pseudo_time_step(number, weissenberg))
-        sheared, sheared_rate = dynamics.sheared(stress, felt, flow)
+    def step(carry, index):
+        way, levels, felt = carry
+        change = changes(levels, felt)
+        way = approach_step(change, way, index, weissenberg)
+        sheared, sheared_rate = dynamics.sheared(way.stress, felt, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         levels = tuple(
             _steady_level(effect, values, sheared_rate, sheared)
@@ -59,10 +59,11 @@ def _approach(dynamics: Dynamics, rate, flow):
             # σ/γ̇ changes more slowly than σ: the iteration converges however strong the slip
             viscosity = dynamics.viscosity + sheared / jnp.where(felt == 0.0, 1.0, felt)
             felt = rate / (1.0 + dynamics.series.slip * viscosity)
-        return (stress, levels, felt), None
+        return (way, levels, felt), None
 
-    start = (stress, levels, jnp.asarray(rate, dtype=stress.dtype))
-    (stress, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(STEPS, dtype=float))
+    start = (approach(stress), levels, jnp.asarray(rate, dtype=stress.dtype))
+    (way, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(STEPS, dtype=float))
+    stress = arrived(changes(levels, felt), way, weissenberg)
     scale = dynamics.combined("modulus_factor", levels)
     return scale * dynamics.recorded(stress, flow), felt
 

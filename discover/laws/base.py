@@ -119,6 +119,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         """
         return jnp.zeros(self.tensors)
 
+    def conformation(self, stress: Symmetric) -> Symmetric:
+        """Return the tensor that stays positive definite as long as there are chains: I + σ."""
+        return identity_like(stress) + stress
+
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
         """Return dσ/dt, and that of the variables.
 
@@ -170,6 +174,11 @@ class AbstractExtendedLaw(AbstractConstitutiveLaw):
     def retracts(self) -> bool:
         """Whether the chains of the base law retract."""
         return self.base is not None and self.base.retracts
+
+    def conformation(self, stress: Symmetric) -> Symmetric:
+        """Return that of the base law."""
+        base = self.base
+        return super().conformation(stress) if base is None else base.conformation(stress)
 
     def relaxations(self) -> Float[Array, "t 2"]:
         """Return those of the base law where it has tensors beside σ."""

@@ -71,5 +71,6 @@ NAMED = {
         },
         source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
         written=_written,
+        contains={"ucm": {"L2": 1e6}},
     )
 }

@@ -34,5 +34,6 @@ NAMED = {
         {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
         source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
         written=lambda: IsotropicFunction({"sigma.sigma": scalars("alpha")}),
+        contains={"ucm": {"alpha": 0.0}},
     )
 }

@@ -33,5 +33,6 @@ NAMED = {
         {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
         source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
         written=lambda: IsotropicFunction({"sigma.gammadot+gammadot.sigma": scalars("xi") / 2}),
+        contains={"ucm": {"xi": 0.0}},
     )
 }

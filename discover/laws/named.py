@@ -29,6 +29,9 @@ class NamedLaw:
     is_one_mode
         Whether at small strain the law is one Maxwell mode. One that is not brings a spectrum of
         its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it out.
+    contains
+        Laws that this one is, exactly or in the limit, with some of its constants at these values
+        and the others as those of the law of that name.
     """
 
     title: str
@@ -38,6 +41,7 @@ class NamedLaw:
     source: str = ""
     written: Callable[[], IsotropicFunction] | None = None
     is_one_mode: bool = True
+    contains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def described(self, values: Mapping[str, float]) -> str:
         """Return the title with the values of the parameters, by their names in study files."""

@@ -34,7 +34,7 @@ class NonAffine(AbstractConstitutiveLaw):
         return None if affine is None else (*affine, slip)
 
 
-def _with_slip(named: NamedLaw) -> NamedLaw:
+def _with_slip(name: str, named: NamedLaw) -> NamedLaw:
     (ranges,) = (law.parameters for law in JOHNSON_SEGALMAN.values())
     (slip,) = JOHNSON_SEGALMAN.values()
 
@@ -55,9 +55,14 @@ def _with_slip(named: NamedLaw) -> NamedLaw:
         {**named.range_sources, **slip.range_sources},
         source=f"{named.source}; {slip.source}",
         written=written,
+        contains={
+            name: dict.fromkeys(ranges, 0.0),
+            **{slipping: dict.fromkeys(named.parameters, 0.0) for slipping in JOHNSON_SEGALMAN},
+        },
     )
 
 
 NAMED = {
-    f"{name}_non_affine": _with_slip(law) for name, law in (GIESEKUS | PHAN_THIEN_TANNER).items()
+    f"{name}_non_affine": _with_slip(name, law)
+    for name, law in (GIESEKUS | PHAN_THIEN_TANNER).items()
 }

@@ -60,6 +60,8 @@ _RANGE_SOURCE = {
     "puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1"
 }
 
+_CONTAINS = {"ucm": {"epsilon": 0.0}}
+
 NAMED = {
     "ptt_linear": NamedLaw(
         "linear PTT",
@@ -68,6 +70,7 @@ NAMED = {
         _RANGE_SOURCE,
         source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
         written=_written_linear,
+        contains=_CONTAINS,
     ),
     "ptt_exponential": NamedLaw(
         "exponential PTT",
@@ -76,5 +79,6 @@ NAMED = {
         _RANGE_SOURCE,
         source="Phan-Thien 1978, J. Rheol. 22, 259",
         written=_written_exponential,
+        contains=_CONTAINS,
     ),
 }

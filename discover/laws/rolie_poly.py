@@ -78,6 +78,12 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
         stiffening = _logarithmic_slope(squared, limit) * growth / 3.0
         return (1.0 - factor) * rate + factor * retracting - stiffening * stress
 
+    def conformation(self, stress: Symmetric) -> Symmetric:
+        """Return A = I + σ/k, which may be one where I + σ is none."""
+        limit = self.maximum_stretch**2
+        squared = self._squared_stretch(trace(stress) / 3.0, limit)
+        return identity_like(stress) + stress / _stiffening(squared, limit)
+
     def _squared_stretch(self, third, limit):
         """Return Λ² from tr σ/3 = k (Λ² − 1), the root between 0 and m."""
         share = (1.0 - 1.0 / limit) / (3.0 - 1.0 / limit)
@@ -170,5 +176,6 @@ NAMED = {
         },
         source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
         written=_written_finite,
+        contains={"rolie_poly": {"maximum_stretch": 100.0}},
     ),
 }

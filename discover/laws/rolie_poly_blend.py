@@ -117,5 +117,12 @@ NAMED = {
         },
         source="Boudara, Peterson, Leal & Read 2019, J. Rheol. 63, 71",
         is_one_mode=False,
+        contains={
+            "rolie_poly": {
+                "long_fraction": 1.0,
+                "short_time_ratio": 1.0,
+                "short_stretch_time_ratio": 1.0,
+            }
+        },
     )
 }

@@ -53,5 +53,6 @@ NAMED = {
         },
         source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
         written=_written,
+        contains={"ucm": {"yield_strain": 0.0}},
     )
 }

@@ -10,12 +10,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
+from scipy.stats import qmc
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS
+from discover.laws.registry import LAWS, starting_values
 from discover.programs import compiled
 from discover.protocols.paper import (
     TEST_DURATION,
@@ -23,12 +24,18 @@ from discover.protocols.paper import (
     paper_test_protocols,
     paper_training_protocols,
 )
-from discover.protocols.protocol import FlowProtocol, stack_protocols
+from discover.protocols.protocol import FlowProtocol, in_flow, stack_protocols, start_up
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.solve import SimulationError, simulate, solve_on_grid
 from tensor_library.algebra import Symmetric
 
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
+
+_POINTS = 5
+"""Starts of a law with a name beside its own, spread evenly over its ranges."""
+
+# slower than any Maxwell mode with the teacher's times can bear for ever
+_EXTENSION = {"extension": in_flow(start_up(0.3), "uniaxial")}
 
 
 class MaxwellSurrogate(AbstractConstitutiveLaw):
@@ -63,6 +70,8 @@ class Student:
         Where the fit starts.
     latex
         The law with ``%s`` where each parameter's value goes.
+    more_starts
+        Further starts: several constants may have a misfit with several minima.
     """
 
     name: str
@@ -70,6 +79,7 @@ class Student:
     bounds: Mapping[str, tuple[float, float]]
     start: tuple[float, ...]
     latex: str
+    more_starts: tuple[tuple[float, ...], ...] = ()
 
 
 _CONVECTED = r"\overset{\nabla}{\boldsymbol{\sigma}}"
@@ -123,7 +133,44 @@ STUDENTS: Mapping[str, Student] = {
         r" - \boldsymbol{I},\quad 1/L^2 = %s",
     ),
 }
-"""Students by the name of their law."""
+"""Students of the paper by the name of their law; any other law with a name can be one too."""
+
+
+def student_of(law: str) -> Student:
+    """Return any law with a name as a student, with all its constants to teach.
+
+    Parameters
+    ----------
+    law
+        Key of `STUDENTS` or of `LAWS`.
+
+    Raises
+    ------
+    InputError
+        If there is no such law, or it has no constant.
+    """
+    if law in STUDENTS:
+        return STUDENTS[law]
+    if law not in LAWS or not LAWS[law].parameters:
+        known = dict.fromkeys([*STUDENTS, *(name for name in LAWS if LAWS[name].parameters)])
+        raise InputError(f"Unknown student {law!r}; write one of {', '.join(known)}.")
+    entry = LAWS[law]
+    ranges = entry.parameters.values()
+    shares = qmc.Halton(len(ranges), scramble=False).random(_POINTS + 1)[1:]
+    others = tuple(
+        tuple(_within(ends, float(at)) for ends, at in zip(ranges, row, strict=True))
+        for row in shares
+    )
+    start = tuple(starting_values(law).values())
+    constants = r",\quad ".join(rf"\texttt{{{name}}} = %s" for name in entry.parameters)
+    latex = rf"\text{{{entry.title}}}:\quad {constants}".replace("_", r"\_")
+    return Student(law, entry.build, entry.parameters, start, latex, others)
+
+
+def _within(ends: tuple[float, float], share: float) -> float:
+    """Return a value within a range; one that leaves out zero spans orders of magnitude."""
+    low, high = ends
+    return low * (high / low) ** share if low > 0.0 else low + (high - low) * share
 
 
 @dataclass(frozen=True)
@@ -146,7 +193,8 @@ class Distillation:
         law.
     errors
         For each test flow, relative L2 errors ``sigma12``, ``N1`` and ``N2`` of the debiased
-        student (N2's relative to N1's norm); None where a law runs away.
+        student (N2's relative to N1's norm), in extension ``tensile_stress``; None where a law
+        runs away.
     latex
         The debiased law.
     law
@@ -185,6 +233,7 @@ class _Lesson(eqx.Module):
     build: Callable[..., AbstractConstitutiveLaw] = eqx.field(static=True)
     low: Float[Array, " p"]
     high: Float[Array, " p"]
+    geometric: Bool[Array, " p"]
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
@@ -194,7 +243,20 @@ class _Lesson(eqx.Module):
 
     def parameters(self, free: Float[Array, " p"]) -> Float[Array, " p"]:
         """Return parameters inside their bounds from unbounded ones."""
-        return self.low + (self.high - self.low) * jax.nn.sigmoid(free)
+        share = jax.nn.sigmoid(free)
+        linear = self.low + (self.high - self.low) * share
+        positive = jnp.where(self.geometric, self.low, 1.0)
+        return jnp.where(self.geometric, positive * (self.high / positive) ** share, linear)
+
+    def free(self, values: Float[np.ndarray, " p"]) -> Float[Array, " p"]:
+        """Return the unbounded parameters of values inside their bounds."""
+        low, high, geometric = map(np.asarray, (self.low, self.high, self.geometric))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(
+                geometric, np.log(values / low) / np.log(high / low), (values - low) / (high - low)
+            )
+        share = np.clip(share, _INSIDE, 1.0 - _INSIDE)
+        return jnp.asarray(np.log(share / (1.0 - share)))
 
     def residual(self, free: Float[Array, " p"], kappa: Float[Array, ""]):
         """Return residuals whose squares add up to the objective."""
@@ -244,7 +306,8 @@ def distil(
     teacher
         A dimensionless law or a fluid.
     student
-        Key of `STUDENTS`, or a `Student`. It has the teacher's moduli and relaxation times.
+        Key of `STUDENTS` or of `LAWS`, or a `Student`. It has the teacher's moduli and relaxation
+        times. A law of `LAWS` beyond the paper's is taught from several starts.
     protocols
         Training flows, by default the paper's eight.
     penalty
@@ -252,7 +315,7 @@ def distil(
     n_samples, duration
         Equally spaced samples of each training flow, and its length in the teacher's units.
     tests
-        Flows on which errors are reported, by default the paper's three.
+        Flows on which errors are reported, by default the paper's three and uniaxial extension.
 
     Raises
     ------
@@ -260,7 +323,7 @@ def distil(
         If the student is unknown or an argument is out of range.
     """
     fluid = teacher if isinstance(teacher, Fluid) else Fluid.dimensionless(teacher)
-    pupil = _find_student(student)
+    pupil = student if isinstance(student, Student) else student_of(student)
     if not (np.isfinite(penalty) and penalty >= 0):
         raise InputError(f"penalty must be a number from 0 on; got {penalty}.")
     if n_samples < 2 or not duration > 0:
@@ -282,6 +345,8 @@ def distil(
         pupil.build,
         jnp.asarray(low),
         jnp.asarray(high),
+        # those of the paper's students go in straight lines
+        jnp.asarray((low > 0.0) & (pupil.name not in STUDENTS)),
         fluid.modulus,
         fluid.relaxation_time,
         fluid.solvent_viscosity,
@@ -289,9 +354,9 @@ def distil(
         grids,
         jnp.asarray(target),
     )
-    fraction = np.clip((np.array(pupil.start) - low) / (high - low), _INSIDE, 1.0 - _INSIDE)
-    start = jnp.asarray(np.log(fraction / (1.0 - fraction)))
-    debiased_free, difference = _teach(lesson, start, jnp.asarray(0.0))
+    starts = (lesson.free(np.array(values)) for values in (pupil.start, *pupil.more_starts))
+    taught_from = [_teach(lesson, start, jnp.asarray(0.0)) for start in starts]
+    debiased_free, difference = min(taught_from, key=lambda one: float(jnp.sum(one[1] ** 2)))
     penalised_free, _ = _teach(lesson, debiased_free, jnp.asarray(float(penalty)))
     debiased = np.asarray(lesson.parameters(debiased_free))
     penalised = np.asarray(lesson.parameters(penalised_free))
@@ -299,7 +364,7 @@ def distil(
     scale = np.sqrt(np.sum(np.mean(target**2, axis=1)))
     maxwell = isinstance(law, MaxwellSurrogate)
     taught = Fluid(law, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity)
-    test_flows = paper_test_protocols() if tests is None else tests
+    test_flows = {**paper_test_protocols(), **_EXTENSION} if tests is None else tests
     return Distillation(
         student=pupil.name,
         penalised=dict(zip(pupil.bounds, map(float, penalised), strict=True)),
@@ -330,7 +395,8 @@ def compare_fluids(
 
     Returns
     -------
-    ``{"sigma12", "N1", "N2"}``, or None where a fluid runs away in this flow.
+    ``{"sigma12", "N1", "N2"}``, in extension ``{"tensile_stress"}``; None where a fluid runs away
+    in this flow.
     """
     times = np.linspace(0.0, duration, 401)
     try:
@@ -341,22 +407,16 @@ def compare_fluids(
     def norm(values):
         return float(np.linalg.norm(values))
 
-    shear = norm(judged.shear_stress - reference.shear_stress)
     first = norm(judged.first_normal_stress_difference - reference.first_normal_stress_difference)
+    normal_scale = max(norm(reference.first_normal_stress_difference), 1e-300)
+    if protocol.kinematics is not None:
+        return {"tensile_stress": first / normal_scale}
+    shear = norm(judged.shear_stress - reference.shear_stress)
     second = norm(
         judged.second_normal_stress_difference - reference.second_normal_stress_difference
     )
-    normal_scale = max(norm(reference.first_normal_stress_difference), 1e-300)
     return {
         "sigma12": shear / max(norm(reference.shear_stress), 1e-300),
         "N1": first / normal_scale,
         "N2": second / normal_scale,
     }
-
-
-def _find_student(student: str | Student) -> Student:
-    if isinstance(student, Student):
-        return student
-    if student not in STUDENTS:
-        raise InputError(f"Unknown student {student!r}; write one of {', '.join(STUDENTS)}.")
-    return STUDENTS[student]

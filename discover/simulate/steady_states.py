@@ -1,6 +1,7 @@
 """Steady states of a fluid, found without waiting for them."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,20 +10,109 @@ from jaxtyping import Array, Float
 from discover.laws.multimode import Fluid
 from tensor_library.kinematics import VelocityGradient
 
+# A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so
+# many steps before, and widths then grow twice as fast until they have caught up. At most so often,
+# so that there are steps left to arrive
+_BACK, _MOST_AGAIN = 3.0, 20
+
+# What may be left of the rate of change, of the largest there could be
+_STILL = 1e-3
+
 # Pseudo-time steps, from a fraction of the fastest time of the flow to where a step is Newton's
 STEPS = 60
 _FIRST, _LAST = 0.05, 1e8
 
 
+class Approach(NamedTuple):
+    """A way towards a steady state.
+
+    Attributes
+    ----------
+    stress
+        Of all modes.
+    number
+        Of the next step of each mode, and how many were taken again, both of shape (k,).
+    again
+        See there.
+    """
+
+    stress: Float[Array, "s k"]
+    number: Float[Array, " k"]
+    again: Float[Array, " k"]
+
+
+def approach(stress: Float[Array, "s k"]) -> Approach:
+    """Return the way from modes at rest."""
+    nothing = jnp.zeros(stress.shape[1], stress.dtype)
+    return Approach(stress, nothing, nothing)
+
+
+def approach_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    way: Approach,
+    index: Float[Array, ""],
+    weissenberg_number: Float[Array, " k"],
+) -> Approach:
+    """Return the way after one of `STEPS` steps.
+
+    Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
+
+    Parameters
+    ----------
+    change
+        As in `linearly_implicit_step`.
+    way
+        Before it.
+    index
+        Of the step, from 0 on.
+    weissenberg_number
+        As in `pseudo_time_step`.
+    """
+    width = pseudo_time_step(way.number, weissenberg_number)
+    moved = linearly_implicit_step(change, way.stress, width)
+    possible = jnp.all(jnp.isfinite(moved), axis=0) & _is_of_chains(moved)
+    taken = possible | (way.again >= _MOST_AGAIN)
+    onward = jnp.minimum(way.number + 2.0, index + 1.0)
+    return Approach(
+        jnp.where(taken, moved, way.stress),
+        jnp.where(taken, onward, jnp.maximum(way.number - _BACK, 0.0)),
+        way.again + jnp.where(taken, 0.0, 1.0),
+    )
+
+
+def arrived(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    way: Approach,
+    weissenberg_number: Float[Array, " k"],
+) -> Float[Array, "s k"]:
+    """Return the modes where the way ends; not finite where that is no steady state of chains.
+
+    A law may have a state of rest that no flow reaches: of FENE-P, springs of no strength.
+
+    Parameters
+    ----------
+    change, way, weissenberg_number
+        As in `approach_step`.
+    """
+    stress = way.stress
+    most = (1.0 + weissenberg_number) * (1.0 + jnp.max(jnp.abs(stress), axis=0))
+    still = jnp.max(jnp.abs(change(stress)), axis=0) <= _STILL * most
+    return jnp.where(still & _is_of_chains(stress), stress, jnp.nan)
+
+
+def _is_of_chains(stress):
+    return jnp.sum(stress[:3], axis=0) > -3.0
+
+
 def pseudo_time_step(
-    number: Float[Array, ""], weissenberg_number: Float[Array, " k"]
+    number: Float[Array, " k"], weissenberg_number: Float[Array, " k"]
 ) -> Float[Array, " k"]:
     """Return the width of one of `STEPS` steps of each mode, in its relaxation times.
 
     Parameters
     ----------
     number
-        Of the step, from 0 on.
+        Of the step of each mode, from 0 on.
     weissenberg_number
         Rate of the flow times the relaxation time of each mode.
     """
@@ -88,7 +178,7 @@ def steady_modes(
 
     Approached from rest by linearly implicit Euler steps in pseudo-time that grow until they are
     Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]. Where a law has several steady
-    states it is the one that a start-up leads to. Not finite, or far off, where there is none.
+    states it is the one that a start-up leads to. Not finite where none is reached.
 
     Derivatives by the law's parameters are those of the implicit function: no tangent passes
     through the steps.
@@ -108,11 +198,11 @@ def steady_modes(
     def change(stress):
         return jax.vmap(stress_rate)(stress.T, scaled_gradient).T
 
-    def step(stress, number):
-        return linearly_implicit_step(change, stress, pseudo_time_step(number, weissenberg)), None
+    def step(way, index):
+        return approach_step(change, way, index, weissenberg), None
 
-    reached, _ = jax.lax.scan(step, rest.T, jnp.arange(STEPS, dtype=float))
-    reached = jax.lax.stop_gradient(reached)
+    way, _ = jax.lax.scan(step, approach(rest.T), jnp.arange(STEPS, dtype=float))
+    reached = jax.lax.stop_gradient(arrived(change, way, weissenberg))
     now, jacobian = _with_jacobian(change, reached)
     # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
     return (reached + _solved(jax.lax.stop_gradient(-jacobian), now)).T

@@ -15,7 +15,7 @@ from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageP
 from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.stages import ConstantByMode, DeclaredEffect, ModeConstant
 from discover.effects import make_effect
-from discover.equations import Box, Equation, EquationTerm, equation_to_json
+from discover.equations import Box, Equation, EquationTerm, StatePart, equation_to_json
 from discover.equations import Tested as Where
 from discover.equations.read import read_result_laws
 from discover.equations.rheotool_reader import read_rheotool
@@ -249,3 +249,20 @@ def test_a_loop_whose_law_is_no_sum_of_terms_says_why(tmp_path, case):
     done = invoke("export", tmp_path)
     assert done.exit_code == 2
     assert ("yield_stress" if case == "yield" else "thixotropy") in done.stderr
+
+
+def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
+    found = loop_result(("thixotropy", 0.1, 2.0))
+    part = StatePart("thixotropy", {"breakdown": 0.1, "build_up_time": 2.0})
+    result = replace(found, fluid=None, fluid_at_mean=found.fluid, states=(part,))
+    result.write_json(tmp_path / "loop.json")
+    text = invoke("export", tmp_path).stdout
+    module = {}
+    exec(text, module)
+    (rate,) = module["structure_rate"](np.zeros((1, 3, 3)), np.diag([3.0, 0.0], k=1), [0.5])
+    # ds/dt = (1 - s)/t_b - k |rate| s
+    assert rate == pytest.approx(0.5 / 2.0 - 0.1 * 3.0 * 0.5)
+    assert read_result_laws(tmp_path)["augmented"].states == (part,)
+    refused = invoke("export", tmp_path, "--format", "rheotool")
+    assert refused.exit_code == 2
+    assert "rheoTool has it not" in refused.stderr

@@ -9,6 +9,7 @@ from independent.pom_pom import ExtendedPomPom
 from independent.rolie_poly import RoliePoly
 
 import discover as dc
+from discover.closed_loop import law_choice
 from discover.errors import InputError
 from discover.report.loop.verdict import loop_verdict
 
@@ -97,3 +98,29 @@ def test_a_law_that_none_of_them_is_stays_unexplained():
 def test_a_name_that_is_no_law_is_told():
     with pytest.raises(InputError, match=r"Unknown law 'newton'; write some of ucm"):
         chosen(runs(Giesekus(0.3), (0.3, 1.0)), names=("ucm", "newton"))
+
+
+@pytest.fixture
+def no_start_of_its_own(monkeypatch):
+    """Where every start of the law with slip is a place at which it cannot be integrated."""
+
+    def starts(model, nothing_known=True):
+        start = model.zero()
+        if "xi" in [p.name for p in model.declared.free_parameters]:
+            start[2:4] = np.nan
+        return [start]
+
+    monkeypatch.setattr(law_choice, "first_starts", starts)
+
+
+def test_a_law_ends_no_higher_than_one_that_it_contains(no_start_of_its_own):
+    names = ["giesekus_non_affine", "giesekus"]  # in any order
+    simple, both = chosen(runs(Giesekus(0.3), (0.5, 5.0)), names=names).laws
+    assert (simple.law, both.law) == ("giesekus", "giesekus_non_affine")
+    assert both.error.fit <= 1.0001 * simple.error.fit
+    assert both.parameters["alpha"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_control_without_the_other_law_it_has_no_start(no_start_of_its_own):
+    with pytest.raises(InputError, match="can be integrated"):
+        chosen(runs(Giesekus(0.3), (0.5, 5.0)), names=["giesekus_non_affine"])

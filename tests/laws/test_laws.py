@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 import tensor_library as tl
 from discover.errors import InputError
 from discover.laws import (
+    LAWS,
     FenePeterlin,
     Fluid,
     Giesekus,
@@ -15,6 +16,7 @@ from discover.laws import (
     UpperConvectedMaxwell,
     make_law,
 )
+from discover.laws.registry import starting_values
 from discover.protocols import oscillatory_shear, start_up
 from discover.simulate import SimulationError, simulate, simulate_homogeneous_flow
 
@@ -211,3 +213,23 @@ def test_runaway_stress_is_an_error_that_says_so():
 def test_a_wrong_law_is_refused_with_what_was_wanted(name, parameters, message):
     with pytest.raises(InputError, match=message):
         make_law(name, parameters)
+
+
+CONTAINED = [
+    (law, below, fixed)
+    for law, entry in LAWS.items()
+    for below, fixed in entry.contains.items()
+    if not make_law(law, starting_values(law)).variables  # the blend: test_rolie_poly_blend.py
+]
+
+
+@pytest.mark.parametrize(("law", "below", "fixed"), CONTAINED, ids=lambda part: str(part)[:40])
+def test_a_law_is_the_one_that_it_contains_where_it_says_so(law, below, fixed):
+    known = {name: 0.3 for name in LAWS[below].parameters}
+    own = {name: {**known, **fixed}[name] for name in LAWS[law].parameters}
+    stress = jnp.array([[1.1, 0.5, 0.0], [0.5, 0.2, 0.0], [0.0, 0.0, -0.1]])
+    rate = jnp.array([[0.3, 0.8, 0.0], [0.8, -0.3, 0.0], [0.0, 0.0, 0.0]])
+    wanted = make_law(below, known).extra_term(stress, rate)
+    found = make_law(law, own).extra_term(stress, rate)
+    # L² = 1e6 and a largest stretch of 100 are limits: (stretch/100)² of the terms
+    np.testing.assert_allclose(found, wanted, atol=1e-3)

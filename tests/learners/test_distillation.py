@@ -10,9 +10,10 @@ from discover.laws import (
     Fluid,
     Giesekus,
     LinearPhanThienTanner,
+    make_law,
 )
 from discover.learners.distillation import STUDENTS, MaxwellSurrogate, compare_fluids, distil
-from discover.protocols import oscillatory_shear, paper_training_protocols, start_up
+from discover.protocols import in_flow, oscillatory_shear, paper_training_protocols, start_up
 from discover.simulate import simulate
 
 FEW = {"fast": oscillatory_shear(2.0, 1.0), "slow": oscillatory_shear(1.0, 0.5)}
@@ -122,3 +123,22 @@ def test_every_student_starts_inside_its_bounds():
     for student in STUDENTS.values():
         for value, (low, high) in zip(student.start, student.bounds.values(), strict=True):
             assert low < value < high
+
+
+@pytest.mark.slow
+def test_a_law_with_a_structure_variable_teaches_and_is_taught():
+    """Every constant comes back, of two at once; another law leaves an error in extension."""
+    short = {
+        "n_samples": 41,
+        "duration": 6.0,
+        "tests": {"pulled": in_flow(start_up(0.3), "uniaxial")},
+    }
+    teacher = make_law("pom_pom_drag_strain", {"q": 4.0, "stretch_time_ratio": 0.3})
+    flows = {"fast": start_up(8.0), **FEW}
+    itself = distil(teacher, "pom_pom_drag_strain", flows, **short)
+    # within the steps of the fit, whose growth of the stretch has kinks
+    assert itself.debiased == pytest.approx({"q": 4.0, "stretch_time_ratio": 0.3}, rel=0.02)
+    assert itself.errors["pulled"]["tensile_stress"] < 0.01
+    other = distil(teacher, "giesekus", flows, **short)
+    assert other.misfit > 10.0 * itself.misfit
+    assert other.errors["pulled"]["tensile_stress"] > 0.05

@@ -4,9 +4,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent.authors import rolie_poly_fene
+from independent.by_authors import ByAuthors
 from independent.homogeneous import GiesekusFluid
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from discover import Fluid, make_law
+from discover.dataset.run import Run
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws.expansion import law_of_terms
 from discover.laws.giesekus import Giesekus
 from discover.protocols import in_flow, start_up
@@ -60,3 +66,52 @@ def test_a_law_without_a_steady_state_says_so():
     fluid = Fluid(law_of_terms(["gammadot.gammadot"], [-2.0], {}, False), 1.0, 1.0)
     with pytest.raises(SimulationError, match="no steady state"):
         simulate(fluid, steady_rates(RATES), COUNTED)
+
+
+FAST = np.array([30.0, 100.0, 316.0, 1000.0])
+
+
+def fene_p_shear_stress(limit, rate):
+    """Return σ12/G of A12 = Wi/f², A22 = A33 = 1/f, A11 = 1/f + 2 Wi²/f³; f is the root."""
+
+    def off(f):
+        trace = 3.0 / f + 2.0 * rate**2 / f**3
+        return f * (limit - trace) - (limit - 3.0)
+
+    return rate / brentq(off, 1.0, 1e4)
+
+
+def followed_until_steady(rate, constants):
+    law = ByAuthors(rolie_poly_fene, constants)
+    states = solve_ivp(
+        lambda t, y: law.change(y, rate), (0, 30.0), law.rest(), "Radau", rtol=1e-9, atol=1e-11
+    )
+    return law.stress(states.y[:, -1], rate)[0, 1]
+
+
+CHAINS = {"stretch_time_ratio": 0.25, "beta": 0.0, "maximum_stretch": 5.0}
+
+
+@pytest.mark.parametrize("name", ["fene_p", "rolie_poly_fene"])
+def test_chains_that_end_have_the_steady_state_of_their_start_up_however_fast(name):
+    """FENE-P is at rest without strength too, where the steps used to end from Wi 100 on."""
+    if name == "fene_p":
+        law, wanted = make_law(name, {"L2": 50.0}), [fene_p_shear_stress(50.0, r) for r in FAST]
+    else:
+        law, wanted = make_law(name, CHAINS), [followed_until_steady(r, CHAINS) for r in FAST]
+    flow, times = steady_rates(FAST), np.arange(1.0, 5.0)
+    found = np.asarray(solve_batch(Fluid.dimensionless(law), lay_out([flow], [times])))[0, :, 3]
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)
+    constants = {"L2": 50.0} if name == "fene_p" else CHAINS
+    model = AugmentedModel(DeclaredModel.named(name, constants, np.ones(1), np.ones(1)), [])
+    run = Run("curve", times, flow, FAST, np.ones(4))
+    np.testing.assert_allclose(model.predict(model.zero(), make_batch([run]))[0], wanted, rtol=1e-6)
+
+
+def test_where_no_steady_state_of_chains_is_reached_none_is_told():
+    """At a Weissenberg number of 1e5 the steps end at springs of no strength: that is no answer."""
+    fluid = Fluid.dimensionless(make_law("fene_p", {"L2": 50.0}))
+    flows = lay_out([steady_rates([1.0, 1e5])], [np.array([1.0, 2.0])])
+    found = np.asarray(solve_batch(fluid, flows))[0, :, 3]
+    assert found[0] == pytest.approx(fene_p_shear_stress(50.0, 1.0), rel=1e-6)
+    assert np.isnan(found[1]) or found[1] == pytest.approx(fene_p_shear_stress(50.0, 1e5))

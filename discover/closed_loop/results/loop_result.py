@@ -33,6 +33,7 @@ from discover.equations import (
     EquationTerm,
     HasEquation,
     NamedPart,
+    StatePart,
     Tested,
     equation_to_json,
     law_parts,
@@ -83,7 +84,10 @@ class LoopResult(PageView, HasEquation, NotebookView):
         The augmented fluid, without instrument effects; None where an effect gives it a state that
         no law of stress and rate can carry, or where its constants differ from mode to mode.
     fluid_at_mean
-        The same with constants that differ from mode to mode at the mean relaxation time.
+        The same with constants that differ from mode to mode at the mean relaxation time, and
+        without states; None where `fluid` is there, or a state cannot be written out.
+    states
+        States of the whole fluid beside it.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
     next_tests
@@ -114,6 +118,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     declared_law: Equation | None = field(repr=False, default=None)
     fluid: Fluid | None = field(repr=False, default=None)
     fluid_at_mean: Fluid | None = field(repr=False, default=None)
+    states: tuple[StatePart, ...] = field(repr=False, default=())
     explanations: Explanations = field(default_factory=Explanations)
     next_tests: NextTests = field(repr=False, default_factory=NextTests)
     laws: tuple[LawFit, ...] = ()
@@ -153,16 +158,16 @@ class LoopResult(PageView, HasEquation, NotebookView):
         Raises
         ------
         InputError
-            If an effect gives the fluid a state, or adds what is no sum of library terms, or if
-            what it adds differs from mode to mode.
+            If an effect gives the fluid a state that nobody wrote out, or adds what is no sum of
+            library terms, or if what it adds differs from mode to mode.
         """
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(
                 f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
-                "state that no law of stress and rate carries, so it cannot be written out as one "
-                "equation."
+                "state of which nobody said how it is written, so it cannot be written out. Give "
+                "the effect's class the method `written`."
             )
         modulus = tuple(float(g) for g in fluid.modulus)
         relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
@@ -190,6 +195,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             notes=tuple(notes),
             tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
             named=named,
+            states=self.states,
         )
 
     def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[EquationTerm, ...]]:

@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 
 from discover.effects.base import EffectParameter, StateEffect
+from discover.effects.written_state import WrittenState
+from tensor_library.isotropic_function import scalars
 
 
 class Thixotropy(StateEffect):
@@ -19,6 +21,11 @@ class Thixotropy(StateEffect):
         del stress
         build_up = 1.0 / values[1]
         return build_up, build_up + values[0] * jnp.abs(shear_rate)
+
+    def written(self):
+        """Return the equation of s, and s."""
+        s, breakdown, time, rate = scalars(self.name, "breakdown", "build_up_time", "shear_rate")
+        return WrittenState(((1 - s) / time - breakdown * rate * s,), modulus_factor=s)
 
     def modulus_factor(self, values, state):
         """Return s."""

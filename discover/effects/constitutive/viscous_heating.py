@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 
 from discover.effects.base import EffectParameter, StateEffect
+from discover.effects.written_state import WrittenState
+from tensor_library.isotropic_function import scalars
 
 
 class ViscousHeating(StateEffect):
@@ -16,6 +18,15 @@ class ViscousHeating(StateEffect):
     def source_and_decay(self, values, shear_rate, stress):
         """Return b σγ̇ and 1/t_h."""
         return values[0] * stress * shear_rate, 1.0 / values[1]
+
+    def written(self):
+        """Return the equation of Θ, and exp(−Θ)."""
+        import sympy
+
+        softening, time = scalars(*(parameter.name for parameter in self.parameters))
+        theta, rate, stress = scalars(self.name, "shear_rate", "shear_stress")
+        changes = softening * stress * rate - theta / time
+        return WrittenState((changes,), time_factor=sympy.exp(-theta))
 
     def time_factor(self, values, state):
         """Return exp(−Θ)."""

@@ -206,12 +206,17 @@ def declared_effects(result: LoopResult) -> list[dict[str, Any]]:
 
 
 def law(result: LoopResult) -> str:
-    """Return the augmented law typeset; empty where it cannot be written out."""
+    """Return the augmented law typeset; empty where it cannot be written out in one equation.
+
+    What a state of the whole fluid does is typeset with the stage that added it.
+    """
     try:
         equation = result.equation()
-        return law_element(equation.terms, equation.linear_relaxation, equation.named)
     except InputError:
         return ""
+    if equation.states:
+        return ""
+    return law_element(equation.terms, equation.linear_relaxation, equation.named)
 
 
 def fold_row(fold: Fold) -> dict[str, Any]:

@@ -1,0 +1,101 @@
+"""A material for every law that the software has a name for, with constants of its own."""
+
+from collections.abc import Mapping
+
+from independent.authors import giesekus_non_affine, rolie_poly_fene, saramito, white_metzner
+from independent.by_authors import ByAuthors
+from independent.fene_p import FenePeterlin
+from independent.giesekus import Giesekus
+from independent.johnson_segalman import JohnsonSegalman
+from independent.material import RateLaw
+from independent.maxwell import UpperConvectedMaxwell
+from independent.phan_thien_tanner import PhanThienTanner
+from independent.pom_pom import ExtendedPomPom, PomPom
+from independent.rolie_poly import RoliePoly
+from independent.rolie_poly_blend import RoliePolyBlend
+
+CONSTANTS: dict[str, dict[str, float]] = {
+    "ucm": {},
+    "johnson_segalman": {"xi": 0.2},
+    "giesekus": {"alpha": 0.3},
+    "ptt_linear": {"epsilon": 0.25},
+    "ptt_exponential": {"epsilon": 0.2},
+    "fene_p": {"L2": 50.0},
+    "giesekus_non_affine": {"alpha": 0.2, "xi": 0.1},
+    "ptt_linear_non_affine": {"epsilon": 0.2, "xi": 0.15},
+    "ptt_exponential_non_affine": {"epsilon": 0.2, "xi": 0.15},
+    "xpp": {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1},
+    "pom_pom": {"q": 4.0, "stretch_time_ratio": 0.3},
+    "pom_pom_drag_strain": {"q": 4.0, "stretch_time_ratio": 0.3},
+    "rolie_poly": {"stretch_time_ratio": 0.2, "beta": 0.7},
+    "rolie_poly_fene": {"stretch_time_ratio": 0.3, "beta": 0.5, "maximum_stretch": 2.0},
+    "rolie_poly_blend": {
+        "long_fraction": 0.3,
+        "short_time_ratio": 0.1,
+        "stretch_time_ratio": 0.2,
+        "short_stretch_time_ratio": 0.2,
+        "beta": 1.0,
+    },
+    "saramito": {"yield_strain": 0.4},
+    "white_metzner": {"k": 0.8, "n": 0.4},
+}
+"""By the names of study files; chosen so that every constant shows at Weissenberg numbers of 1."""
+
+
+def material(
+    law: str, constants: Mapping[str, float], modulus: float = 1.0, relaxation_time: float = 1.0
+) -> RateLaw:
+    """Return the independent material of a law with a name.
+
+    Parameters
+    ----------
+    law
+        As studies spell it.
+    constants
+        By the names of studies; times are over the relaxation time.
+    modulus, relaxation_time
+        In Pa and s.
+    """
+    scale = {"modulus": modulus, "relaxation_time": relaxation_time}
+    c, time = constants, relaxation_time
+    if law == "ucm":
+        return UpperConvectedMaxwell(**scale)
+    if law == "johnson_segalman":
+        return JohnsonSegalman(c["xi"], **scale)
+    if law == "giesekus":
+        return Giesekus(c["alpha"], **scale)
+    if law in ("ptt_linear", "ptt_linear_non_affine"):
+        return PhanThienTanner(c["epsilon"], "linear", c.get("xi", 0.0), **scale)
+    if law in ("ptt_exponential", "ptt_exponential_non_affine"):
+        return PhanThienTanner(c["epsilon"], "exponential", c.get("xi", 0.0), **scale)
+    if law == "fene_p":
+        return FenePeterlin(c["L2"], **scale)
+    if law == "xpp":
+        return ExtendedPomPom(c["q"], c["alpha"], c["stretch_time_ratio"] * time, **scale)
+    if law in ("pom_pom", "pom_pom_drag_strain"):
+        # growth of the stretch fades over the share of q that the software documents
+        drag_strain = law == "pom_pom_drag_strain"
+        return PomPom(c["q"], c["stretch_time_ratio"] * time, modulus, time, drag_strain, fade=0.05)
+    if law == "rolie_poly":
+        return RoliePoly(c["beta"], c["stretch_time_ratio"] * time, **scale)
+    if law == "rolie_poly_blend":
+        phi, short = c["long_fraction"], c["short_time_ratio"] * time
+        stretch = c["stretch_time_ratio"] * time, c["short_stretch_time_ratio"] * short
+        return RoliePolyBlend((phi, 1 - phi), (time, short), stretch, c["beta"], modulus)
+    functions = (giesekus_non_affine, rolie_poly_fene, saramito, white_metzner)
+    function = {one.__name__: one for one in functions}[law]
+    return ByAuthors(function, dict(c), **scale)
+
+
+def linear_modes(
+    law: str, constants: Mapping[str, float], modulus: float = 1.0, relaxation_time: float = 1.0
+) -> tuple[list[float], list[float]]:
+    """Return moduli in Pa and relaxation times in s of the law at small strain."""
+    if law != "rolie_poly_blend":
+        return [modulus], [relaxation_time]
+    # each pair of lengths relaxes at the mean of their rates
+    phi, short = constants["long_fraction"], constants["short_time_ratio"]
+    between = 2.0 / (1.0 + 1.0 / short)
+    shares = [phi**2, 2 * phi * (1 - phi), (1 - phi) ** 2]
+    times = [1.0, between, short]
+    return [modulus * one for one in shares], [relaxation_time * one for one in times]
