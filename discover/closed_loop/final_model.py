@@ -15,6 +15,7 @@ from discover.closed_loop.results.stages import (
     StageParameter,
 )
 from discover.closed_loop.search import Search
+from discover.closed_loop.search.problem import effect_of
 from discover.effects import (
     ConstitutiveEffect,
     ModeEffect,
@@ -58,7 +59,7 @@ def stage_of(
         Its constant in each mode, where that differs.
     """
     model, fit = search.model, search.fit
-    effect = next(e for e in model.effects if e.name == name)
+    effect = effect_of(model, name)
     parameters = {
         p.name: StageParameter(
             float(fit.theta[at]), bounds[1][at], p.unit, ci95_given_effects=bounds[0][at]

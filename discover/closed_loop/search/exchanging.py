@@ -54,8 +54,7 @@ def in_place_of(search: CurrentModel, name: str) -> tuple[Choice | None, list[Ch
     leading = attribute(search.model, search.batch, without, others, LEADERS, rival).leading
     current = CandidateScore(name, "", 1.0, 0.0, start=search.fit.theta.copy())
     asked = [current, *leading][:_COMPARED]
-    choices = refit(search.model, search.batch, without, asked, search.n_candidates, search.prior)
-    choices = search.possible(choices, others)
+    choices = search.possible(refit(search.problem, without, asked), others)
     return next((c for c in choices if c.candidate is current), None), choices
 
 

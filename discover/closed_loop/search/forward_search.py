@@ -9,7 +9,7 @@ from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.augment import Choice, choose, prune
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE, evidence
+from discover.closed_loop.search.evidence import INDISTINGUISHABLE
 from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
 from discover.closed_loop.search.looking_ahead import look_ahead
 from discover.closed_loop.search.taking_out import (
@@ -21,10 +21,8 @@ from discover.closed_loop.search.taking_out import (
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import make_batch
-from discover.forward.least_squares import (
-    intervals,
-)
-from discover.statistics.residual import STRUCTURE, summarise
+from discover.forward.least_squares import intervals
+from discover.statistics.residual import STRUCTURE
 
 _ROUNDS = 3
 
@@ -144,9 +142,7 @@ class Search(CurrentModel):
         if name in self.degrees:
             self.choose_degrees()
         self.polish()
-        self.fit, self.active = prune(
-            self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
-        )
+        self.fit, self.active = prune(self.problem, self.fit, kept, self.settled)
         if len(self.active) < len(kept):
             self.unasked = set(self.active)
             # the stages must tell how the final model is reached, so they are fitted again
@@ -166,10 +162,8 @@ class Search(CurrentModel):
         error, left = (float(np.mean(fit.run_errors)) for fit in (self.fit, choice.fit))
         if error <= STRUCTURE * left:
             return False
-        weight = np.asarray(self.batch.weight)
-        effective = summarise(self.fit.residual, weight).effective_samples
-        found = evidence(self.fit, choice.fit, weight, effective, self.n_candidates)
-        return found > INDISTINGUISHABLE
+        effective = self.problem.independent_samples(self.fit)
+        return self.problem.evidence(self.fit, choice.fit, effective) > INDISTINGUISHABLE
 
     def adopt(self, other: "Search") -> None:
         """Take over the effects that another search established, refitted to these runs."""
