@@ -133,7 +133,6 @@ def differences(
     reference: LawTerms,
     others: Sequence[LawTerms],
     base: AbstractConstitutiveLaw | None = None,
-    histories: Histories | None = None,
 ) -> list[Difference]:
     """Return how far each of several laws is from a reference in random shear histories.
 
@@ -147,10 +146,8 @@ def differences(
         The laws.
     base
         The known part; by default UCM.
-    histories
-        By default `random_histories()`.
     """
-    flows = histories_for(base) if histories is None else histories
+    flows = histories_for(base)
     stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)
     observed = observe_differences(stresses[:, : flows.n_random])
     return [difference(observed[0], other) for other in observed[1:]]

@@ -17,6 +17,9 @@ from discover.report.plots.style import (
 )
 from discover.report.wording import effect_title, percent
 
+MOST_RANKED = 12
+"""Candidates of a stage that are shown, the best."""
+
 
 def waterfall_picture(result: LoopResult) -> Picture:
     """Return the errors after each stage."""
@@ -65,7 +68,7 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     panel.vlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
-def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
+def ranking_picture(result: LoopResult) -> Picture | None:
     """Return what each candidate would remove of the residual, stage by stage."""
     rankings = [ranking for ranking in result.rankings if ranking]
     if not rankings:
@@ -76,7 +79,7 @@ def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
         for panel in axes.ravel()[len(rankings) :]:
             panel.set_visible(False)
         for number, (panel, ranking) in enumerate(zip(axes.ravel(), rankings, strict=False)):
-            best = ranking[:shown][::-1]
+            best = ranking[:MOST_RANKED][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(
                 [effect_title(c.effect) for c in best],

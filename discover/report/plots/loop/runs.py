@@ -33,6 +33,8 @@ FIT_COLOUR, HELD_COLOUR = NETWORK, SPARSE
 """Of runs fitted and held out."""
 
 
+_LONGEST_NAME = 30  # of a run over its panel, in characters
+
 THOUSANDS = 1e4
 """In Pa, from which digits would crowd an axis."""
 
@@ -191,20 +193,18 @@ def short_title(record: RunRecord) -> str:
     return f"{name}\n{' → '.join(map(percent, errors))}"
 
 
-def shortened(name: str, longest: int = 30) -> str:
+def shortened(name: str) -> str:
     """Return the name of a run as it fits over a panel: its beginning and its end.
 
     Parameters
     ----------
     name
         Of the run, which may be a file's.
-    longest
-        Most characters.
     """
     for modulus in MODULI:
         name = name.replace(f".csv ({modulus})", f" {FIGURE_SYMBOLS[modulus]}")
     name = name.removesuffix(".csv")
-    if len(name) <= longest:
+    if len(name) <= _LONGEST_NAME:
         return name
-    end = longest // 2
-    return f"{name[: longest - end - 1]}…{name[-end:]}"
+    end = _LONGEST_NAME // 2
+    return f"{name[: _LONGEST_NAME - end - 1]}…{name[-end:]}"
