@@ -15,7 +15,7 @@ LINEAR_STRAIN = 0.4
 """Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""
 
 
-def settle_instrument(
+def find_instrument_effects(
     search: Search, runs: Sequence[Run], max_effects: int, say: Callable[[str], None]
 ) -> None:
     """Find instrument effects where the strain is small and no law differs from another.

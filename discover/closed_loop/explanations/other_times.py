@@ -120,7 +120,7 @@ def _worth(search: Search, cost: float, free: Sequence[int], effects: Sequence[s
     return problem.criterion(cost, free, effects, problem.independent_samples(search.fit))
 
 
-def held_against_times(
+def compared_with_times(
     judgement: Judgement,
     active: Sequence[str],
     carried: Sequence[Carried],
@@ -135,7 +135,7 @@ def held_against_times(
     best = min(others, key=lambda one: one.criterion)
     own = next(one.criterion for one in carried if set(one.effects) == set(active))
     if judgement.structured or best.criterion < own - INDISTINGUISHABLE:
-        return _saying(replace(judgement, structured=True, verdict="unexplained"), best), ()
+        return _with_sentence(replace(judgement, structured=True, verdict="unexplained"), best), ()
     # the best last, which stays
     instead = {
         name: one
@@ -144,9 +144,9 @@ def held_against_times(
         if one.criterion < own + INDISTINGUISHABLE
     }
     if instead:
-        judgement = _saying(judgement, min(instead.values(), key=lambda one: one.criterion))
+        judgement = _with_sentence(judgement, min(instead.values(), key=lambda one: one.criterion))
     return judgement, tuple(instead)
 
 
-def _saying(judgement: Judgement, times: OtherTimes) -> Judgement:
+def _with_sentence(judgement: Judgement, times: OtherTimes) -> Judgement:
     return replace(judgement, description=f"{judgement.description} {times.sentence}")

@@ -232,7 +232,7 @@ def _near(best: Choice, other: Choice) -> bool:
 
 
 def prune(
-    problem: FitProblem, fit: Fit, active: Sequence[str], settled: Sequence[str] = ()
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
 ) -> tuple[Fit, list[str]]:
     """Drop effects that later ones have made redundant, one after another.
 
@@ -242,8 +242,8 @@ def prune(
         What is fitted to what, and the current fit.
     active
         Effects in the model, in the order they were added; the last is never dropped.
-    settled
-        Effects established on other grounds, which stay.
+    established
+        Effects that other data showed, which stay.
 
     Returns
     -------
@@ -251,13 +251,13 @@ def prune(
     """
 
     def optional(fit: Fit, active: list[str]) -> list[str]:
-        return [name for name in active[:-1] if name not in settled]
+        return [name for name in active[:-1] if name not in established]
 
     return _drop(problem, fit, active, optional, 0.0)
 
 
 def drop_undecided(
-    problem: FitProblem, fit: Fit, active: Sequence[str], settled: Sequence[str] = ()
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
 ) -> tuple[Fit, list[str]]:
     """Drop effects whose amplitude may be zero, one after another, the weakest first.
 
@@ -267,7 +267,7 @@ def drop_undecided(
 
     Parameters
     ----------
-    problem, fit, active, settled
+    problem, fit, active, established
         As in `prune`, but that the last effect may be dropped too.
 
     Returns
@@ -281,7 +281,7 @@ def drop_undecided(
         return [
             name
             for name, (low, high) in amplitudes.items()
-            if low <= 0.0 <= high and name not in settled
+            if low <= 0.0 <= high and name not in established
         ]
 
     return _drop(problem, fit, active, optional, INDISTINGUISHABLE)

@@ -206,7 +206,7 @@ class CurrentModel(SearchState):
     def take(self, fit: Fit, active: Sequence[str]) -> None:
         """Go on with a fit that has these effects, none of which was asked for its aliases yet."""
         self.fit, self.active = fit, list(active)
-        self.unasked = set(active)
+        self.without_aliases = set(active)
         self.fit_path()
         self.leave_out()
 

@@ -14,7 +14,7 @@ from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
 from discover.closed_loop.search.looking_ahead import look_ahead
 from discover.closed_loop.search.taking_out import (
     drop_undecided_effects,
-    hold_against_modes,
+    drop_what_modes_explain,
     refuse,
     restore_left_open,
 )
@@ -56,7 +56,7 @@ class Search(CurrentModel):
         """
         if not self.active or not self.choose_degrees():
             return False
-        self.unasked = set(self.active)
+        self.without_aliases = set(self.active)
         self.fit_path()
         self.leave_out()
         chosen = (f"{name} of degree {found.degree}" for name, found in self.degrees.items())
@@ -97,9 +97,9 @@ class Search(CurrentModel):
         if restored:
             say(f"put back, for what stands in its place is far less likely: {restored}")
         if whole:
-            hold_against_modes(self, say)
+            drop_what_modes_explain(self, say)
         for name in self.active:
-            if name in self.unasked:
+            if name in self.without_aliases:
                 ask_for_aliases(self, name)
 
     def _add_all(self, max_effects: int, say: Callable[[str], None], whole: bool) -> None:
@@ -136,15 +136,15 @@ class Search(CurrentModel):
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
-        self.unasked = set(self.active)
+        self.without_aliases = set(self.active)
         kept = [*self.active, name]
         self.fit = self.sharpened(chosen.fit)
         if name in self.degrees:
             self.choose_degrees()
         self.polish()
-        self.fit, self.active = prune(self.problem, self.fit, kept, self.settled)
+        self.fit, self.active = prune(self.problem, self.fit, kept, self.established)
         if len(self.active) < len(kept):
-            self.unasked = set(self.active)
+            self.without_aliases = set(self.active)
             # the stages must tell how the final model is reached, so they are fitted again
             self.fit_path()
         else:
@@ -167,7 +167,7 @@ class Search(CurrentModel):
 
     def adopt(self, other: "Search") -> None:
         """Take over the effects that another search established, refitted to these runs."""
-        self.settled = tuple(other.active)
+        self.established = tuple(other.active)
         self.active = list(other.active)
         self.aliases |= other.aliases
         self.support |= other.support

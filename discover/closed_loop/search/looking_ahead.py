@@ -33,7 +33,7 @@ def look_ahead(search: CurrentModel, max_effects: int) -> str | None:
             continue
         fit = search.sharpened(fit)
         search.fit = fit
-        search.fit, search.active = prune(search.problem, fit, kept, search.settled)
+        search.fit, search.active = prune(search.problem, fit, kept, search.established)
         new = [name for name in search.active if name not in active]
         for name in new:
             search.aliases[name] = ()
@@ -43,6 +43,6 @@ def look_ahead(search: CurrentModel, max_effects: int) -> str | None:
         # the first was taken on trust, with the others still missing
         for name in new[:-1]:
             exchange(search, name)
-        search.unasked = set(search.active)
+        search.without_aliases = set(search.active)
         return ", ".join(name for name in search.active if name not in active)
     return None

@@ -13,12 +13,12 @@ from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import intervals
 
 
-def hold_against_modes(search: CurrentModel, say: Callable[[str], None]) -> None:
+def drop_what_modes_explain(search: CurrentModel, say: Callable[[str], None]) -> None:
     """Take out effects that constants that differ from mode to mode make needless.
 
     Asked only where the names would explain the data: elsewhere nobody is to believe them.
     """
-    names = [name for name in search.active if name not in search.settled]
+    names = [name for name in search.active if name not in search.established]
     if not names or not search.explained:
         return
     needless = names_not_needed(search.problem, search.fit, names)
@@ -37,7 +37,7 @@ def hold_against_modes(search: CurrentModel, say: Callable[[str], None]) -> None
 
 def refuse(search: CurrentModel) -> str:
     """Take out one effect whose parameters are no finding, and return its name."""
-    names = [name for name in reversed(search.active) if name not in search.settled]
+    names = [name for name in reversed(search.active) if name not in search.established]
     if not names:
         return ""
     bounds = intervals(search.model, search.batch, search.fit)
@@ -60,7 +60,7 @@ def refuse(search: CurrentModel) -> str:
 
 def drop_undecided_effects(search: CurrentModel) -> list[str]:
     """Take out effects of which the whole leaves open whether they are there; name them."""
-    fit, kept = drop_undecided(search.problem, search.fit, search.active, search.settled)
+    fit, kept = drop_undecided(search.problem, search.fit, search.active, search.established)
     dropped = [name for name in search.active if name not in kept]
     if dropped:
         search.take(fit, kept)

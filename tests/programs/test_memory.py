@@ -25,7 +25,7 @@ def make_programs(n):
 def limit(tmp_path, monkeypatch):
     file = tmp_path / "max_map_count"
     monkeypatch.setattr(room, "_LIMIT", file)
-    monkeypatch.setattr("discover.programs.kept._LOOK_EVERY", 10)
+    monkeypatch.setattr("discover.programs.program_cache._LOOK_EVERY", 10)
     return file
 
 
