@@ -30,10 +30,7 @@ from discover.closed_loop.final_model import (
     stage_of,
 )
 from discover.closed_loop.free_form import free_forms
-from discover.closed_loop.judging.before_after import (
-    errors_of,
-    record_runs,
-)
+from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.between_samples import (
     change_between_samples,
     coarse_rates,
@@ -58,17 +55,9 @@ from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
-from discover.effects import (
-    BY_MODE,
-    AbstractEffect,
-)
+from discover.effects import BY_MODE, AbstractEffect
 from discover.errors import InputError
-from discover.forward import (
-    AugmentedModel,
-    DeclaredModel,
-    data_scales,
-    make_batch,
-)
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.statistics.residual import Expectation, summarise

@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.judging.before_after import (
-    strain_of,
-)
+from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.runs import FEWEST_LINEAR_SAMPLES
 from discover.closed_loop.search import Search
 from discover.dataset import Run

@@ -18,11 +18,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
-from discover.identify.exact.exact_series import (
-    DEFAULT_ORDER,
-    hidden_change,
-    solve_for_coefficient,
-)
+from discover.identify.exact.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.exact.relations import feels_33, spell, term_relations
 from discover.identify.side_by_side.histories import SAME, Difference, differences
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, joint_library
