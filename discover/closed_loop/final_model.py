@@ -15,7 +15,7 @@ from discover.closed_loop.results.stages import (
     StageParameter,
 )
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.problem import effect_of
+from discover.closed_loop.search.scoring.problem import effect_of
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import Equation, law_parts
 from discover.errors import InputError

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.search.left_out import left_out_errors
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch

@@ -6,9 +6,9 @@ import pytest
 
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.judging.finer_steps import on_finer_steps
-from discover.closed_loop.search.attribution import attribute
-from discover.closed_loop.search.left_out import FEWEST_FOLDS, left_out_errors
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.attribution import attribute
+from discover.closed_loop.search.scoring.left_out import FEWEST_FOLDS, left_out_errors
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.effects.base import EffectParameter, SignalEffect

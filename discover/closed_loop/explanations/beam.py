@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.evidence import WINDOW
+from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import Fit
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch

@@ -16,7 +16,7 @@ import numpy as np
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.forward.least_squares import Fit
 from discover.words import percent_of
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.search.attribution import Attribution, attribute
-from discover.closed_loop.search.augment import Choice, refit
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.degrees import choose_degrees, positions_of
-from discover.closed_loop.search.evidence import BARE_MENTION
 from discover.closed_loop.search.first_starts import first_starts
-from discover.closed_loop.search.left_out import left_out_errors
-from discover.closed_loop.search.physical_range import at_an_end
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.attribution import Attribution, attribute
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.physical_range import at_an_end
+from discover.closed_loop.search.scoring.problem import FitProblem
+from discover.closed_loop.search.scoring.refitting import Choice, refit
 from discover.closed_loop.search.state import SearchState
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError

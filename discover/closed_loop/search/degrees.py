@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.closed_loop.search.evidence import BARE_MENTION
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import Fit
@@ -28,7 +28,7 @@ class Degree:
     degree
         0 for one constant of all modes.
     evidence
-        For each degree over one constant, by `discover.closed_loop.search.evidence.evidence`.
+        For each degree over one constant, see `discover.closed_loop.search.scoring.evidence`.
     """
 
     degree: int = 0

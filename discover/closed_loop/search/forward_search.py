@@ -6,18 +6,18 @@ import numpy as np
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.augment import Choice, choose, prune
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE
-from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
-from discover.closed_loop.search.looking_ahead import look_ahead
-from discover.closed_loop.search.taking_out import (
+from discover.closed_loop.search.moves.exchanging import ask_for_aliases, reexamine
+from discover.closed_loop.search.moves.looking_ahead import look_ahead
+from discover.closed_loop.search.moves.taking_out import (
     drop_undecided_effects,
     drop_what_modes_explain,
     refuse,
     restore_left_open,
 )
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.refitting import Choice, choose, prune
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import make_batch

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 
-from discover.closed_loop.explanations.discrepancy import changed
-from discover.closed_loop.search.left_out import left_out_parts
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.explanations.bands.discrepancy import changed
+from discover.closed_loop.search.scoring.left_out import left_out_parts
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, covariance_and_noise
 

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.search.attribution import TRIED_AT, CandidateScore, with_other_inner
-from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE
-from discover.closed_loop.search.left_out import (
+from discover.closed_loop.search.scoring.attribution import (
+    TRIED_AT,
+    CandidateScore,
+    with_other_inner,
+)
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.left_out import (
     FEWEST_FOLDS,
     left_out_parts,
     part_errors,
     run_errors,
 )
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit, intervals

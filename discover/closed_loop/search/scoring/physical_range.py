@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.problem import effect_of
+from discover.closed_loop.search.scoring.problem import effect_of
 from discover.effects import EffectParameter
 from discover.forward import AugmentedModel
 

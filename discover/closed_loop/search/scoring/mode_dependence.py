@@ -8,8 +8,8 @@ name that is not needed once it is allowed is no finding.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import ModeDependence
 from discover.forward.least_squares import Fit
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.attribution import attribute
-from discover.closed_loop.search.augment import Choice, aliases_of, refit, simplest
 from discover.closed_loop.search.current_model import LEADERS, CurrentModel
+from discover.closed_loop.search.scoring.attribution import attribute
+from discover.closed_loop.search.scoring.refitting import Choice, aliases_of, refit, simplest
 from discover.effects import AbstractEffect
 
 _COMPARED = 16

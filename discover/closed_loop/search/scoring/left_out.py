@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.closed_loop.search.problem import FitProblem
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward.least_squares import Fit, gauss_newton_step
 
 _MISSED = 10.0
