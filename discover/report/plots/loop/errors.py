@@ -13,6 +13,7 @@ from discover.report.plots.style import (
     legend_above,
     literal,
     make_percentage,
+    panels_of,
     picture,
 )
 from discover.report.wording import effect_title, percent
@@ -73,12 +74,8 @@ def ranking_picture(result: LoopResult) -> Picture | None:
     rankings = [ranking for ranking in result.rankings if ranking]
     if not rankings:
         return None
-    columns = min(3, len(rankings))
-    rows = -(-len(rankings) // columns)
-    with figure(rows, columns, width=10.0, height=3.0) as (drawing, axes):
-        for panel in axes.ravel()[len(rankings) :]:
-            panel.set_visible(False)
-        for number, (panel, ranking) in enumerate(zip(axes.ravel(), rankings, strict=False)):
+    with panels_of(len(rankings), 3, width=10.0, height=3.0) as (drawing, _, panels):
+        for number, (panel, ranking) in enumerate(zip(panels, rankings, strict=True)):
             best = ranking[:MOST_RANKED][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(

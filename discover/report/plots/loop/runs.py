@@ -16,10 +16,11 @@ from discover.report.plots.style import (
     SPARSE,
     TRUTH,
     Picture,
-    figure,
+    label_rows,
     legend_above,
     literal,
     make_logarithmic,
+    panels_of,
     picture,
     runs_through_decades,
 )
@@ -83,12 +84,8 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
 def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
     """Return every run: measured, declared model, augmented model, and overlays."""
     records = result.records
-    columns = min(4, len(records))
-    rows = -(-len(records) // columns)
-    with figure(rows, columns, width=10.0, height=2.2) as (drawing, axes):
-        for panel in axes.ravel()[len(records) :]:
-            panel.set_visible(False)
-        for panel, record in zip(axes.ravel(), records, strict=False):
+    with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
+        for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
             draw_overlays(panel, record, overlays, record.along[1], slice(None))
@@ -105,13 +102,10 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
         below = {panel for panel in axes[-1]}
-        for panel, record in zip(axes.ravel(), records, strict=False):
+        for panel, record in zip(panels, records, strict=True):
             if panel in below or not record.is_transient:
                 panel.set_xlabel(record.along[0])
-        for place, (panel, record) in enumerate(zip(axes.ravel(), records, strict=False)):
-            # once a row, unless something else is recorded
-            if place % columns == 0 or record.quantity != records[place - 1].quantity:
-                panel.set_ylabel(axis_label([record]))
+        label_rows(axes, [axis_label([record]) for record in records])
         legend_above(drawing, axes)
         return picture(
             drawing,
