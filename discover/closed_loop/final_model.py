@@ -15,11 +15,19 @@ from discover.closed_loop.results.stages import (
     StageParameter,
 )
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.scoring.problem import effect_of
-from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
+from discover.effects import (
+    ConstitutiveEffect,
+    ModeEffect,
+    StateEffect,
+)
 from discover.equations import Equation, law_parts
 from discover.errors import InputError
-from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
+from discover.forward import (
+    MODULUS,
+    RELAXATION_TIME,
+    AugmentedModel,
+    DeclaredModel,
+)
 from discover.forward.least_squares import Fit
 from discover.laws import Fluid
 
@@ -50,7 +58,7 @@ def stage_of(
         Its constant in each mode, where that differs.
     """
     model, fit = search.model, search.fit
-    effect = effect_of(model, name)
+    effect = next(e for e in model.effects if e.name == name)
     parameters = {
         p.name: StageParameter(
             float(fit.theta[at]), bounds[1][at], p.unit, ci95_given_effects=bounds[0][at]

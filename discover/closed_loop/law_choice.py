@@ -8,9 +8,8 @@ import numpy as np
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.law_fit import LawFit
-from discover.closed_loop.search.first_starts import first_starts
 from discover.closed_loop.search.scoring.evidence import BARE_MENTION, criterion
-from discover.closed_loop.search.scoring.problem import FitProblem
+from discover.closed_loop.search.first_starts import first_starts
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import (
@@ -21,7 +20,7 @@ from discover.forward import (
     data_scales,
     make_batch,
 )
-from discover.forward.least_squares import Fit
+from discover.forward.least_squares import Fit, fit_batch
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise
@@ -71,7 +70,10 @@ def choose_law(
         say(f"law {len(tried) + 1} of {len(names)}: {LAWS[name].title}")
         model = AugmentedModel(_with_law(declared, name), [], scales)
         starts = first_starts(model, nothing_known=True)
-        tried.append((model, FitProblem(model, batch).best_fit(starts, model.free_positions)))
+        free = [model.free_positions] * len(starts)
+        fits = fit_batch(model, batch, starts, free)
+        usable = [fit for fit in fits if fit.usable]
+        tried.append((model, min(usable, key=lambda fit: fit.cost, default=fits[0])))
     usable = [fit for _, fit in tried if fit.usable]
     if not usable:
         raise InputError(
