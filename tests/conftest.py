@@ -35,6 +35,7 @@ _END_TO_END = {
     "test_measured.py", "test_commands.py", "test_contract_script.py", "test_planting.py",
     "test_loop.py", "test_law_choice.py", "test_constants_by_mode.py", "test_explanations.py",
     "test_extension.py", "test_known_instrument.py", "test_free_form.py", "test_next_tests.py",
+    "test_free_in_model.py",
     "test_first_steps_too_far.py", "test_other_controls.py", "test_measured_rates.py",
     "test_no_signal.py", "test_other_times.py", "test_known_effects_in_the_loop.py",
     "test_search_checkpoint.py", "test_mode_dependence.py", "test_held_out_pattern.py",

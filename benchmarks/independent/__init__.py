@@ -15,6 +15,7 @@ from independent.phan_thien_tanner import PhanThienTanner
 from independent.pom_pom import ExtendedPomPom, PomPom
 from independent.rolie_poly import RoliePoly
 from independent.rolie_poly_blend import RoliePolyBlend
+from independent.soft_glass import SoftGlass
 from independent.structured import Structured
 from independent.thixotropic import Thixotropic
 from independent.white_metzner import WhiteMetzner
@@ -34,6 +35,7 @@ __all__ = [
     "RateLaw",
     "RoliePoly",
     "RoliePolyBlend",
+    "SoftGlass",
     "StressLaw",
     "Stresses",
     "Structured",

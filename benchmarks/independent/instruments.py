@@ -52,6 +52,9 @@ class Instrument:
     ----------
     slip
         s in 1/(Pa s): γ̇_felt = γ̇_tool − s σ   [Yoshimura & Prud'homme 1988, J. Rheol. 32, 53].
+    slip_power
+        γ̇_felt = γ̇_tool − s |σ|^(m−1) σ instead, with m this; slip then in 1/(Pa^m s)
+        [Hatzikiriakos & Dealy 1991, J. Rheol. 35, 497].
     compliance
         C in 1/Pa: γ_felt = γ_tool − C σ   [Gottlieb & Macosko 1982, Rheol. Acta 21, 90].
     rise_time
@@ -64,8 +67,12 @@ class Instrument:
         γ̇_tool is 1 + this times the command.
     gain, offset, drift
         Of the stress: relative, Pa, Pa/s.
+    settling_time
+        In s: the drift dies out, so that drift · τ (1 − exp(−t/τ)) is recorded with the stress.
     lag, delay
         Of the stress, first-order and pure, in s.
+    resonance, damping
+        ω in rad/s and ζ of a transducer of second order, y''/ω² + 2 ζ y'/ω + y = stress.
     adc_step
         Smallest step of the recorded stress, in Pa; 0: none.
     limit
@@ -79,6 +86,7 @@ class Instrument:
     """
 
     slip: float = 0.0
+    slip_power: float = 1.0
     compliance: float = 0.0
     rise_time: float = 0.0
     inertia: float = 0.0
@@ -87,8 +95,11 @@ class Instrument:
     gain: float = 0.0
     offset: float = 0.0
     drift: float = 0.0
+    settling_time: float = np.inf
     lag: float = 0.0
     delay: float = 0.0
+    resonance: float = np.inf
+    damping: float = 0.3
     adc_step: float = 0.0
     limit: float = np.inf
     fastest: float = np.inf
@@ -106,11 +117,14 @@ class Instrument:
         times = np.asarray(times, float)
         told = self._told(flow)
         # the filters of the record need the stress between the samples
-        dense = times if self.lag == self.delay == 0.0 else _filled(times)
+        filtered = self.lag or self.delay or np.isfinite(self.resonance)
+        dense = _filled(times) if filtered else times
         true, felt, tool, slope = self._run(material, told, dense)
         signal = (1 + self.gain) * true.sigma12 + self.inertia * slope
-        signal = signal + self.friction * np.sign(tool) + self.offset + self.drift * dense
+        signal = signal + self.friction * np.sign(tool) + self.offset + self._drifted(dense)
         signal = _lagged(dense, signal, self.lag)
+        if np.isfinite(self.resonance):
+            signal = _ringing(dense, signal, self.resonance, self.damping)
         if self.delay:
             signal = np.interp(dense - self.delay, dense, signal, left=0.0)
         if self.dead:
@@ -146,6 +160,12 @@ class Instrument:
             )
         return Flow(lambda t: gain * flow.rate(t), lambda t: gain * flow.strain(t), flow.jumps)
 
+    def _drifted(self, times: np.ndarray) -> np.ndarray:
+        """Return what a drift has added by the times, in Pa."""
+        if np.isinf(self.settling_time):
+            return self.drift * times
+        return self.drift * self.settling_time * -np.expm1(-times / self.settling_time)
+
     def _run(self, material: Material, told: Flow, times: np.ndarray):
         """Return stresses, felt rate, tool rate and slope of the tool rate at the times."""
         rates = np.asarray(told.rate(times), float)
@@ -175,10 +195,11 @@ class Instrument:
         return differences(tensors), felt, tool, slope
 
     def _felt(self, law: RateLaw, state: np.ndarray, tool: float) -> float:
-        """Return γ̇_felt, which solves γ̇ + s σ12 + C dσ12/dt = γ̇_tool at this state."""
+        """Return γ̇_felt, which solves γ̇ + s |σ12|^(m−1) σ12 + C dσ12/dt = γ̇_tool at this state."""
 
         def missing(rate):
-            gone = self.slip * law.stress(state, rate)[0, 1]
+            stress = law.stress(state, rate)[0, 1]
+            gone = self.slip * np.abs(stress) ** (self.slip_power - 1.0) * stress
             if self.compliance:
                 gone += self.compliance * _stress_change(law, state, rate)
             return rate + gone - tool
@@ -227,3 +248,22 @@ def _lagged(times: np.ndarray, signal: np.ndarray, lag: float) -> np.ndarray:
         # particular solution: signal − τ slope
         out[i] = (out[i - 1] - signal[i - 1] + lag * slope) * decay + signal[i] - lag * slope
     return out
+
+
+def _ringing(times: np.ndarray, signal: np.ndarray, frequency: float, damping: float):
+    """Return y of y''/ω² + 2 ζ y'/ω + y = signal from rest; the signal is linear between times."""
+    from scipy.integrate import solve_ivp
+
+    solution = solve_ivp(
+        lambda t, y: [
+            y[1],
+            frequency**2 * (np.interp(t, times, signal) - y[0]) - 2 * damping * frequency * y[1],
+        ],
+        (times[0], times[-1]),
+        [0.0, 0.0],
+        t_eval=times,
+        rtol=1e-8,
+        atol=1e-8 * max(float(np.max(np.abs(signal))), 1e-300),
+        max_step=float(np.max(np.diff(times))),
+    )
+    return solution.y[0]

@@ -30,6 +30,7 @@ from discover.closed_loop.final_model import (
     stage_of,
 )
 from discover.closed_loop.free_form import free_forms
+from discover.closed_loop.free_in_model import free_functions_in_model
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.between_samples import (
     change_between_samples,
@@ -46,12 +47,14 @@ from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
+from discover.closed_loop.results.free_curve import FreeForm
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
+from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
@@ -226,7 +229,8 @@ def run_loop(
         for i, name in enumerate(active, start=1)
     )
     spikes = with_later_spikes(spikes, fitted_runs, judgement)
-    forms, following = (), NextTests()
+    forms: tuple[FreeForm, ...] = ()
+    following = NextTests()
     if carried:
         tried = [effect.name for effect in candidates if search.admitted(effect)]
         # what explains the fitted runs and not those held out lacks no curve of the fitted ones
@@ -234,7 +238,10 @@ def run_loop(
         known_rates = coarse is None or not coarse.is_coarse
         if judgement.structured and judgement.carries_over and known_rates:
             forms = free_forms(search, fitted_runs, held_batch, held_runs)
-            forms = tuple(one for one in forms if not _predicts_worse(one.error, after))
+        # a law that fits and misses the runs held out may stand for a function inside the model
+        if (judgement.structured or not judgement.carries_over) and known_rates:
+            forms += free_functions_in_model(search, fitted_runs, held_batch)
+        forms = _most_probable([one for one in forms if not _predicts_worse(one.error, after)])
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
@@ -286,6 +293,12 @@ def run_loop(
         fluid_at_mean=fluid if differ else None,
         seconds=time.perf_counter() - started,
     )
+
+
+def _most_probable(forms: Sequence[FreeForm]) -> tuple[FreeForm, ...]:
+    """Return free functions of any place, the most probable first, none beyond Occam's window."""
+    ranked = sorted(forms, key=lambda one: -one.evidence)
+    return tuple(one for one in ranked if one.evidence >= ranked[0].evidence - 2.0 * np.log(WINDOW))
 
 
 def _predicts_worse(error: ErrorPair, than: ErrorPair) -> bool:

@@ -24,6 +24,7 @@ Scale = Literal[
     "fluidity",
     "viscosity",
     "stress_rate",
+    "rate",
     "inertia",
 ]
 """What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
@@ -317,6 +318,16 @@ class SeriesElement(KinematicEffect):
         self, values: Float[Array, " p"]
     ) -> tuple[Float[Array, ""], Float[Array, ""]]:
         """Return s in 1/(Pa s) and C in 1/Pa."""
+
+    @property
+    def slips_by_stress(self) -> bool:
+        """Whether there is a `slip_at`."""
+        return type(self).slip_at is not SeriesElement.slip_at
+
+    def slip_at(self, values: Float[Array, " p"], stress: Float[Array, ""]) -> Float[Array, ""]:
+        """Return what the slip s in 1/(Pa s) is beyond its constant, at a stress in Pa."""
+        del stress
+        return jnp.zeros_like(values[0])
 
 
 class SignalEffect(AbstractEffect):

@@ -28,10 +28,23 @@ class Modes(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Elements in series with the fluid: slip s in 1/(Pa s) and compliance C in 1/Pa."""
+    """Elements in series with the fluid: slip s in 1/(Pa s) and compliance C in 1/Pa.
+
+    Attributes
+    ----------
+    slip, compliance
+        Constants.
+    slip_by_stress
+        What slip is beyond that at a stress in Pa; None for nothing.
+    """
 
     slip: Float[Array, ""]
     compliance: Float[Array, ""]
+    slip_by_stress: Callable[[Float[Array, ""]], Float[Array, ""]] | None = None
+
+    def slip_at(self, stress: Float[Array, ""]) -> Float[Array, ""]:
+        """Return s at a stress in Pa."""
+        return self.slip if self.slip_by_stress is None else self.slip + self.slip_by_stress(stress)
 
 
 class Dynamics(NamedTuple):

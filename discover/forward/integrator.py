@@ -89,7 +89,7 @@ def integrate(
                 shear_before + shear_after
                 + dynamics.viscosity * (first_rate + last_rate + compliance_rate)
             )  # fmt: skip
-            missing = missing + compliance_rate * h + series.slip * h * torque
+            missing = missing + compliance_rate * h + series.slip_at(torque) * h * torque
         return (after, levels, missing, compliance_rate), (stress_after, compliance_rate)
 
     zero = jnp.zeros(())
@@ -174,12 +174,14 @@ def _compliance_rate(
     stretch = own_time * (1.0 + stress[1])
     predicted = scale * ((full * stress[3] + whole * n1[3]) @ modes.modulus)
     stiffness = scale * ((whole * stretch) @ modes.modulus)
-    compliance = series.compliance + 0.5 * series.slip * h
+    # that of the start of the step; what it misses is carried on as well
+    slip = series.slip_at(before)
+    compliance = series.compliance + 0.5 * slip * h
     # torque at the ends for the rate that was given way to before
     predicted = predicted + viscous * (last_rate + earlier)
     before = before + viscous * (first_rate + earlier)
     taken = compliance * (predicted - (stiffness + viscous) * earlier)
-    taken = taken + 0.5 * series.slip * h * before + missing
+    taken = taken + 0.5 * slip * h * before + missing
     now = -taken / (h + compliance * (stiffness + viscous))
     now = jnp.where(h > _JUMP * end, now, earlier)
     change = (now - earlier) * own_time

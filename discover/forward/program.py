@@ -354,7 +354,7 @@ class Program:
             pairs = [e.slip_and_compliance(self._values(theta, e)) for e in self._series]
             both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
             slip, compliance = _where_in_shear(flow, both, jnp.zeros(2))
-            series = Series(slip, compliance)
+            series = Series(slip, compliance, self._slip_by_stress(theta, flow))
         return Dynamics(
             modes_rate,
             law.linear_relaxation,
@@ -369,6 +369,18 @@ class Program:
             law.variables,
             self._of_modes_at_rest("shares", law, modulus, extra) if law.tensors else None,
         )
+
+    def _slip_by_stress(self, theta, flow: Kinematics | None):
+        """Return what slip depends on the stress, as a function of it; None where nothing does."""
+        elements = [e for e in self._series if e.slips_by_stress]
+        if not elements:
+            return None
+
+        def slip(stress):
+            found = sum(e.slip_at(self._values(theta, e), stress) for e in elements)
+            return _where_in_shear(flow, found, jnp.zeros(()))
+
+        return slip
 
     def _of_modes_at_rest(
         self, name: str, law: AbstractConstitutiveLaw, modulus, extra: Modes | None

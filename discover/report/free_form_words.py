@@ -8,6 +8,8 @@ _WHAT = {
     "drift": "a function of the time alone",
     "rate": "a function of the shear rate alone",
     "network": "a factor that depends on the strain alone",
+    "relaxation": "a rate of relaxation that depends on the {variable} alone",
+    "slip": "a rate of slip that depends on the {variable} alone",
 }
 
 
@@ -16,4 +18,5 @@ def free_form_sentence(found: FreeForm) -> str:
     beside = " and ".join(map(effect_title, found.beside)) or "the declared model"
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
     verb = "explains" if found.explains else "takes up most of"
-    return f"{_WHAT[found.slot]}{shape}, beside {beside} {verb} what is left"
+    what = _WHAT[found.slot].format(variable=found.variable)
+    return f"{what}{shape}, beside {beside} {verb} what is left"

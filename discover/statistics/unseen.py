@@ -15,7 +15,13 @@ from scipy.linalg import solve_triangular, toeplitz
 from scipy.stats import chi2
 
 from discover.statistics.lack_of_fit import what_is_left
-from discover.statistics.residual import STRUCTURE, Expectation, fast_part, tells_noise
+from discover.statistics.residual import (
+    FEWEST_FAST,
+    STRUCTURE,
+    Expectation,
+    fast_part,
+    tells_noise,
+)
 from discover.statistics.whiteness import SIGNIFICANCE
 
 _SMALLEST_SHARE = 1e-2  # of noise, in what changes from sample to sample
@@ -47,6 +53,30 @@ class Unseen:
     records: Rows
     columns: Sequence[Float[np.ndarray, "constants _"]]
     correlation: Float[np.ndarray, " _"]
+
+    def without_outliers(self, expectation: Expectation) -> "Unseen":
+        """Return the same without samples that are outliers, which refute no law.
+
+        Parameters
+        ----------
+        expectation
+            What a complete model may leave.
+        """
+        outliers = what_is_left(self.residuals, self.records, expectation).outlier_samples
+        parts = (
+            [np.delete(row, list(off), axis=-1) for row, off in zip(part, outliers, strict=True)]
+            for part in (self.residuals, self.records, self.columns)
+        )
+        return Unseen(*parts, self.correlation)
+
+    @property
+    def error(self) -> float:
+        """Mean relative error of the runs that are long enough to judge, or of all."""
+        pairs = [*zip(self.residuals, self.records, strict=True)]
+        judging = [pair for pair in pairs if len(pair[0]) >= FEWEST_FAST] or pairs
+        return float(
+            np.mean([np.linalg.norm(r) / (np.linalg.norm(of) or 1.0) for r, of in judging])
+        )
 
     def moved(self) -> tuple[list[np.ndarray], float]:
         """Return the residuals after the constants moved as both kinds of runs ask.

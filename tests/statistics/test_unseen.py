@@ -71,3 +71,28 @@ def test_a_few_samples_decide_nothing(responses):
         [one.residuals[0][:6]], [one.records[0][:6]], [one.columns[0][:, :6]], one.correlation
     )
     assert not against(few)
+
+
+def knocked(one, seed):
+    """Return the same with three samples of the record thrown off by half its size."""
+    record, residual = one.records[0].copy(), one.residuals[0].copy()
+    at = np.random.default_rng(seed).choice(np.arange(5, len(record) - 5), 3, replace=False)
+    thrown = 0.5 * np.sqrt(np.mean(record**2))
+    record[at] += thrown
+    residual[at] -= thrown
+    return Unseen([residual], [record], one.columns, one.correlation)
+
+
+def test_knocks_refute_no_law_once_they_are_left_out(responses):
+    right = [knocked(unseen(responses, 1e-3, 0.0, seed=seed), seed) for seed in range(10)]
+    left = [one.without_outliers(Expectation()) for one in right]
+    assert np.mean([against(one) for one in left]) <= 0.1
+    assert all(one.error < 0.013 for one in left)
+    assert all(one.error > 0.05 for one in right)
+
+
+def test_what_is_wrong_is_refuted_without_its_knocks_too(responses):
+    extra = 0.025 * (responses["other"] - responses[ALPHA])
+    wrong = [knocked(unseen(responses, 1e-3, 0.0, extra, seed), seed) for seed in range(10)]
+    found = [against(one.without_outliers(Expectation())) for one in wrong]
+    assert np.mean(found) >= 0.9

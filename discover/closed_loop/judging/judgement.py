@@ -13,7 +13,7 @@ from discover.closed_loop.results.stages import Verdict
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, summarise, tells_noise
-from discover.statistics.unseen import CARRIED, refutes
+from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.statistics.whiteness import SIGNIFICANCE
 from discover.words import percent_of
 
@@ -96,6 +96,10 @@ def judge(
     resolution = tolerated.resolution.limit(fit.theta, active, asked)
     known = given or error <= STRUCTURE * resolution
     missed_held_out = _error([record for record in records if record.held_out])
+    # knocks in runs that no fit saw refute no law
+    unseen = None if held is None else held.unseen.without_outliers(expectation)
+    if unseen is not None:
+        missed_held_out = min(missed_held_out, unseen.error)
     asked_of_held_out = max(error, expected, resolution)
     carries_over = held is None or missed_held_out <= CARRIED * asked_of_held_out
     if held is not None and not carries_over:
@@ -107,8 +111,8 @@ def judge(
         # and a few samples, off by chance, decide nothing
         carries_over |= tells_noise(weight) and not tells_noise(held.weight)
     pattern = False
-    if held is not None and explained and carries_over and tolerated.noise_known:
-        pattern = _refuted_by(tolerated, fit, held, plain)
+    if unseen is not None and explained and carries_over and tolerated.noise_known:
+        pattern = _refuted_by(tolerated, fit, unseen, plain)
     if held is not None and pattern:
         limit = held.resolution.limit(fit.theta, active, missed_held_out)
         # what arithmetic did to the fitted runs, constants carry over
@@ -220,7 +224,7 @@ def judge(
     )  # fmt: skip
 
 
-def _refuted_by(tolerated: ToleratedMisfit, fit: Fit, held: HeldOut, together: bool) -> bool:
+def _refuted_by(tolerated: ToleratedMisfit, fit: Fit, unseen: Unseen, together: bool) -> bool:
     """Return whether runs that no fit saw say that something is missing.
 
     The fitted ones have a voice too where noise explains them, and not arithmetic alone.
@@ -229,7 +233,7 @@ def _refuted_by(tolerated: ToleratedMisfit, fit: Fit, held: HeldOut, together: b
     seen = [w > 0 for w in weight]
     rows = [r[s] / w[s] for r, w, s in zip(fit.residual, weight, seen, strict=False)]
     records = [r[s] for r, s in zip(tolerated.records, seen, strict=False)]
-    return refutes(held.unseen, rows, records, tolerated.expectation)
+    return refutes(unseen, rows, records, tolerated.expectation)
 
 
 def _error(records: Sequence[RunRecord]) -> float:

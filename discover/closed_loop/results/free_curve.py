@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeWarning, curve_fit
 
 from discover.closed_loop.results.error_pair import ErrorPair
 
-Slot = Literal["recorded_stress", "drift", "network", "rate"]
+Slot = Literal["recorded_stress", "drift", "network", "rate", "relaxation", "slip"]
 
 _WITHIN = 2.0
 """A closed form is the nearest one if it stays within so many standard deviations of the curve in
@@ -27,13 +27,15 @@ class FreeForm:
     ----------
     slot
         Where it acts: ``recorded_stress``, σ + f(σ) is recorded; ``drift``, σ + f(t); ``rate``,
-        σ + f(γ̇); ``network``, σ (1 + f(γ)).
+        σ + f(γ̇); ``network``, σ (1 + f(γ)); ``relaxation``, each mode relaxes 1 + f times as fast,
+        with f of its dimensionless stress or rate; ``slip``, γ̇ − f(σ) is felt.
     variable, unit
         Of what it is a function, and its unit.
     beside
         Effects in the model with it.
     grid, value, low95, high95
-        The curve, in Pa (``network``: a pure number), with its 95 % band, shape (n,).
+        The curve with its 95 % band, shape (n,): in Pa (``network``, ``relaxation``: a pure number;
+        ``slip``: in 1/s).
     nearest
         Name of a closed form that is it within its uncertainty; None if none is.
     evidence
@@ -86,6 +88,7 @@ def nearest_form(
     value: Float[np.ndarray, " n"],
     deviation: Float[np.ndarray, " n"],
     in_stress: bool,
+    in_time: bool = True,
 ) -> str | None:
     """Return the simplest closed form that a curve is within its uncertainty; None if none is.
 
@@ -97,13 +100,15 @@ def nearest_form(
         The curve and its standard deviation.
     in_stress
         Whether the curve and its variable have one unit, which a saturation (tanh) needs.
+    in_time
+        Whether the variable may be one in which something repeats.
     """
     size = float(np.max(np.abs(grid))) or 1.0
     scale = size if in_stress else float(np.max(np.abs(value - np.mean(value)))) or 1.0
     x, y, spread = grid / size, value / scale, np.maximum(deviation / scale, 1e-12)
     own = float(np.sqrt(np.mean((y - np.mean(y)) ** 2)))
     for name, (form, starts) in _FORMS.items():
-        if name == "tanh" and not in_stress:
+        if (name == "tanh" and not in_stress) or (name == "periodic" and not in_time):
             continue
         for start in starts:
             try:

@@ -44,5 +44,6 @@ def data_scales(runs: Sequence[Run]) -> dict[str, float]:
         "fluidity": rate / stress,
         "viscosity": stress / rate,
         "stress_rate": stress / length,
+        "rate": rate,
         "inertia": stress * gap / rate,
     }

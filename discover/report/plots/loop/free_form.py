@@ -9,6 +9,8 @@ _AXES = {
     "drift": ("time on the instrument's clock (s)", "recorded less true stress (Pa)"),
     "rate": ("shear rate (1/s)", "recorded less true stress (Pa)"),
     "network": ("strain", "relative change of the stress"),
+    "relaxation": ("{variable}, dimensionless", "relative change of the rate of relaxation"),
+    "slip": ("stress (Pa)", "rate taken by slip (1/s)"),
 }
 
 
@@ -23,7 +25,7 @@ def free_form_picture(result: LoopResult) -> Picture | None:
             panel.plot(one.grid, one.value, color=NETWORK, lw=1.5, label="free function")
             panel.axhline(0.0, color="0.6", lw=0.6)
             along, up = _AXES[one.slot]
-            panel.set_xlabel(along)
+            panel.set_xlabel(along.format(variable=one.variable))
             panel.set_ylabel(up)
         legend_above(drawing, axes)
         said = "; ".join(map(free_form_sentence, forms))

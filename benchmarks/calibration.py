@@ -1,0 +1,191 @@
+"""Are probabilities, intervals and bands those of the world? On records that share no code with it.
+
+`independent.worlds` draws a law, an instrument, a protocol and a noise, half of the laws and some
+of the flaws from outside library and dictionary, and records six runs with scipy alone. The
+software is told a Maxwell fluid and given four of them; the two faster ones judge.
+
+- ``close-loop``: verdict, probabilities of explanations, intervals, the band of the held-out runs.
+- ``compare``: the verdict, and the bands of σ12, N1 and N2 in the held-out runs, of every learner
+  that claims one.
+
+Each case is a line of JSON in a file, so a stopped run goes on, and any number of runs add up.
+Seeds of 1 to 9 are for development. The seed that judges, written down before its first case was
+run, and never used to change anything: 20261130.
+
+    python benchmarks/calibration.py --task close-loop --cases 1000 --out loops.jsonl
+    python benchmarks/calibration.py --task compare --cases 1000 --out comparisons.jsonl
+
+With ``--cases 0`` a file is only read, and its table printed.
+"""
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from calibration_tables import TABLES
+from independent.folders import write_folder
+from independent.instruments import Recording
+from independent.worlds import MODULUS, TIME, World, draw_world
+
+import discover as dc
+
+JUDGING_SEED = 20261130
+HELD = "held_"
+
+
+def close_loop(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
+    """Return what a closed loop says, beside what is there."""
+    del runs  # the loop claims nothing but what is recorded
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    loop = dc.close_loop(data, base, held_out=_held_out(data), max_effects=3)
+    said = loop.explanations
+    constants = [
+        {"effect": effect, "parameter": name, "truth": truth, "ci95": list(interval)}
+        for effect, sizes in world.constants.items()
+        for name, truth in sizes.items()
+        if (interval := _interval(loop, effect, name)) is not None
+    ]
+    judged = [r for r in loop.records if r.held_out and r.band is not None]
+    return {
+        "verdict": loop.verdict,
+        "explanations": [
+            {"members": [sorted(one) for one in e.members], "probability": e.probability}
+            for e in said.likeliest_first
+        ],
+        "unexplained_probability": said.unexplained_probability,
+        "inclusion": dict(said.inclusion),
+        "free_form": [[f.slot, f.variable, f.nearest] for f in loop.free_form],
+        "constants": constants,
+        "errors": [loop.error_after.fit, loop.error_after.held_out],
+        "bands": [_band(r.name, "sigma12", *r.band, r.measured) for r in judged],
+    }
+
+
+def compare(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
+    """Return what a comparison claims of stresses in the held-out runs, beside what they were."""
+    from discover.report.predictions import comparison_predictions
+
+    del world
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    found = dc.compare(
+        data, base, held_out=_held_out(data), learners=["tensor_sindy", "tensor_dense"]
+    )
+    lines = comparison_predictions(found)
+    lines = lines[(lines["role"] == "held_out") & lines["low95"].notna()]
+    bands = []
+    for (source, name, quantity), part in lines.groupby(["source", "run", "quantity"]):
+        run = runs[name]
+        # the record judges σ12, the fluid itself what was not recorded
+        truth = run.stress if quantity == "sigma12" else getattr(run, quantity)
+        at = np.searchsorted(run.time, part["time_s"])
+        there = at < len(run.time)
+        there[there] = np.isclose(run.time[at[there]], part["time_s"][there], atol=1e-9)
+        size = np.sqrt(np.mean((run.stress if quantity == "sigma12" else run.N1) ** 2))
+        bands.append(
+            {"source": source}
+            | _band(name, quantity, part["low95"][there], part["high95"][there],
+                    truth[at[there]], size)
+        )  # fmt: skip
+    return {
+        "verdict": str(found.verdict.verdict),
+        "undetermined": found.undetermined,
+        "terms": {
+            name: [term.name for term in outcome.terms] for name, outcome in found.outcomes.items()
+        },
+        "bands": bands,
+    }
+
+
+TASKS: dict[str, Callable[[dc.Dataset, World, dict[str, Recording]], dict]] = {
+    "close-loop": close_loop,
+    "compare": compare,
+}
+
+
+def run_case(task: str, seed: int, index: int) -> dict:
+    """Draw one world, record it, ask, and return the answer beside the truth."""
+    world = draw_world(seed, index)
+    runs = world.make(np.random.default_rng([seed, index, 1]))
+    with tempfile.TemporaryDirectory() as folder:
+        data = dc.load_dataset(write_folder(Path(folder) / "data", runs))
+        started, used = time.perf_counter(), time.process_time()
+        answer = TASKS[task](data, world, runs)
+    return {
+        "seed": seed,
+        "index": index,
+        "law": world.law,
+        "flaw": world.flaw,
+        "protocol": world.protocol,
+        "noise": world.noise,
+        "effects": None if world.effects is None else [sorted(one) for one in world.effects],
+        **answer,
+        "seconds": time.perf_counter() - started,
+        "processor_seconds": time.process_time() - used,
+    }
+
+
+def main() -> None:
+    """Run the cases that are not there yet, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--task", choices=[*TASKS], default="close-loop")
+    parser.add_argument("--seed", type=int, default=JUDGING_SEED)
+    parser.add_argument("--first", type=int, default=0, help="index of the first case")
+    parser.add_argument("--cases", type=int, default=12)
+    parser.add_argument("--out", type=Path, default=Path("calibration.jsonl"))
+    asked = parser.parse_args()
+    lines = asked.out.read_text("utf-8").splitlines() if asked.out.exists() else []
+    cases = [json.loads(line) for line in lines]
+    done = {(case["seed"], case["index"]) for case in cases}
+    for index in range(asked.first, asked.first + asked.cases):
+        if (asked.seed, index) in done:
+            continue
+        case = run_case(asked.task, asked.seed, index)
+        cases.append(case)
+        with asked.out.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(_rounded(case)) + "\n")
+        print(f"{index}: {case['law']}, {case['flaw']}, {case['protocol']}, {case['noise']}: "
+              f"{case['verdict']}, {case['processor_seconds']:.0f} s", flush=True)  # fmt: skip
+    print(TABLES[asked.task](cases))
+
+
+def _held_out(data: dc.Dataset) -> list[str]:
+    return [name for name in data.names if name.startswith(HELD)]
+
+
+def _interval(loop, effect: str, parameter: str) -> tuple[float, float] | None:
+    """Return the interval of a constant in the last stage that has it, if it was found."""
+    for stage in reversed(loop.to_json()["stages"]):
+        if stage["effect"] == effect and parameter in stage["parameters"]:
+            interval = stage["parameters"][parameter]["ci95"]
+            return None if interval is None or None in interval else tuple(interval)
+    return None
+
+
+def _band(run: str, quantity: str, low, high, truth, size: float | None = None) -> dict:
+    """Return the share of samples that a band holds, and half its width over a size."""
+    low, high, truth = (np.asarray(one, float) for one in (low, high, truth))
+    size = float(np.sqrt(np.mean(truth**2))) if size is None else float(size)
+    half = 0.5 * np.sqrt(np.mean((high - low) ** 2))
+    return {
+        "run": run,
+        "quantity": quantity,
+        "inside": float(np.mean((low <= truth) & (truth <= high))),
+        "half_width": float(half / size),
+    }
+
+
+def _rounded(value):
+    """Return JSON with numbers of four digits, which is what a count needs."""
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(one) for one in value]
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""What the cases of `calibration` add up to: how often what was said was so."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.stats import beta
+
+Cases = Sequence[dict]
+WHOLE = 0.9
+"""A run counts as held with so many of its samples in the band."""
+
+
+def share(hits: int, of: int) -> str:
+    """Return a count with its 95 % interval   [Clopper & Pearson 1934, Biometrika 26, 404]."""
+    if not of:
+        return "0 of 0"
+    low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
+    high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
+    return f"{hits} of {of} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def is_right(members: Sequence[Sequence[str]], effects: Sequence[Sequence[str]] | None) -> bool:
+    """Whether one set of a class of twins names each effect that is there once, and no other."""
+    if effects is None:
+        return False
+    for names in members:
+        found = [next((i for i, right in enumerate(effects) if n in right), None) for n in names]
+        if None not in found and sorted(found) == list(range(len(effects))):
+            return True
+    return False
+
+
+def calibration_error(said: np.ndarray, so: np.ndarray, bins: int = 10) -> tuple[float, list[str]]:
+    """Return the expected calibration error, and the lines of a reliability diagram.
+
+    Parameters
+    ----------
+    said
+        Probabilities, shape (n,).
+    so
+        Whether each was so, shape (n,).
+    bins
+        Of equal width.
+    """
+    place = np.minimum((said * bins).astype(int), bins - 1)
+    error, lines = 0.0, []
+    for bin_ in range(bins):
+        among = place == bin_
+        if not np.any(among):
+            continue
+        stated, true = float(np.mean(said[among])), float(np.mean(so[among]))
+        error += np.mean(among) * abs(stated - true)
+        count = int(np.count_nonzero(among))
+        lines.append(f"  said {stated:.2f}: so in {share(int(np.sum(so[among])), count)}")
+    return float(error), lines
+
+
+def loop_table(cases: Cases) -> str:
+    """Return the table of what closed loops said and what was so."""
+    inside = [c for c in cases if c["effects"] is not None]
+    outside = [c for c in cases if c["effects"] is None]
+    clean = [c for c in inside if not c["effects"]]
+    planted = [c for c in inside if c["effects"]]
+    lines = [f"{len(cases)} closed loops, {len(inside)} of what has a name"]
+    first = [c["explanations"][0]["members"] if c["explanations"] else [] for c in planted]
+    right = [is_right(m, c["effects"]) for m, c in zip(first, planted, strict=True)]
+    lines.append(f"what is there in the likeliest class: {share(sum(right), len(right))}")
+    for number in (1, 2):
+        some = [r for r, c in zip(right, planted, strict=True) if len(c["effects"]) == number]
+        lines.append(f"  {number} at a time: {share(sum(some), len(some))}")
+    beside = sum(bool(_beside(c)) for c in planted)
+    lines.append(f"a name beside it, 50 % or more: {share(beside, len(planted))}")
+    named = sum(c["verdict"] == "effects_added" for c in clean)
+    lines.append(f"an effect named where there is none: {share(named, len(clean))}")
+    open_ = sum(c["verdict"] == "unexplained" for c in inside)
+    lines.append(f"unexplained where all has a name: {share(open_, len(inside))}")
+    met = sum(c["verdict"] in ("unexplained", "no_signal") for c in outside)
+    lines.append(f"unexplained where something has none: {share(met, len(outside))}")
+    missed = [c for c in outside if c["verdict"] not in ("unexplained", "no_signal")]
+    lines += [f"  but: {_case(c)}: {c['verdict']}, {_first(c)}" for c in missed]
+    found = [f for c in planted for f in c["constants"]]
+    held = sum(f["ci95"][0] <= f["truth"] <= f["ci95"][1] for f in found)
+    lines.append(f"95 % intervals that hold the constant: {share(held, len(found))}")
+    for name, some in (("all has a name", inside), ("something has none", outside)):
+        lines.append(_coverage(f"band of held-out runs, {name}", _bands(some)))
+    said = [
+        (e["probability"], is_right(e["members"], c["effects"]))
+        for c in cases
+        for e in c["explanations"]
+    ]
+    said += [(c["unexplained_probability"], c["effects"] is None) for c in cases]
+    error, diagram = calibration_error(*map(np.array, zip(*said, strict=True)))
+    lines += [f"expected calibration error of all probabilities: {error:.3f}", *diagram]
+    top = [
+        max(
+            [(c["unexplained_probability"], c["effects"] is None)]
+            + [(e["probability"], is_right(e["members"], c["effects"])) for e in c["explanations"]]
+        )
+        for c in cases
+    ]
+    error, diagram = calibration_error(*map(np.array, zip(*top, strict=True)))
+    lines += [f"of the likeliest answer alone: {error:.3f}", *diagram]
+    return "\n".join([*lines, _seconds(cases)])
+
+
+def comparison_table(cases: Cases) -> str:
+    """Return the table of what comparisons claimed and what was so."""
+    lines = [f"{len(cases)} comparisons"]
+    for name, some in (
+        ("all has a name", [c for c in cases if c["effects"] is not None]),
+        ("something has none", [c for c in cases if c["effects"] is None]),
+    ):
+        explained = sum(c["verdict"] == "explained" for c in some)
+        lines.append(f"{name}: explained in {share(explained, len(some))}")
+        for source in sorted({b["source"] for c in some for b in c["bands"]}):
+            for quantity in ("sigma12", "N1", "N2"):
+                bands = [b for b in _bands(some) if b["quantity"] == quantity]
+                bands = [b for b in bands if b["source"] == source]
+                lines.append(_coverage(f"  {source}, {quantity}", bands))
+    return "\n".join([*lines, _seconds(cases)])
+
+
+TABLES: dict[str, Callable[[Cases], str]] = {
+    "close-loop": loop_table,
+    "compare": comparison_table,
+}
+
+
+def _beside(case: dict) -> list[str]:
+    """Return names of a half or more in the answer that are no name of what is there."""
+    right = {name for names in case["effects"] for name in names}
+    return [name for name, p in case["inclusion"].items() if p >= 0.5 and name not in right]
+
+
+def _bands(cases: Cases) -> list[dict]:
+    return [band for case in cases for band in case["bands"]]
+
+
+def _coverage(what: str, bands: list[dict]) -> str:
+    if not bands:
+        return f"{what}: no band"
+    inside = np.array([b["inside"] for b in bands])
+    width = np.median([b["half_width"] for b in bands])
+    return (
+        f"{what}: {100 * np.mean(inside):.1f} % of the samples, runs held to 90 % "
+        f"{share(int(np.sum(inside >= WHOLE)), len(bands))}, median half-width {100 * width:.2g} %"
+    )
+
+
+def _case(case: dict) -> str:
+    return f"{case['index']}, {case['law']}, {case['flaw']}, {case['protocol']}, {case['noise']}"
+
+
+def _first(case: dict) -> str:
+    first = case["explanations"][0]
+    return f"{' + '.join(first['members'][0]) or 'nothing'} {first['probability']:.2f}"
+
+
+def _seconds(cases: Cases) -> str:
+    used = [c["processor_seconds"] for c in cases]
+    return f"seconds of processor a case: median {np.median(used):.0f}, mean {np.mean(used):.0f}"

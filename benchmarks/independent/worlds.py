@@ -1,0 +1,255 @@
+"""Whole experiments drawn by lot: a law, an instrument, a protocol and a noise, from scipy alone.
+
+Half of the laws and some of the flaws are in no library and no dictionary of the software under
+test. What is told of each is the upper convected Maxwell fluid with G = 100 Pa and λ = 1 s.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from independent.fene_p import FenePeterlin
+from independent.flow import Flow, oscillation, start_up, steps
+from independent.giesekus import Giesekus, multimode_giesekus
+from independent.instruments import Instrument, Recording
+from independent.johnson_segalman import JohnsonSegalman
+from independent.k_bkz import KBKZ
+from independent.material import Material, RateLaw
+from independent.maxwell import UpperConvectedMaxwell
+from independent.noise import correlated, outliers, proportional, white
+from independent.phan_thien_tanner import PhanThienTanner
+from independent.pom_pom import ExtendedPomPom, PomPom
+from independent.rolie_poly import RoliePoly
+from independent.soft_glass import SoftGlass
+from independent.thixotropic import Thixotropic
+from independent.white_metzner import WhiteMetzner
+
+MODULUS, TIME, SAMPLES = 100.0, 1.0, 120
+SCALE = {"modulus": MODULUS, "relaxation_time": TIME}
+VISCOSITY = MODULUS * TIME
+
+Draw = Callable[[float, float], float]
+Constants = Mapping[str, Mapping[str, float]]
+Named = tuple[tuple[frozenset[str], ...], Constants]
+"""For each effect that is there, the names it has; and the constants that go with the first."""
+
+FLOWS: dict[str, dict[str, tuple[Flow, float]]] = {
+    "start-ups and oscillations": {
+        "a.csv": (start_up(1.0), 6.0),
+        "b.csv": (start_up(3.0), 5.0),
+        "c.csv": (oscillation(2.0, 1.0), 12.0),
+        "d.csv": (oscillation(3.0, 0.5), 14.0),
+        "held_e.csv": (start_up(5.0), 4.0),
+        "held_f.csv": (oscillation(5.0, 1.5), 8.0),
+    },
+    "start-ups": {
+        "a.csv": (start_up(0.5), 8.0),
+        "b.csv": (start_up(1.0), 6.0),
+        "c.csv": (start_up(2.0), 6.0),
+        "d.csv": (start_up(4.0), 5.0),
+        "held_e.csv": (start_up(6.0), 4.0),
+        "held_f.csv": (start_up(3.0), 5.0),
+    },
+    "oscillations": {
+        "a.csv": (oscillation(1.0, 0.5), 14.0),
+        "b.csv": (oscillation(2.0, 0.5), 14.0),
+        "c.csv": (oscillation(2.0, 1.0), 12.0),
+        "d.csv": (oscillation(4.0, 1.0), 12.0),
+        "held_e.csv": (oscillation(5.0, 1.5), 8.0),
+        "held_f.csv": (oscillation(6.0, 0.75), 10.0),
+    },
+    "steps": {
+        "a.csv": (steps([0.0, 4.0], [1.0, 3.0]), 8.0),
+        "b.csv": (steps([0.0, 4.0], [3.0, 0.5]), 8.0),
+        "c.csv": (steps([0.0, 4.0], [2.0, 0.0]), 7.0),
+        "d.csv": (steps([0.0, 3.0], [2.0, -2.0]), 7.0),
+        "held_e.csv": (steps([0.0, 3.0], [5.0, 1.0]), 6.0),
+        "held_f.csv": (steps([0.0, 3.0], [4.0, -4.0]), 6.0),
+    },
+}
+"""Six flows of each protocol, each with its duration in s; those named ``held_`` are to judge."""
+
+
+def _alone(name: str, value: float, *spelled: str, constant: str) -> Named:
+    return (frozenset({name, *spelled}),), {name: {constant: value}}
+
+
+def known_laws(draw: Draw) -> dict[str, tuple[Material, Named]]:
+    """Return laws that the software has a name for, with their names."""
+    mobility, slip, linear, exponential = (draw(0.1, 0.5), draw(0.1, 0.4), draw(0.1, 0.4),
+                                           draw(0.1, 0.4))  # fmt: skip
+    length, breakdown, build_up = draw(20.0, 60.0), draw(0.1, 0.4), draw(1.0, 4.0)
+    return {
+        "Maxwell": (UpperConvectedMaxwell(**SCALE), ((), {})),
+        "Giesekus": (
+            Giesekus(mobility, **SCALE),
+            _alone("giesekus_mobility", mobility, "sigma.sigma", constant="alpha"),
+        ),
+        # σ12 in shear tells none of these from its twins (FACTS on twins; Johnson & Segalman 1977)
+        "Johnson-Segalman": (
+            JohnsonSegalman(slip, **SCALE),
+            _alone(
+                "non_affine_motion", slip, "tr(sigma)*gammadot",
+                "sigma.gammadot+gammadot.sigma", constant="xi",
+            ),
+        ),
+        "linear PTT": (
+            PhanThienTanner(linear, "linear", 0.0, **SCALE),
+            _alone("ptt_linear", linear, "tr(sigma)*sigma", constant="epsilon"),
+        ),
+        "exponential PTT": (
+            PhanThienTanner(exponential, "exponential", 0.0, **SCALE),
+            _alone("ptt_exponential", exponential, constant="epsilon"),
+        ),
+        "FENE-P": (
+            FenePeterlin(length, **SCALE),
+            ((frozenset({"finite_extensibility"}),), {}),
+        ),
+        "thixotropic Maxwell": (
+            Thixotropic(UpperConvectedMaxwell(**SCALE), breakdown, build_up),
+            (
+                (frozenset({"thixotropy"}),),
+                {"thixotropy": {"breakdown": breakdown, "build_up_time": build_up}},
+            ),
+        ),
+    }  # fmt: skip
+
+
+def unknown_laws(draw: Draw) -> dict[str, Material]:
+    """Return laws that it has no name for among its effects and terms."""
+    return {
+        "Rolie-Poly": RoliePoly(draw(0.5, 1.0), draw(0.05, 0.2), -0.5, **SCALE),
+        "pom-pom": PomPom(draw(3.0, 6.0), draw(0.2, 0.6), **SCALE),
+        "extended pom-pom": ExtendedPomPom(draw(3.0, 8.0), draw(0.05, 0.3), draw(0.2, 0.6),
+                                           **SCALE),
+        "White-Metzner": WhiteMetzner(draw(0.4, 0.7), draw(0.5, 1.5), **SCALE),
+        "K-BKZ": KBKZ(draw(0.1, 0.3), -0.15, **SCALE),
+        "two modes": multimode_giesekus(
+            (draw(0.05, 0.2), draw(0.5, 0.9)),
+            (0.5 * MODULUS, 0.5 * MODULUS),
+            (draw(1.1, 1.6) * TIME, draw(0.3, 0.6) * TIME),
+        ),
+        "soft glass": SoftGlass(draw(0.1, 0.3), draw(0.1, 0.3), **SCALE),
+        "square-root thixotropy": Thixotropic(
+            UpperConvectedMaxwell(**SCALE), draw(0.2, 0.5), draw(2.0, 6.0), 0.5, 2.0
+        ),
+    }  # fmt: skip
+
+
+def known_flaws(draw: Draw) -> dict[str, tuple[Instrument, Named]]:
+    """Return instruments with a flaw that the software has a name for."""
+    gain, lag, rise = draw(0.05, 0.15), draw(0.05, 0.15), draw(0.05, 0.2)
+    slip, friction = draw(0.1, 0.3) / VISCOSITY, draw(0.03, 0.1) * MODULUS
+    return {
+        "gain": (Instrument(gain=gain), _alone("stress_gain", gain, constant="gain_error")),
+        "lag": (Instrument(lag=lag), _alone("transducer_lag", lag, constant="tau")),
+        "rise": (Instrument(rise_time=rise), _alone("rate_rise_time", rise, constant="tau")),
+        "slip": (Instrument(slip=slip), _alone("wall_slip", slip, constant="slip")),
+        "friction": (
+            Instrument(friction=friction),
+            _alone("bearing_friction", friction, constant="friction"),
+        ),
+    }
+
+
+def unknown_flaws(draw: Draw) -> dict[str, Instrument]:
+    """Return instruments with a flaw of other kinetics than any it has a name for."""
+    return {
+        # of the largest stress, which `World.make` knows
+        "saturated": Instrument(limit=draw(0.6, 0.8)),
+        "ringing": Instrument(resonance=draw(6.0, 15.0), damping=draw(0.1, 0.3)),
+        "cubic slip": Instrument(slip=draw(0.1, 0.3) / VISCOSITY / MODULUS**2, slip_power=3.0),
+        "settling drift": Instrument(
+            drift=draw(0.1, 0.3) * MODULUS / TIME, settling_time=draw(0.5, 2.0) * TIME
+        ),
+    }
+
+
+NOISES: dict[str, Callable[[np.ndarray, np.random.Generator], np.ndarray]] = {
+    "white": lambda stress, lot: white(stress, 0.01, lot),
+    "correlated": lambda stress, lot: correlated(stress, 0.01, 0.6, lot),
+    "proportional": lambda stress, lot: proportional(stress, 0.015, lot),
+    "outliers": lambda stress, lot: outliers(white(stress, 0.01, lot), 0.01, 0.5, lot),
+}
+
+
+@dataclass(frozen=True)
+class World:
+    """One experiment.
+
+    Attributes
+    ----------
+    law, flaw, protocol, noise
+        In words; the flaw is ``"sound"`` if the instrument has none.
+    material, instrument
+        What makes the records.
+    effects
+        For each effect that is there, the names that are right; None if one of them has no name.
+    constants
+        Of effects that are there, by name of effect and parameter.
+    """
+
+    law: str
+    flaw: str
+    protocol: str
+    noise: str
+    material: Material
+    instrument: Instrument
+    effects: tuple[frozenset[str], ...] | None
+    constants: Constants = field(default_factory=dict)
+
+    @property
+    def inside(self) -> bool:
+        """Whether everything that is there has a name."""
+        return self.effects is not None
+
+    def make(self, lot: np.random.Generator) -> dict[str, Recording]:
+        """Return the runs by file name, with noise."""
+        flows, instrument = FLOWS[self.protocol], self.instrument
+        if self.flaw == "saturated":
+            largest = max(
+                np.max(np.abs(self.material.respond(flow, np.linspace(0.0, end, 200)).sigma12))
+                for name, (flow, end) in flows.items()
+                if not name.startswith("held_")
+            )
+            instrument = replace(instrument, limit=instrument.limit * float(largest))
+        runs = {}
+        for name, (flow, end) in flows.items():
+            run = instrument.record(self.material, flow, np.linspace(0.02, end, SAMPLES))
+            runs[name] = replace(run, stress=NOISES[self.noise](run.stress, lot))
+        return runs
+
+
+def draw_world(seed: int, index: int) -> World:
+    """Return one experiment; those of odd index have a law without a name.
+
+    Laws, protocols and noises come in turn, so that a few hundred cover all combinations; half of
+    the instruments are sound, three in ten have a flaw with a name, two in ten one without.
+    """
+    lot = np.random.default_rng([seed, index])
+
+    def draw(low: float, high: float) -> float:
+        return float(lot.uniform(low, high))
+
+    known, unknown = known_laws(draw), unknown_laws(draw)
+    flawed, strange = known_flaws(draw), unknown_flaws(draw)
+    protocol = list(FLOWS)[int(lot.integers(len(FLOWS)))]
+    noise = list(NOISES)[int(lot.integers(len(NOISES)))]
+    chance, which = draw(0.0, 1.0), draw(0.0, 1.0)
+    if index % 2:
+        law = list(unknown)[(index // 2) % len(unknown)]
+        material, effects, constants = unknown[law], None, {}
+    else:
+        law = list(known)[(index // 2) % len(known)]
+        material, (effects, constants) = known[law]
+    flaw, instrument = "sound", Instrument()
+    if chance > 0.8 and isinstance(material, RateLaw):
+        flaw = list(strange)[int(which * len(strange))]
+        instrument, effects = strange[flaw], None
+    elif chance > 0.5 and isinstance(material, RateLaw):
+        flaw = list(flawed)[int(which * len(flawed))]
+        instrument, (names, sizes) = flawed[flaw]
+        effects = None if effects is None else effects + names
+        constants = {**constants, **sizes}
+    return World(law, flaw, protocol, noise, material, instrument, effects, constants)

@@ -1,0 +1,105 @@
+"""What is in no dictionary, found as a curve inside the model: on records by scipy alone."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import PhanThienTanner, PomPom, WhiteMetzner
+from independent.flow import oscillation, start_up
+from independent.folders import write_folder
+from independent.giesekus import Giesekus
+from independent.instruments import Instrument
+
+import discover as dc
+from discover.effects.free_function import INTERVALS, ONSET, spline_basis
+from discover.report.loop.verdict import loop_verdict
+
+MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
+SCALE = {"modulus": MODULUS, "relaxation_time": TIME}
+FLOWS = {
+    "up.csv": (start_up(1.5), 6.0),
+    "swing.csv": (oscillation(2.0, 1.0), 10.0),
+    "wide.csv": (oscillation(4.0, 0.5), 12.0),
+    "judge.csv": (oscillation(3.0, 0.8), 10.0),
+}
+EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_gain", "stress_drift", "transducer_lag"]
+
+
+def loop_on(folder, material, **flaws):
+    """Return the loop on records of a material and the largest N1 of the fitted ones."""
+    generator, runs = np.random.default_rng(0), {}
+    for name, (flow, end) in FLOWS.items():
+        run = Instrument(**flaws).record(material, flow, np.linspace(0.02, end, 120))
+        size = NOISE * np.sqrt(np.mean(run.stress**2))
+        runs[name] = replace(run, stress=run.stress + size * generator.standard_normal(120))
+    data = dc.load_dataset(write_folder(folder, runs))
+    base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    loop = dc.close_loop(
+        data, base, held_out=["judge.csv"], effects=EFFECTS, max_effects=1, explanations=2
+    )
+    largest = max(np.max(run.true.N1) for name, run in runs.items() if name != "judge.csv")
+    return loop, largest
+
+
+def held_in(found, true, widths=2.0):
+    """Return the share of a curve that lies within some widths of its band."""
+    half = (found.high95 - found.low95) / 2.0
+    return np.mean(np.abs(found.value - true) <= widths * half + 1e-9)
+
+
+def test_a_relaxation_that_quickens_with_the_rate_is_found_as_that_function(tmp_path):
+    loop, _ = loop_on(tmp_path, WhiteMetzner(0.5, 1.0, **SCALE))
+    assert loop.verdict == "unexplained"
+    found = loop.free_form[0]
+    assert (found.slot, found.variable, found.beside) == ("relaxation", "rate of deformation", ())
+    # 1/λ(γ̇) = (1 + (k λ γ̇)^(1−n))/λ   [White & Metzner 1963]
+    assert held_in(found, found.grid**0.5) > 0.9
+    assert found.nearest == "power"
+    assert found.explains
+    assert found.error.held_out < 1.5 * NOISE < loop.error_after.held_out
+    said = loop_verdict(loop)[0]
+    assert "a rate of relaxation that depends on the rate of deformation alone" in said
+
+
+@pytest.mark.slow
+def test_a_relaxation_that_quickens_with_the_stress_is_found_as_that_function(tmp_path):
+    loop, first_normal = loop_on(tmp_path, PhanThienTanner(0.3, "exponential", 0.0, **SCALE))
+    found = loop.free_form[0]
+    assert (found.slot, found.variable) == ("relaxation", "trace of the stress")
+    assert held_in(found, np.expm1(0.3 * found.grid)) > 0.9
+    assert found.nearest == "exponential"
+    # σ22 = σ33 = 0 in this law, so that tr σ is N1; further than that no record tells of it
+    assert 0.5 < found.grid[-1] / (first_normal / MODULUS) < 1.05
+
+
+@pytest.mark.slow
+def test_slip_with_the_third_power_of_the_stress_is_found_as_that_function(tmp_path):
+    strength = 0.4 / MODULUS**3
+    loop, _ = loop_on(tmp_path, Giesekus(0.3, **SCALE), slip=strength, slip_power=3.0)
+    found = loop.free_form[0]
+    assert (found.slot, found.variable, found.unit) == ("slip", "stress", "Pa")
+    assert found.beside == ("giesekus_mobility",)
+    assert held_in(found, strength * found.grid**3) > 0.9
+    assert found.nearest == "power"
+    assert found.error.held_out < 1.5 * NOISE < loop.error_after.held_out
+
+
+@pytest.mark.slow
+def test_a_fluid_that_stretches_is_no_function_of_one_variable(tmp_path):
+    loop, _ = loop_on(tmp_path, PomPom(5.0, 0.4, **SCALE))
+    assert loop.verdict == "unexplained"
+    assert not any(one.explains for one in loop.free_form)
+
+
+@pytest.mark.parametrize("largest", [0.5, 20.0])
+def test_the_spline_is_zero_at_rest_and_follows_any_smooth_function(largest):
+    x = np.linspace(0.0, largest, 200)
+    basis = np.asarray(spline_basis(jnp.asarray(x), largest, ONSET))
+    assert basis.shape == (200, INTERVALS + 1)
+    np.testing.assert_allclose(basis[0], 0.0, atol=1e-12)
+    for function in (lambda x: x, np.sqrt, lambda x: np.log1p(x) ** 2):
+        wanted = function(x)
+        met = basis @ np.linalg.lstsq(basis, wanted, rcond=None)[0]
+        # the root has no slope at zero that a spline could follow
+        assert np.sqrt(np.mean((met - wanted) ** 2)) < 0.03 * np.max(wanted)
