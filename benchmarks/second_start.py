@@ -23,7 +23,9 @@ library = {{ degree = 0 }}
 high_deborah = [1.5]
 learners = {learners}
 """
-TRACED = "from discover.programs import kept; kept.program_folder = lambda: None; "
+TRACED = (
+    "from discover.programs import program_cache; program_cache.program_folder = lambda: None; "
+)
 RUN = "from discover.cli import main; main()"
 
 

@@ -64,7 +64,7 @@ class CandidateTerm:
         return None if self.closed_form is None else CLOSED_FORMS[self.closed_form]
 
     @property
-    def told_beside_fields(self) -> tuple:
+    def digest_beside_fields(self) -> tuple:
         """What a compiled program depends on beside the fields: a name is not its function."""
         return () if self.form is None else (self.form.function,)
 

@@ -1,6 +1,7 @@
 """Double precision, strict types and shapes for every test."""
 
 import gc
+import importlib.metadata
 import os
 import sys
 from collections.abc import Iterator
@@ -74,13 +75,38 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--whole", action="store_true", help="run the tests marked slow too")
 
 
+# no optimising, one piece of code a program instead of as many as there are threads, and the older
+# emitters, which are sooner done; XLA ends a process that names a flag that its version lacks
+_COMPILED_SOON = (
+    "--xla_backend_optimization_level=0 --xla_cpu_parallel_codegen_split_count=1 "
+    "--xla_cpu_use_fusion_emitters=false"
+)
+_KNOWN_TO = ("0.10",)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile without optimising where slow tests are left out.
+
+    Most programs of the others run for milliseconds, and LLVM takes longer over them than they do.
+    A release runs the slow ones too, compiled as users have them.
+    """
+    version = importlib.metadata.version("jax").rpartition(".")[0]
+    if _leaves_slow_out(config) and version in _KNOWN_TO:
+        os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
+
+
+def _leaves_slow_out(config: pytest.Config) -> bool:
+    """Return whether nobody asks for slow tests, by --whole, -m or a file's name."""
+    asked = config.getoption("--whole") or config.getoption("-m")
+    return not asked and all(Path(name.split("::")[0]).is_dir() for name in config.args)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave what is slow out unless it is asked for, by --whole, -m or a file's name.
+    """Leave what is slow out unless it is asked for.
 
     Let long files begin first, so that no worker waits for another at the end.
     """
-    asked = config.getoption("--whole") or config.getoption("-m")
-    if not asked and all(Path(name.split("::")[0]).is_dir() for name in config.args):
+    if _leaves_slow_out(config):
         left = [item for item in items if item.get_closest_marker("slow")]
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if not item.get_closest_marker("slow")]

@@ -16,7 +16,7 @@ from discover.identify import (
     RivalTable,
     Twin,
 )
-from discover.identify.design.experiment_outcome import Weight
+from discover.identify.design.experiment_outcome import LawOutcome
 from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm
@@ -80,7 +80,7 @@ def test_what_was_found_out_about_a_law_shows_itself(result, words):
 
 def test_lists_of_findings_become_tables():
     assert table_of([TWIN]).loc[0, ["proof", "N2_apart"]].tolist() == ["series", 0.2]
-    weights = table_of([Weight("a", 10.0, 10, 0.5), Weight("b", 99.0, 10, 0.0)])
+    weights = table_of([LawOutcome("a", 10.0, 10, 0.5), LawOutcome("b", 99.0, 10, 0.0)])
     assert weights["refuted"].tolist() == [False, True]
     assert table_of([]).empty
 

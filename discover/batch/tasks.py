@@ -186,7 +186,7 @@ def run_close_loop(
         f"Data: {data_of_study.dataset.name}, {len(data_of_study.fit)} runs fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {_chosen(result) or _described(model)}, {modes}{_beside(model)}. "
+        f"Declared model: {_chosen(result) or model.described}, {modes}{_beside(model)}. "
         f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()
@@ -198,13 +198,6 @@ def run_close_loop(
     ended = _end("close-loop", folder, loop_verdict(result))
     progress("done", 1.0)
     return ended
-
-
-def _described(model) -> str:
-    from discover.laws.registry import LAWS
-
-    named = LAWS.get(model.law_name)
-    return model.law_name if named is None else named.described(model.parameters)
 
 
 def _chosen(result) -> str:

@@ -14,7 +14,7 @@ from discover.closed_loop.results.stages import (
     Stage,
     StageParameter,
 )
-from discover.closed_loop.search.attribution import Attribution
+from discover.closed_loop.search.scoring.attribution import Attribution
 from discover.forward import DeclaredModel
 
 __all__ = [

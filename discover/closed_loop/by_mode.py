@@ -11,14 +11,7 @@ from discover.closed_loop.results.stages import ConstantByMode, ModeConstant
 from discover.closed_loop.search.degrees import Degree
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
-from discover.forward.least_squares import (
-    NO_PRIOR,
-    Fit,
-    Prior,
-    fit_batch,
-    jacobians,
-    uncertainty,
-)
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians, uncertainty
 
 _OPEN = float(np.log(0.95 / 0.05))
 """Half width of an interval, on the link's scale, from which on nothing is determined: about the

@@ -14,9 +14,7 @@ from discover.effects import (
     named_effects,
 )
 from discover.errors import InputError
-from discover.forward import (
-    DeclaredModel,
-)
+from discover.forward import DeclaredModel
 
 EXTRAPOLATION = 10.0
 """Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""

@@ -15,19 +15,10 @@ from discover.closed_loop.results.stages import (
     StageParameter,
 )
 from discover.closed_loop.search import Search
-from discover.effects import (
-    ConstitutiveEffect,
-    ModeEffect,
-    StateEffect,
-)
+from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import Equation, StatePart, law_parts
 from discover.errors import InputError
-from discover.forward import (
-    MODULUS,
-    RELAXATION_TIME,
-    AugmentedModel,
-    DeclaredModel,
-)
+from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.forward.least_squares import Fit
 from discover.laws import Fluid
 

@@ -17,7 +17,7 @@ from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE, WINDOW, criterion
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE, WINDOW, criterion
 from discover.dataset import Run
 from discover.forward import Batch
 from discover.forward.least_squares import covariance_and_noise, gauss_newton_step, jacobians
@@ -121,7 +121,7 @@ def free_forms(
     for gain, trial in ranked:
         if gain >= least and trial.slot not in [one.slot for one in out]:
             held = _held_out_error(search, trial, held_batch, held_runs)
-            out.append(_told(search, runs, trial, gain, held))
+            out.append(_free_form_of(search, runs, trial, gain, held))
     return tuple(out)
 
 
@@ -210,7 +210,7 @@ def _fitted(
     return _Trial(slot, tuple(effects), theta, free, *best, left, design)
 
 
-def _told(search: Search, runs, trial: _Trial, gain: float, held: float | None) -> FreeForm:
+def _free_form_of(search: Search, runs, trial: _Trial, gain: float, held: float | None) -> FreeForm:
     """Return a free function as the result holds it."""
     batch, tolerated = search.batch, search.tolerated
     seen = np.asarray(batch.weight) > 0

@@ -16,7 +16,7 @@ from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE, criterion
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE, criterion
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.effects.free_function import (

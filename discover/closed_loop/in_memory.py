@@ -12,9 +12,7 @@ from discover.closed_loop.results.loop_result import LoopResult
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS
 from discover.progress import Progress, by_lines, checked
-from discover.study.declared_model import DeclaredModel as DeclaredFluid
 from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Loop
@@ -97,7 +95,7 @@ def close_loop(
     judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
     summary = (
         f"Data: {data.name}, {len(divided.fit)} runs fitted, {judged}. Declared model: "
-        f"{_described(fluid)}, {len(fluid.modulus)} relaxation "
+        f"{fluid.described}, {len(fluid.modulus)} relaxation "
         f"mode{'s' if len(fluid.modulus) > 1 else ''}. {data.thinned}"
     ).strip()
     return replace(result, title=data.name, summary=summary)
@@ -116,8 +114,3 @@ def _checked(options: Mapping[str, Any]) -> Loop:
     if isinstance(content.get("strain"), np.ndarray):
         content["strain"] = content["strain"].tolist()
     return validated(Loop, content, "close_loop()")
-
-
-def _described(fluid: DeclaredFluid) -> str:
-    named = LAWS.get(fluid.law_name)
-    return fluid.law_name if named is None else named.described(fluid.parameters)

@@ -8,8 +8,8 @@ import numpy as np
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.law_fit import LawFit
-from discover.closed_loop.search.evidence import BARE_MENTION, criterion
 from discover.closed_loop.search.first_starts import first_starts
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION, criterion
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import (

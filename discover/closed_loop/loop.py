@@ -21,7 +21,7 @@ from discover.closed_loop.explanations import (
     with_band,
 )
 from discover.closed_loop.explanations.limits import names_of_limits
-from discover.closed_loop.explanations.other_times import FACTOR, held_against_times, other_times
+from discover.closed_loop.explanations.other_times import FACTOR, compared_with_times, other_times
 from discover.closed_loop.final_model import (
     augmented_fluid,
     declared_effects,
@@ -32,10 +32,7 @@ from discover.closed_loop.final_model import (
 )
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.free_in_model import free_functions_in_model
-from discover.closed_loop.judging.before_after import (
-    errors_of,
-    record_runs,
-)
+from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.between_samples import (
     change_between_samples,
     coarse_rates,
@@ -58,21 +55,13 @@ from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
-from discover.closed_loop.search.evidence import WINDOW
-from discover.closed_loop.small_strains import settle_instrument
+from discover.closed_loop.search.scoring.evidence import WINDOW
+from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
-from discover.effects import (
-    BY_MODE,
-    AbstractEffect,
-)
+from discover.effects import BY_MODE, AbstractEffect
 from discover.errors import InputError
-from discover.forward import (
-    AugmentedModel,
-    DeclaredModel,
-    data_scales,
-    make_batch,
-)
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.statistics.residual import Expectation, summarise
@@ -186,7 +175,7 @@ def run_loop(
     else:
         say(f"declared model on {len(fitted_runs)} runs")
         search.start()
-        settle_instrument(search, fitted_runs, max_effects, say)
+        find_instrument_effects(search, fitted_runs, max_effects, say)
     carried = []
     if not silent:
         search.run(max_effects, say)
@@ -223,7 +212,7 @@ def run_loop(
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     judgement = judged_with(judgement, coarse)
     times = other_times(search, carried, judgement) if carried else []
-    judgement, instead = held_against_times(judgement, active, carried, times)
+    judgement, instead = compared_with_times(judgement, active, carried, times)
     for name in instead:
         search.aliases[name] = (*search.aliases.get(name, ()), FACTOR)
     limits = names_of_limits(model, batch, fitted_runs, current, active)

@@ -4,18 +4,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from discover.closed_loop.judging.before_after import (
-    cut_to_strain,
-)
+from discover.closed_loop.judging.before_after import cut_to_strain
 from discover.closed_loop.judging.judgement import Judgement
-from discover.closed_loop.search.augment import FEWEST_SAMPLES
+from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
 from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
-from discover.forward import (
-    DeclaredModel,
-)
+from discover.forward import DeclaredModel
 from discover.statistics import isolated
 from discover.statistics.residual import fast_part
 

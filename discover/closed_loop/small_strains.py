@@ -4,9 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.judging.before_after import (
-    strain_of,
-)
+from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.runs import FEWEST_LINEAR_SAMPLES
 from discover.closed_loop.search import Search
 from discover.dataset import Run
@@ -15,7 +13,7 @@ LINEAR_STRAIN = 0.4
 """Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""
 
 
-def settle_instrument(
+def find_instrument_effects(
     search: Search, runs: Sequence[Run], max_effects: int, say: Callable[[str], None]
 ) -> None:
     """Find instrument effects where the strain is small and no law differs from another.

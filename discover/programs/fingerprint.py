@@ -28,7 +28,7 @@ _VERSIONED = {
 _SIMPLE = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), type(NotImplemented))
 
 
-class NotTold(Exception):
+class NotDescribable(Exception):
     """Something that no digest can describe."""
 
 
@@ -45,7 +45,7 @@ def fingerprint(value: Any, arrays_by_content: bool) -> bytes:
 
     Raises
     ------
-    NotTold
+    NotDescribable
         If the value holds what cannot be described: code outside the packages known by version, an
         object that refers to itself, a device's handle.
     """
@@ -58,7 +58,7 @@ class _Walk:
 
     def digest(self, value: Any, content: bool) -> bytes:
         if id(value) in self._above:
-            raise NotTold("an object that refers to itself")
+            raise NotDescribable("an object that refers to itself")
         self._above.add(id(value))
         try:
             return _hash(self._parts(value, content))
@@ -100,9 +100,9 @@ class _Walk:
 
     def _array(self, value: Any, content: bool) -> Iterable[bytes]:
         if not hasattr(value, "dtype") or value.dtype == object:
-            raise NotTold("an array of objects")
+            raise NotDescribable("an array of objects")
         if jax.dtypes.issubdtype(value.dtype, jax.dtypes.extended):
-            raise NotTold("an array of keys")
+            raise NotDescribable("an array of keys")
         weak = bool(getattr(value, "weak_type", False))
         head = [b"array", str(value.dtype).encode(), str((np.shape(value), weak)).encode()]
         return [*head, np.ascontiguousarray(value).tobytes()] if content else head
@@ -139,12 +139,12 @@ class _Walk:
         if dataclasses.is_dataclass(value):
             told = [(f.name, getattr(value, f.name)) for f in dataclasses.fields(value)]
             # a name in a field may stand for code that is another user's
-            if beside := getattr(value, "told_beside_fields", ()):
-                told.append(("told_beside_fields", beside))
+            if beside := getattr(value, "digest_beside_fields", ()):
+                told.append(("digest_beside_fields", beside))
         elif hasattr(value, "__dict__"):
             told = sorted(vars(value).items())
         else:
-            raise NotTold(f"an object of {type(value).__name__}")
+            raise NotDescribable(f"an object of {type(value).__name__}")
         return [name, *(part for k, v in told for part in (k.encode(), self.digest(v, True)))]
 
 
@@ -159,13 +159,13 @@ def _hash(parts: Iterable[bytes]) -> bytes:
 def _require_known(module: str | None) -> None:
     """Refuse code of which no version says when it changes."""
     if (module or "").partition(".")[0] not in _VERSIONED:
-        raise NotTold(f"code of {module}")
+        raise NotDescribable(f"code of {module}")
 
 
 def _name(kind: type) -> bytes:
     _require_known(kind.__module__)
     if "<locals>" in kind.__qualname__:
-        raise NotTold(f"the local class {kind.__qualname__}")
+        raise NotDescribable(f"the local class {kind.__qualname__}")
     return f"{kind.__module__}:{kind.__qualname__}".encode()
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import equinox as eqx
 
-from discover.programs.fingerprint import OURS, NotTold
+from discover.programs.fingerprint import OURS, NotDescribable
 
 _PLAIN = (type(None), bool, int, float, str)
 
@@ -17,7 +17,7 @@ def take_apart(value: Any, leaves: list[Any]) -> Any:
 
     Raises
     ------
-    NotTold
+    NotDescribable
         If it holds something other than arrays, plain values, tuples, lists, dictionaries and
         the named tuples and modules of this project.
     """
@@ -36,7 +36,7 @@ def take_apart(value: Any, leaves: list[Any]) -> Any:
         fields = [f.name for f in dataclasses.fields(value)]  # pyright: ignore[reportArgumentType]
         parts = [[name, take_apart(vars(value)[name], leaves)] for name in fields]
         return ["module", _name(type(value)), *parts]
-    raise NotTold(f"a result of {type(value).__name__}")
+    raise NotDescribable(f"a result of {type(value).__name__}")
 
 
 def put_together(nesting: Sequence[Any], leaves: Iterator[Any]) -> Any:
@@ -64,15 +64,15 @@ def put_together(nesting: Sequence[Any], leaves: Iterator[Any]) -> Any:
 
 def _name(kind: type) -> str:
     if kind.__module__.partition(".")[0] not in OURS or "." in kind.__qualname__:
-        raise NotTold(f"a result of {kind.__name__}")
+        raise NotDescribable(f"a result of {kind.__name__}")
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def _class(name: str) -> Any:
     module, _, kind = name.partition(":")
     if module.partition(".")[0] not in OURS:
-        raise NotTold(f"a class of {module}")
+        raise NotDescribable(f"a class of {module}")
     found = getattr(importlib.import_module(module), kind)
     if not (isinstance(found, type) and issubclass(found, (tuple, eqx.Module))):
-        raise NotTold(f"{name} is no result")
+        raise NotDescribable(f"{name} is no result")
     return found

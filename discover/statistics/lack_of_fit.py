@@ -9,13 +9,7 @@ from jaxtyping import Float
 
 from discover.statistics.dead_records import holds_signal
 from discover.statistics.outliers import stray
-from discover.statistics.residual import (
-    STRUCTURE,
-    Expectation,
-    judging,
-    summarise,
-    tells_noise,
-)
+from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
 from discover.statistics.same_place import repeated
 from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 from discover.words import percent_of

@@ -74,7 +74,9 @@ class Unseen:
         """Mean relative error of the runs that are long enough to judge, or of all."""
         pairs = [*zip(self.residuals, self.records, strict=True)]
         judging = [pair for pair in pairs if len(pair[0]) >= FEWEST_FAST] or pairs
-        return float(np.mean([np.linalg.norm(r) / (np.linalg.norm(of) or 1.0) for r, of in judging]))
+        return float(
+            np.mean([np.linalg.norm(r) / (np.linalg.norm(of) or 1.0) for r, of in judging])
+        )
 
     def moved(self) -> tuple[list[np.ndarray], float]:
         """Return the residuals after the constants moved as both kinds of runs ask.

@@ -81,6 +81,12 @@ class DeclaredModel:
         return spectrum.modulus_covariance * np.outer(factor, factor)
 
     @property
+    def described(self) -> str:
+        """The law with its constants, in words; its name where that is none of a law's."""
+        named = LAWS.get(self.law_name)
+        return self.law_name if named is None else named.described(self.parameters)
+
+    @property
     def fluid(self) -> Fluid:
         """The declared fluid."""
         return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)

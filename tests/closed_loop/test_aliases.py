@@ -5,7 +5,7 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.augment import Choice, aliases_of
+from discover.closed_loop.search.scoring.refitting import Choice, aliases_of
 from discover.dataset import Dataset, Run
 from discover.forward.least_squares import Fit
 from discover.protocols import start_up

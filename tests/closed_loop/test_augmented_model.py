@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.search.left_out import left_out_errors
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
@@ -82,7 +83,7 @@ def test_a_fit_finds_the_parameter_and_predicts_runs_left_out():
     start[at] = 0.05
     fit = fit_batch(model, batch, [start], [at], tolerance=1e-8)[0]
     assert fit.theta[at[0]] == pytest.approx(0.3, abs=1e-3)
-    assert np.max(left_out_errors(model, batch, fit)) < 1e-3
+    assert np.max(left_out_errors(FitProblem(model, batch), fit)) < 1e-3
 
 
 def test_a_trial_that_runs_away_is_a_rejected_step_and_no_crash():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel
-from discover.closed_loop.explanations.growth import growth
-from discover.closed_loop.explanations.widening import widening
+from discover.closed_loop.explanations.bands.growth import growth
+from discover.closed_loop.explanations.bands.widening import widening
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch

@@ -15,9 +15,9 @@ from scipy.stats import norm
 from sklearn.linear_model import BayesianRidge
 
 import discover as dc
-from discover.closed_loop.explanations.discrepancy import posterior
-from discover.closed_loop.explanations.mixture import quantile
-from discover.closed_loop.explanations.weighing import unexplained_probability
+from discover.closed_loop.explanations.bands.discrepancy import posterior
+from discover.closed_loop.explanations.bands.mixture import quantile
+from discover.closed_loop.explanations.probabilities import unexplained_probability
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.loop_result import LoopResult

@@ -5,7 +5,7 @@ import pytest
 from independent import PhanThienTanner, oscillation, start_up
 
 import discover as dc
-from discover.closed_loop.explanations.wider_intervals import _ends
+from discover.closed_loop.explanations.bands.wider_intervals import _ends
 from discover.protocols.protocol import shear_rates
 
 MODULUS, GAIN, EPSILON, NOISE = 100.0, 0.14, 0.15, 0.01

@@ -6,8 +6,9 @@ import pytest
 
 from discover.closed_loop import DeclaredModel
 from discover.closed_loop.judging.finer_steps import on_finer_steps
-from discover.closed_loop.search.attribution import attribute
-from discover.closed_loop.search.left_out import FEWEST_FOLDS, left_out_errors
+from discover.closed_loop.search.scoring.attribution import attribute
+from discover.closed_loop.search.scoring.left_out import FEWEST_FOLDS, left_out_errors
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.effects.base import EffectParameter, SignalEffect
@@ -67,7 +68,7 @@ def test_errors_left_out_are_near_the_noise_whatever_the_number_of_runs(count):
     model = AugmentedModel(DeclaredModel.maxwell(100.0, 1.0), [make_effect("giesekus_mobility")])
     batch = make_batch(runs(count, noise=0.01))
     fit = fitted(model, batch, "giesekus_mobility")
-    errors = left_out_errors(model, batch, fit)
+    errors = left_out_errors(FitProblem(model, batch), fit)
     assert errors.shape == (count,)
     assert np.all(errors >= fit.run_errors)
     # one parameter and dozens of samples: leaving some out changes little
@@ -80,8 +81,8 @@ def test_of_few_runs_parts_are_left_out_so_that_nothing_must_be_extrapolated():
         [make_effect("giesekus_mobility")],
     )
     few, many = (make_batch(runs(count, noise=0.01)) for count in (2, FEWEST_FOLDS))
-    from_few = left_out_errors(model, few, fitted(model, few, "giesekus_mobility"))
-    from_many = left_out_errors(model, many, fitted(model, many, "giesekus_mobility"))
+    from_few = left_out_errors(FitProblem(model, few), fitted(model, few, "giesekus_mobility"))
+    from_many = left_out_errors(FitProblem(model, many), fitted(model, many, "giesekus_mobility"))
     # two slow start-ups, one left out, would leave the mobility to one of them
     assert np.mean(from_few) < 1.5 * np.mean(from_many)
 

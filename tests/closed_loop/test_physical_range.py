@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.search.physical_range import at_an_end, undetermined
+from discover.closed_loop.search.scoring.physical_range import at_an_end, undetermined
 from discover.dataset import Dataset, Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel

@@ -5,8 +5,8 @@ import pytest
 from planting import OUTSIDE, Noise, Planter
 
 from discover.closed_loop import run_loop
-from discover.closed_loop.search import exchanging
 from discover.closed_loop.search.current_model import CurrentModel
+from discover.closed_loop.search.moves import exchanging
 from discover.effects import named_effects
 from discover.errors import InputError
 

@@ -10,7 +10,7 @@ import sympy
 from discover.equations import Equation, EquationTerm, equation_from_json, equation_to_json
 from discover.equations.code import numpy_code, sympy_code
 from discover.equations.mathml import law_element
-from discover.programs.fingerprint import NotTold, fingerprint
+from discover.programs.fingerprint import NotDescribable, fingerprint
 from tensor_library import CLOSED_FORMS, ClosedForm, build_library, parse_term, register_closed_form
 
 PAGE = "adding-a-term.md"
@@ -109,7 +109,7 @@ def test_every_notation_writes_the_same_function(form, tmp_path):
 
 def test_a_program_with_the_form_is_not_kept_for_another_process(form):
     library = build_library(tensors=["sigma"], closed_forms=["levelling"])
-    with pytest.raises(NotTold, match="code of"):
+    with pytest.raises(NotDescribable, match="code of"):
         fingerprint(library, True)
     # negative control: one with a form of this package is
     assert fingerprint(build_library(tensors=["sigma"], closed_forms=["exp"]), True)

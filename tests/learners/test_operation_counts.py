@@ -16,7 +16,7 @@ def compiled(monkeypatch):
     names = []
     # after a thousand other tests the process may be full, and would drop programs between the
     # two fits (tests/programs looks at that)
-    monkeypatch.setattr("discover.programs.kept.is_crowded", lambda: False)
+    monkeypatch.setattr("discover.programs.program_cache.is_crowded", lambda: False)
 
     def listen(event, duration, **kwargs):
         del duration, kwargs

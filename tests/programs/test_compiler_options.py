@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discover.programs import compiled
-from discover.programs.kept import _compiled_soon
+from discover.programs.program_cache import _compiled_soon
 
 
 @pytest.fixture

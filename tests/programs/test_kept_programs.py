@@ -17,7 +17,7 @@ from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
-from discover.programs.fingerprint import NotTold, fingerprint
+from discover.programs.fingerprint import NotDescribable, fingerprint
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 from discover.protocols.protocol import oscillatory_shear, start_up
@@ -192,7 +192,7 @@ def test_code_that_no_version_names_is_refused_and_still_computed(folder):
     itself = []
     itself.append(itself)
     for unknown in (Own(2.0), lambda x: x, partial(_double), itself, object(), jax.random.key(0)):
-        with pytest.raises(NotTold):
+        with pytest.raises(NotDescribable):
             fingerprint(unknown, False)
     apply = compiled(lambda law, x: law(x))
     np.testing.assert_array_equal(apply(Own(2.0), np.arange(3.0)), [0.0, 2.0, 4.0])
@@ -233,5 +233,5 @@ def test_results_are_put_together_as_they_were():
     again = put_together(nesting, iter(leaves))
     assert jax.tree.structure(again) == jax.tree.structure(value)
     assert eqx.tree_equal(again, value)
-    with pytest.raises(NotTold):
+    with pytest.raises(NotDescribable):
         take_apart(object(), [])

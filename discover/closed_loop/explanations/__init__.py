@@ -1,9 +1,9 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
+from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry
+from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
-from discover.closed_loop.explanations.telling_apart import next_tests
-from discover.closed_loop.explanations.wider_intervals import over_explanations
 
 __all__ = [
     "BEAM_WIDTH",

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.augment import taken_out
-from discover.closed_loop.search.evidence import WINDOW, criterion
+from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.search.seen_sets import SeenSet
-from discover.forward.least_squares import Fit, fit_batch
-from discover.statistics.residual import judged_cost, summarise
+from discover.forward.least_squares import Fit
 
 BEAM_WIDTH = 8
 """Explanations that are carried side by side, by default."""
@@ -66,10 +64,9 @@ def carry(
     """
     if width > 1:
         _note_shorter(search)
-    weight = np.asarray(search.batch.weight)
     own = tuple(search.active)
-    search.seen.note(own, search.fit, weight)
-    effective = summarise(search.fit.residual, weight).effective_samples
+    search.seen.note(own, search.fit, search.problem.weight)
+    effective = search.problem.independent_samples(search.fit)
     # twins of one that was followed lead nowhere else
     followed = [one for one in search.seen if one.effects == tuple(sorted(own))]
     spent = 0
@@ -85,35 +82,30 @@ def carry(
 
 def _note_shorter(search: Search) -> None:
     """Fit the sets that what was found contains: the stages before it, and it less one effect."""
-    model, active, weight = search.model, search.active, np.asarray(search.batch.weight)
+    problem, active = search.problem, search.active
     sets, starts, free = [], [], []
     for n in range(len(active)):
         sets.append(active[:n])
         starts.append(search.path[n])
         free.append(tuple(search.positions(active[:n])))
     for name in active[:-1]:
-        theta, positions = taken_out(model, search.fit, name)
+        theta, positions = problem.without(search.fit, name)
         sets.append([other for other in active if other != name])
         starts.append(theta)
         free.append(positions)
     if not sets:
         return
-    prior = search.prior
-    for effects, fit in zip(
-        sets, fit_batch(model, search.batch, starts, free, prior=prior), strict=True
-    ):
+    for effects, fit in zip(sets, problem.fits(starts, free), strict=True):
         if fit.usable:
-            search.seen.note(effects, fit, weight)
+            search.seen.note(effects, fit, problem.weight)
 
 
 def _in_window(search: Search, effective: float) -> list[SeenSet]:
     """Return the sets that are within reach of the best, the best first."""
     sets = [one for one in search.seen if not search.refused & set(one.effects)]
+    problem = search.problem
     worth = {
-        one.effects: criterion(
-            one.cost, len(one.free), len(one.effects), effective, search.n_candidates
-        )
-        for one in sets
+        one.effects: problem.criterion(one.cost, one.free, one.effects, effective) for one in sets
     }
     limit = min(worth.values()) + 2.0 * np.log(WINDOW) + _SLACK
     return sorted(
@@ -154,8 +146,7 @@ def _follow(search: Search, one: SeenSet, max_effects: int, most: int) -> int:
         others = tuple(other for other in one.effects if other != name)
         if others in explored or stages >= most:
             continue
-        theta, free = taken_out(search.model, fit, name)
-        without = fit_batch(search.model, search.batch, [theta], [free], prior=search.prior)[0]
+        without = search.problem.fit(*search.problem.without(fit, name))
         if without.usable:
             search.choices_beside(without, others)
             stages += 1
@@ -164,8 +155,7 @@ def _follow(search: Search, one: SeenSet, max_effects: int, most: int) -> int:
 
 def _fits(search: Search, sets: Sequence[SeenSet]) -> list[Fit]:
     """Return seen sets, fitted to the end."""
-    starts, free = [one.theta(search.model) for one in sets], [one.free for one in sets]
-    return fit_batch(search.model, search.batch, starts, free, prior=search.prior)
+    return search.problem.fits([one.theta(search.model) for one in sets], [s.free for s in sets])
 
 
 def _fitted(search: Search, sets: Sequence[SeenSet], effective: float, width: int) -> list[Carried]:
@@ -173,11 +163,10 @@ def _fitted(search: Search, sets: Sequence[SeenSet], effective: float, width: in
 
     The most probable first.
     """
-    weight = np.asarray(search.batch.weight)
+    problem = search.problem
 
     def carried(effects: tuple[str, ...], fit: Fit) -> Carried:
-        cost = judged_cost(fit.residual, weight)
-        own = criterion(cost, len(fit.free), len(effects), effective, search.n_candidates)
+        own = problem.criterion(problem.cost(fit), fit.free, effects, effective)
         return Carried(effects, fit, own)
 
     chosen = carried(tuple(search.active), search.fit)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.augment import taken_out
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
@@ -43,7 +43,7 @@ def names_of_limits(
             if parameter.endless and fit.theta[at] >= batch.longest > 0.0:
                 found[effect.name] = parameter.endless
         if at_rest and isinstance(effect, ConstitutiveEffect):
-            theta, _ = taken_out(model, fit, effect.name)
+            theta, _ = FitProblem(model, batch).without(fit, effect.name)
             if _only_factors(model, batch, fit, theta):
                 found[effect.name] = DAMPING
     return found

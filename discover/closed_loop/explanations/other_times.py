@@ -16,10 +16,8 @@ import numpy as np
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.augment import taken_out
-from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE, criterion
-from discover.forward.least_squares import Fit, fit_batch
-from discover.statistics.residual import judged_cost, summarise
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.forward.least_squares import Fit
 from discover.words import percent_of
 
 FACTOR = "relaxation_time_factor"
@@ -85,20 +83,15 @@ def other_times(
     for one in carried[:_MOST]:
         for name in one.effects:
             left = tuple(sorted(set(one.effects) - {name}))
-            tried.setdefault(left, taken_out(search.model, one.fit, name))
+            tried.setdefault(left, search.problem.without(one.fit, name))
     if judgement.structured:
         tried.setdefault(tuple(sorted(search.active)), (search.fit.theta, search.fit.free))
         single = sorted((s for s in search.seen if len(s.effects) == 1), key=lambda s: s.cost)
         for seen in islice(single, _MOST):
             tried.setdefault(seen.effects, (seen.theta(search.model), seen.free))
-    fits = fit_batch(
-        search.model,
-        search.batch,
-        [theta for theta, _ in tried.values()],
-        [(*free, _FACTOR_AT) for _, free in tried.values()],
-        prior=search.prior,
-        rivals=True,
-    )
+    starts = [theta for theta, _ in tried.values()]
+    free = [(*own, _FACTOR_AT) for _, own in tried.values()]
+    fits = search.problem.fits(starts, free, rivals=True)
     found = [
         _found(search, effects, fit)
         for effects, fit in zip(tried, fits, strict=True)
@@ -116,20 +109,18 @@ def _inside(search: Search, fit: Fit) -> bool:
 
 
 def _found(search: Search, effects: tuple[str, ...], fit: Fit) -> OtherTimes:
-    cost = judged_cost(fit.residual, np.asarray(search.batch.weight))
-    worth = _worth(search, cost, fit.free, (*effects, FACTOR))
+    worth = _worth(search, search.problem.cost(fit), fit.free, (*effects, FACTOR))
     error = float(np.mean(fit.run_errors))
     return OtherTimes(float(np.exp(fit.theta[_FACTOR_AT])), effects, error, worth)
 
 
 def _worth(search: Search, cost: float, free: Sequence[int], effects: Sequence[str]) -> float:
     """Return the criterion of a fit as the explanations are weighed: by what the search left."""
-    weight = np.asarray(search.batch.weight)
-    effective = summarise(search.fit.residual, weight).effective_samples
-    return criterion(cost, len(free), len(effects), effective, search.n_candidates)
+    problem = search.problem
+    return problem.criterion(cost, free, effects, problem.independent_samples(search.fit))
 
 
-def held_against_times(
+def compared_with_times(
     judgement: Judgement,
     active: Sequence[str],
     carried: Sequence[Carried],
@@ -144,7 +135,7 @@ def held_against_times(
     best = min(others, key=lambda one: one.criterion)
     own = next(one.criterion for one in carried if set(one.effects) == set(active))
     if judgement.structured or best.criterion < own - INDISTINGUISHABLE:
-        return _saying(replace(judgement, structured=True, verdict="unexplained"), best), ()
+        return _with_sentence(replace(judgement, structured=True, verdict="unexplained"), best), ()
     # the best last, which stays
     instead = {
         name: one
@@ -153,9 +144,9 @@ def held_against_times(
         if one.criterion < own + INDISTINGUISHABLE
     }
     if instead:
-        judgement = _saying(judgement, min(instead.values(), key=lambda one: one.criterion))
+        judgement = _with_sentence(judgement, min(instead.values(), key=lambda one: one.criterion))
     return judgement, tuple(instead)
 
 
-def _saying(judgement: Judgement, times: OtherTimes) -> Judgement:
+def _with_sentence(judgement: Judgement, times: OtherTimes) -> Judgement:
     return replace(judgement, description=f"{judgement.description} {times.sentence}")

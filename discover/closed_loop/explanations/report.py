@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.closed_loop.explanations.bands.mixture import mixed_bands
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.limits import names_of_limits
-from discover.closed_loop.explanations.mixture import mixed_bands
-from discover.closed_loop.explanations.weighing import explanations_of
+from discover.closed_loop.explanations.probabilities import explanations_of
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations

@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.judging.finer_steps import (
-    change_on_finer_steps,
-    constants_that_follow,
-)
+from discover.closed_loop.judging.finer_steps import change_on_finer_steps, constants_that_follow
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run

@@ -12,12 +12,7 @@ from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.results.stages import Verdict
 from discover.forward.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
-from discover.statistics.residual import (
-    FEWEST_FAST,
-    STRUCTURE,
-    summarise,
-    tells_noise,
-)
+from discover.statistics.residual import FEWEST_FAST, STRUCTURE, summarise, tells_noise
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.statistics.whiteness import SIGNIFICANCE
 from discover.words import percent_of

@@ -11,13 +11,7 @@ from discover.forward import even
 from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
-from discover.statistics.residual import (
-    FEWEST_FAST,
-    STRUCTURE,
-    Expectation,
-    fast_part,
-    tells_noise,
-)
+from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, fast_part, tells_noise
 from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
 from discover.words import percent_of
 

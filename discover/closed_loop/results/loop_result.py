@@ -294,12 +294,8 @@ class LoopResult(PageView, HasEquation, NotebookView):
         stage
             From 0; the last one holds those that earned nothing.
         """
-        names = ("effect", "kind", "score", "reduction", "evidence", "error", "left_out_error")
-        lines = [
-            {**{name: getattr(c, name) for name in names}, "aliases": ", ".join(c.aliases)}
-            for c in self.rankings[stage]
-        ]
-        return pd.DataFrame(lines, columns=[*names, "aliases"])
+        lines = [{**_line_of(c), "aliases": ", ".join(c.aliases)} for c in self.rankings[stage]]
+        return pd.DataFrame(lines, columns=[*_RANKED, "aliases"])
 
     def runs_table(self) -> pd.DataFrame:
         """Return the relative error of every run, by the declared model and after each stage."""
@@ -345,20 +341,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             },
             "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
             "ranking": [
-                [
-                    {
-                        "effect": c.effect,
-                        "kind": c.kind,
-                        "score": c.score,
-                        "reduction": c.reduction,
-                        "evidence": c.evidence,
-                        "error": c.error,
-                        "left_out_error": c.left_out_error,
-                        "aliases": c.aliases,
-                    }
-                    for c in stage
-                ]
-                for stage in self.rankings
+                [{**_line_of(c), "aliases": c.aliases} for c in stage] for stage in self.rankings
             ],
             "runs": {
                 record.name: {"held_out": record.held_out, "errors": record.errors}
@@ -379,6 +362,13 @@ class LoopResult(PageView, HasEquation, NotebookView):
         """Write ``loop.json``."""
         text = json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
         Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+_RANKED = ("effect", "kind", "score", "reduction", "evidence", "error", "left_out_error")
+
+
+def _line_of(candidate: CandidateScore) -> dict[str, Any]:
+    return {name: getattr(candidate, name) for name in _RANKED}
 
 
 def _numbers(record: RunRecord, time: float) -> tuple[float, float]:

@@ -75,7 +75,7 @@ def _state(search: SearchState) -> dict[str, Any]:
             "jacobian": fit.jacobian.tolist(),
         },
         "active": search.active,
-        "settled": search.settled,
+        "settled": search.established,
         "rounds": search.rounds,
         "path": [np.asarray(theta).tolist() for theta in search.path],
         "rankings": [
@@ -88,7 +88,7 @@ def _state(search: SearchState) -> dict[str, Any]:
         "not_named": search.not_named,
         "refused": sorted(search.refused),
         "left_open": sorted(search.left_open),
-        "unasked": sorted(search.unasked),
+        "unasked": sorted(search.without_aliases),
         "seen": search.seen.to_json(),
         "degrees": {name: asdict(found) for name, found in search.degrees.items()},
         "known": [[at, *pair] for at, pair in search.known.items()],
@@ -105,7 +105,7 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
         np.array(fit["jacobian"]).reshape(len(fit["free"]), *np.shape(fit["residual"])),
     )
     search.active = list(state["active"])
-    search.settled = tuple(state["settled"])
+    search.established = tuple(state["settled"])
     search.rounds = state["rounds"]
     search.path = [np.array(theta) for theta in state["path"]]
     search.rankings = [
@@ -123,7 +123,7 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.not_named = dict(state.get("not_named", {}))
     search.refused = set(state.get("refused", ()))
     search.left_open = set(state.get("left_open", ()))
-    search.unasked = set(state.get("unasked", ()))
+    search.without_aliases = set(state.get("unasked", ()))
     search.seen = SeenSets.from_json(state.get("seen", {}))
     search.degrees = {
         name: Degree(found["degree"], tuple(found["evidence"]))

@@ -1,30 +1,25 @@
 """The model that a search has reached: its fit, and fits with and without one effect."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.search.attribution import Attribution, attribute
-from discover.closed_loop.search.augment import Choice, refit, taken_out
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.degrees import choose_degrees, positions_of
-from discover.closed_loop.search.evidence import BARE_MENTION
 from discover.closed_loop.search.first_starts import first_starts
-from discover.closed_loop.search.left_out import left_out_errors
-from discover.closed_loop.search.physical_range import at_an_end
+from discover.closed_loop.search.scoring.attribution import Attribution, attribute
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.physical_range import at_an_end
+from discover.closed_loop.search.scoring.problem import FitProblem
+from discover.closed_loop.search.scoring.refitting import Choice, refit
 from discover.closed_loop.search.state import SearchState
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import (
-    NO_PRIOR,
-    Fit,
-    Prior,
-    fit_batch,
-    jacobians,
-)
-from discover.statistics.residual import summarise
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, jacobians
 
 _POLISHES = 5
 
@@ -68,12 +63,18 @@ class CurrentModel(SearchState):
         self.batch, self.held_batch = batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
         self.tolerated = tolerated
+        self._problem = FitProblem(model, batch, n_candidates)
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""
         known = effect.name in {known.name for known in self.model.declared.effects}
         refused = effect.name in self.refused or isinstance(effect, ModeDependence)
         return not known and not refused and self.admitted(effect)
+
+    @property
+    def problem(self) -> FitProblem:
+        """What is fitted to what, and with what known."""
+        return replace(self._problem, prior=self.prior)
 
     @property
     def prior(self) -> Prior:
@@ -84,8 +85,7 @@ class CurrentModel(SearchState):
         """
         if not self.known:
             return NO_PRIOR
-        effective = summarise(self.fit.residual, np.asarray(self.batch.weight)).effective_samples
-        size = float(np.sqrt(self.fit.cost / effective))
+        size = float(np.sqrt(self.fit.cost / self._problem.independent_samples(self.fit)))
         return Prior(
             tuple(self.known),
             tuple(mean for mean, _ in self.known.values()),
@@ -126,11 +126,7 @@ class CurrentModel(SearchState):
         InputError
             If it cannot be integrated through the runs.
         """
-        free = self.model.free_positions
-        starts = first_starts(self.model)
-        fits = fit_batch(self.model, self.batch, starts, [free] * len(starts))
-        usable = [fit for fit in fits if fit.usable]
-        self.fit = min(usable, key=lambda fit: fit.cost, default=fits[0])
+        self.fit = self._problem.best_fit(first_starts(self.model), self.model.free_positions)
         if not self.fit.usable:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: its stress runs "
@@ -145,15 +141,13 @@ class CurrentModel(SearchState):
         """Choose how constants by mode depend on the time, and return whether that is new."""
         before = {name: found.degree for name, found in self.degrees.items()}
         if before:
-            self.fit, self.degrees = choose_degrees(
-                self.model, self.batch, self.fit, self.degrees, self.prior
-            )
+            self.fit, self.degrees = choose_degrees(self.problem, self.fit, self.degrees)
         return before != {name: found.degree for name, found in self.degrees.items()}
 
     def without(self, effect: str) -> Fit:
         """Return the current fit with an effect taken out and the others refitted."""
-        theta, free = taken_out(self.model, self.fit, effect)
-        fit = fit_batch(self.model, self.batch, [theta], [free], prior=self.prior)[0]
+        theta, free = self.problem.without(self.fit, effect)
+        fit = self.problem.fit(theta, free)
         if fit.usable:
             return fit
         residual = self.model.residuals([theta], self.batch)
@@ -167,9 +161,7 @@ class CurrentModel(SearchState):
     def choices_beside(self, fit: Fit, others: Sequence[str]) -> tuple[Attribution, list[Choice]]:
         """Return what may be added to a fit with other effects: all as scored, and the refitted."""
         attribution = attribute(self.model, self.batch, fit, others, LEADERS, self.candidate)
-        choices = refit(
-            self.model, self.batch, fit, attribution.leading, self.n_candidates, self.prior
-        )
+        choices = refit(self.problem, fit, attribution.leading)
         return attribution, self.possible(choices, others)
 
     def fitted(self, active: Sequence[str], values: np.ndarray) -> Fit:
@@ -177,20 +169,18 @@ class CurrentModel(SearchState):
         positions = self.positions(active)
         start = self.model.zero()
         start[positions] = values[positions]
-        return fit_batch(self.model, self.batch, [start], [positions], prior=self.prior)[0]
+        return self.problem.fit(start, positions)
 
     def sharpened(self, fit: Fit) -> Fit:
         """Return a fit that only ranked candidates, carried on to the end."""
-        again = fit_batch(self.model, self.batch, [fit.theta], [fit.free], prior=self.prior)[0]
+        again = self.problem.fit(fit.theta, fit.free)
         return again if again.usable else fit
 
     def polish(self) -> None:
         """Fit again while a better fit weighs what is known otherwise."""
         for _ in range(_POLISHES if self.known else 0):
             before = self.fit.cost
-            again = fit_batch(
-                self.model, self.batch, [self.fit.theta], [self.fit.free], prior=self.prior
-            )[0]
+            again = self.problem.fit(self.fit.theta, self.fit.free)
             if not again.usable:
                 break
             self.fit = again
@@ -211,9 +201,14 @@ class CurrentModel(SearchState):
 
     def leave_out(self) -> None:
         """Compute the error of runs left out anew."""
-        self.left_out = float(
-            np.mean(left_out_errors(self.model, self.batch, self.fit, self.prior))
-        )
+        self.left_out = float(np.mean(left_out_errors(self.problem, self.fit)))
+
+    def take(self, fit: Fit, active: Sequence[str]) -> None:
+        """Go on with a fit that has these effects, none of which was asked for its aliases yet."""
+        self.fit, self.active = fit, list(active)
+        self.without_aliases = set(active)
+        self.fit_path()
+        self.leave_out()
 
     def possible(self, choices: Sequence[Choice], others: Sequence[str]) -> list[Choice]:
         """Return the choices that a fluid or an instrument can be, and that predict every flow.

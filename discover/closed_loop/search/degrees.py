@@ -1,15 +1,15 @@
 """How constants by mode depend on the relaxation time: constant, linear or quadratic in log λ."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.closed_loop.search.evidence import BARE_MENTION, evidence
-from discover.forward import AugmentedModel, Batch
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.problem import FitProblem
+from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
-from discover.statistics.residual import summarise
+from discover.forward.least_squares import Fit
 
 _STEPS = (0.0, -1.0, 1.0)
 """From where a new coefficient starts, as a change of the constant by itself for each power of a
@@ -28,7 +28,7 @@ class Degree:
     degree
         0 for one constant of all modes.
     evidence
-        For each degree over one constant, by `discover.closed_loop.search.evidence.evidence`.
+        For each degree over one constant, see `discover.closed_loop.search.scoring.evidence`.
     """
 
     degree: int = 0
@@ -42,11 +42,7 @@ def positions_of(model: AugmentedModel, degrees: Mapping[str, Degree]) -> list[i
 
 
 def choose_degrees(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    degrees: Mapping[str, Degree],
-    prior: Prior = NO_PRIOR,
+    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree]
 ) -> tuple[Fit, dict[str, Degree]]:
     """Return a fit in which constants by mode have the degree that evidence asks for, and these.
 
@@ -56,18 +52,16 @@ def choose_degrees(
 
     Parameters
     ----------
-    model, batch, fit
-        The model, the fitted runs, and a fit with the degrees so far.
+    problem, fit
+        What is fitted to what, and a fit with the degrees so far.
     degrees
         By name of the constant.
-    prior
-        What is known of some parameters.
     """
-    chosen = dict(degrees)
+    model, chosen = problem.model, dict(degrees)
+    alone = replace(problem, n_candidates=1)  # a degree is not chosen among the candidates
     # an effect that is not in the model has no amplitude to vary
     waiting = [name for name in chosen if model.constant(name)[1] not in fit.free]
     highest = min(DEGREE, len(model.declared.modulus) - 1)
-    weight = np.asarray(batch.weight)
     for name in chosen:
         if name in waiting:
             chosen[name] = Degree()
@@ -76,19 +70,16 @@ def choose_degrees(
         rest = tuple(p for p in fit.free if p not in at)
         plain = fit.theta.copy()
         plain[at] = 0.0
-        fits = [fit_batch(model, batch, [plain], [rest], prior=prior)[0]]
+        fits = [problem.fit(plain, rest)]
         for degree in range(1, highest + 1):
             starts = _starts(model, name, fits[-1].theta, at[degree - 1])
             if chosen[name].degree == degree:
                 starts.append(fit.theta)
-            free = [(*rest, *at[:degree])] * len(starts)
-            found = fit_batch(model, batch, starts, free, prior=prior, rivals=True)
-            usable = [trial for trial in found if trial.usable]
-            fits.append(min(usable, key=lambda trial: trial.cost, default=found[0]))
+            fits.append(problem.best_fit(starts, (*rest, *at[:degree]), rivals=True))
         best = min((trial for trial in fits if trial.usable), key=lambda trial: trial.cost)
-        effective = summarise(best.residual, weight).effective_samples
+        effective = problem.independent_samples(best)
         gains = [0.0] + [
-            evidence(fits[0], trial, weight, effective, 1) if trial.usable else -np.inf
+            alone.evidence(fits[0], trial, effective) if trial.usable else -np.inf
             for trial in fits[1:]
         ]
         degree = next(i for i, gain in enumerate(gains) if gain >= max(gains) - BARE_MENTION)

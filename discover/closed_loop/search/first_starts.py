@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import qmc
 
-from discover.closed_loop.search.attribution import with_other_inner
+from discover.closed_loop.search.scoring.attribution import with_other_inner
 from discover.forward import AugmentedModel, FreeParameter
 
 _TIMES = (1e-3, 1e-2, 0.1, 0.3, 3.0, 10.0)

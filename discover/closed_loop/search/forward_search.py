@@ -6,25 +6,23 @@ import numpy as np
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.augment import Choice, choose, prune
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE, evidence
-from discover.closed_loop.search.exchanging import ask_for_aliases, reexamine
-from discover.closed_loop.search.looking_ahead import look_ahead
-from discover.closed_loop.search.taking_out import (
+from discover.closed_loop.search.moves.exchanging import ask_for_aliases, reexamine
+from discover.closed_loop.search.moves.looking_ahead import look_ahead
+from discover.closed_loop.search.moves.taking_out import (
     drop_undecided_effects,
-    hold_against_modes,
+    drop_what_modes_explain,
     refuse,
     restore_left_open,
 )
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.refitting import Choice, choose, prune
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import make_batch
-from discover.forward.least_squares import (
-    intervals,
-)
-from discover.statistics.residual import STRUCTURE, summarise
+from discover.forward.least_squares import intervals
+from discover.statistics.residual import STRUCTURE
 
 _ROUNDS = 3
 
@@ -58,7 +56,7 @@ class Search(CurrentModel):
         """
         if not self.active or not self.choose_degrees():
             return False
-        self.unasked = set(self.active)
+        self.without_aliases = set(self.active)
         self.fit_path()
         self.leave_out()
         chosen = (f"{name} of degree {found.degree}" for name, found in self.degrees.items())
@@ -99,9 +97,9 @@ class Search(CurrentModel):
         if restored:
             say(f"put back, for what stands in its place is far less likely: {restored}")
         if whole:
-            hold_against_modes(self, say)
+            drop_what_modes_explain(self, say)
         for name in self.active:
-            if name in self.unasked:
+            if name in self.without_aliases:
                 ask_for_aliases(self, name)
 
     def _add_all(self, max_effects: int, say: Callable[[str], None], whole: bool) -> None:
@@ -138,17 +136,15 @@ class Search(CurrentModel):
         name = chosen.candidate.effect
         self.aliases[name] = chosen.candidate.aliases
         self.support[name] = chosen.candidate.evidence or 0.0
-        self.unasked = set(self.active)
+        self.without_aliases = set(self.active)
         kept = [*self.active, name]
         self.fit = self.sharpened(chosen.fit)
         if name in self.degrees:
             self.choose_degrees()
         self.polish()
-        self.fit, self.active = prune(
-            self.model, self.batch, self.fit, kept, self.n_candidates, self.settled, self.prior
-        )
+        self.fit, self.active = prune(self.problem, self.fit, kept, self.established)
         if len(self.active) < len(kept):
-            self.unasked = set(self.active)
+            self.without_aliases = set(self.active)
             # the stages must tell how the final model is reached, so they are fitted again
             self.fit_path()
         else:
@@ -166,14 +162,12 @@ class Search(CurrentModel):
         error, left = (float(np.mean(fit.run_errors)) for fit in (self.fit, choice.fit))
         if error <= STRUCTURE * left:
             return False
-        weight = np.asarray(self.batch.weight)
-        effective = summarise(self.fit.residual, weight).effective_samples
-        found = evidence(self.fit, choice.fit, weight, effective, self.n_candidates)
-        return found > INDISTINGUISHABLE
+        effective = self.problem.independent_samples(self.fit)
+        return self.problem.evidence(self.fit, choice.fit, effective) > INDISTINGUISHABLE
 
     def adopt(self, other: "Search") -> None:
         """Take over the effects that another search established, refitted to these runs."""
-        self.settled = tuple(other.active)
+        self.established = tuple(other.active)
         self.active = list(other.active)
         self.aliases |= other.aliases
         self.support |= other.support

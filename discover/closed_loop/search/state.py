@@ -31,8 +31,8 @@ class SearchState:
         Aliases and evidence of each effect when it was added.
     left_out
         Mean error of runs left out.
-    settled
-        Effects established at small strain.
+    established
+        Effects that small strains showed.
     known
         Mean and standard deviation of parameters determined there, by position.
     rounds
@@ -46,7 +46,7 @@ class SearchState:
         Those of them of which nothing but the data's silence about a constant speaks.
     seen
         Every set of effects that was fitted.
-    unasked
+    without_aliases
         Effects whose aliases were found beside others than those that are in the model now.
     degrees
         Degree in log λ of each constant by mode, and the evidence for each degree.
@@ -58,7 +58,7 @@ class SearchState:
         self.model = model
         self.rounds = 0
         self.active: list[str] = []
-        self.settled: tuple[str, ...] = ()
+        self.established: tuple[str, ...] = ()
         self.rankings: list[tuple[CandidateScore, ...]] = []
         self.aliases: dict[str, tuple[str, ...]] = {}
         self.support: dict[str, float] = {}
@@ -68,6 +68,6 @@ class SearchState:
         self.not_named: dict[str, str] = {}
         self.refused: set[str] = set()
         self.left_open: set[str] = set()
-        self.unasked: set[str] = set()
+        self.without_aliases: set[str] = set()
         self.seen = SeenSets()
         self.degrees = {name: Degree() for name in model.declared.by_mode}

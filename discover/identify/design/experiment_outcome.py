@@ -18,7 +18,7 @@ REFUTED = 1e-3
 
 
 @dataclass(frozen=True)
-class Weight:
+class LawOutcome:
     """How one law stands after the experiment.
 
     Attributes
@@ -56,7 +56,7 @@ def judge_laws(
     noise: dict[str, float],
     n_draws: int = 32,
     seed: int = 0,
-) -> list[Weight]:
+) -> list[LawOutcome]:
     """Return how each law stands after the experiment: prediction against measurement.
 
     Nothing is fitted; the uncertainty of a law's parameters is allowed for.
@@ -89,10 +89,10 @@ def judge_laws(
             data.append(values / noise[name])
         scaled, target = np.concatenate(columns, axis=1), np.concatenate(data)
         if not np.all(np.isfinite(scaled[0])):
-            weights.append(Weight(law.name, np.inf, target.size, 0.0))
+            weights.append(LawOutcome(law.name, np.inf, target.size, 0.0))
             continue
         distance = squared_distance(target - scaled[0], spread_of(scaled))
         weights.append(
-            Weight(law.name, distance, target.size, float(chi2.sf(distance, target.size)))
+            LawOutcome(law.name, distance, target.size, float(chi2.sf(distance, target.size)))
         )
     return weights

@@ -18,6 +18,9 @@ Linear identities commute with Runge–Kutta steps, so exact directions come out
 
 _ENTRY = 1e-7
 
+_WEAKEST = 5
+"""Directions that are not exact, of which no more are told."""
+
 
 @dataclass(frozen=True)
 class Direction:
@@ -80,7 +83,6 @@ def weak_directions(
     observed: Float[np.ndarray, "rows n"],
     quantities: Mapping[str, Float[np.ndarray, "_ n"]],
     n_observations: int,
-    weakest: int = 5,
 ) -> tuple[list[Direction], list[Direction]]:
     """Return the exact null directions and the weakest of the others.
 
@@ -95,8 +97,6 @@ def weak_directions(
         Sensitivities of each quantity, weighted alike.
     n_observations
         Number of values observed, each with independent noise.
-    weakest
-        How many directions that are not exact to return.
     """
     norms = np.linalg.norm(observed, axis=0)
     scale = np.where(norms > EXACT * np.max(norms, initial=1.0), norms, 1.0)
@@ -110,7 +110,7 @@ def weak_directions(
     ]
     near = [
         _direction(names, vector / scale, observed, quantities, n_observations, False)
-        for vector in right[~null][::-1][:weakest]
+        for vector in right[~null][::-1][:_WEAKEST]
     ]
     return exact, near
 

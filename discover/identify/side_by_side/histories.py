@@ -10,12 +10,7 @@ from jaxtyping import Float
 
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.protocols.protocol import (
-    FlowProtocol,
-    oscillatory_shear,
-    stack_protocols,
-    start_up,
-)
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear, stack_protocols, start_up
 from discover.simulate.grid import IntegrationGrid, make_grids
 from discover.simulate.runge_kutta import longest_step
 from tensor_library.library import TermLibrary
@@ -133,7 +128,6 @@ def differences(
     reference: LawTerms,
     others: Sequence[LawTerms],
     base: AbstractConstitutiveLaw | None = None,
-    histories: Histories | None = None,
 ) -> list[Difference]:
     """Return how far each of several laws is from a reference in random shear histories.
 
@@ -147,10 +141,8 @@ def differences(
         The laws.
     base
         The known part; by default UCM.
-    histories
-        By default `random_histories()`.
     """
-    flows = histories_for(base) if histories is None else histories
+    flows = histories_for(base)
     stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)
     observed = observe_differences(stresses[:, : flows.n_random])
     return [difference(observed[0], other) for other in observed[1:]]

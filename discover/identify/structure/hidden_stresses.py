@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.identify.side_by_side.histories import Histories, histories_for
+from discover.identify.side_by_side.histories import histories_for
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.simulate.runge_kutta import runge_kutta_4
@@ -70,19 +70,15 @@ class HiddenStresses:
         return {"unfelt": self.unfelt.tolist(), "felt": dict(self.felt), "text": self.text}
 
 
-def hidden_stresses(
-    law: AbstractConstitutiveLaw, histories: Histories | None = None
-) -> HiddenStresses:
+def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random shear histories.
 
     Parameters
     ----------
     law
-        Any dimensionless law.
-    histories
-        By default `random_histories()`. Histories in which the law runs away are left out.
+        Any dimensionless law. Histories in which it runs away are left out.
     """
-    flows = histories_for(law) if histories is None else histories
+    flows = histories_for(law)
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids.times))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)

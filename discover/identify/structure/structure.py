@@ -42,6 +42,8 @@ _CHANGED = 1e-6
 _ROWS = 400
 """Samples of each quantity that enter a null space; more say nothing new of it."""
 
+_STRAIN_STEP = 0.2  # that of the fit, so that both share a compiled program
+
 _FINITE_STEP = Fraction(1, 10)
 _FINITE_ORDER = 8
 _NORMAL_STRESSES = ("N1", "N2")
@@ -207,7 +209,6 @@ def analyse_structure(
     relaxation_time: Any = 1.0,
     solvent_viscosity: float = 0.0,
     use_normal_stresses: bool = False,
-    strain_step: float = 0.2,
 ) -> Structure:
     """Return what shear flows can determine of a library's coefficients.
 
@@ -227,8 +228,6 @@ def analyse_structure(
         As in `make_problem`.
     use_normal_stresses
         Whether N1 and N2, where runs hold them, are observed too.
-    strain_step
-        Of the integration; that of the fit, so that both share a compiled program.
     """
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:
@@ -242,7 +241,7 @@ def analyse_structure(
         solvent_viscosity,
         base,
         use_normal_stresses=use_normal_stresses,
-        strain_step=strain_step,
+        strain_step=_STRAIN_STEP,
     )
     seen = np.any(np.asarray(problem.weight) > 0, axis=(0, 1))
     known = "the known part alone"

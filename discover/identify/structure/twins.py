@@ -13,16 +13,12 @@ changes of the hidden stresses
 Every twin is also simulated in random histories before it is reported.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, Literal
 
-from discover.identify.exact.exact_series import (
-    DEFAULT_ORDER,
-    hidden_change,
-    solve_for_coefficient,
-)
+from discover.identify.exact.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.exact.relations import feels_33, spell, term_relations
 from discover.identify.side_by_side.histories import SAME, Difference, differences
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, joint_library
@@ -132,14 +128,12 @@ def find_twins(
     library: TermLibrary,
     law: LawTerms,
     base: AbstractConstitutiveLaw | None = None,
-    candidates: Sequence[LawTerms] = (),
-    order: int = DEFAULT_ORDER,
 ) -> list[Twin]:
     """Return the twins of a law, simplest first, checked by simulation.
 
     Searched are: every other term of the library in place of each term of the law (exact; for a
-    polynomial law on UCM), every exchange along a relation that vanishes in shear, every
-    combination that lives on σ33 only (where nothing in the law feels σ33), and the candidates.
+    polynomial law on UCM), every exchange along a relation that vanishes in shear, and
+    every combination that lives on σ33 only (where nothing in the law feels σ33).
 
     Parameters
     ----------
@@ -149,19 +143,13 @@ def find_twins(
         The law, beyond the known part.
     base
         The known part; by default UCM.
-    candidates
-        Further laws to test, such as ties that a fit met.
-    order
-        Of the Taylor series.
     """
     base = UpperConvectedMaxwell() if base is None else base
-    library = joint_library(library, [law, *candidates])
+    library = joint_library(library, [law])
     found: list[_Candidate] = []
     if isinstance(base, UpperConvectedMaxwell):
-        found += _by_series(library, law, base.linear_relaxation, order)
+        found += _by_series(library, law, base.linear_relaxation)
         found += _by_relations(library, law)
-    for candidate in candidates:
-        found.append((candidate, "histories", {}))
     distinct = {_key(law): None}
     unique = []
     for one in found:
@@ -183,7 +171,7 @@ def find_twins(
             keeps_N1=d.N1 <= 10.0 * SAME,
             difference=d,
             separated_by=by,
-            order=order if proof == "series" else None,
+            order=DEFAULT_ORDER if proof == "series" else None,
             change=change,
         )
         for ((twin, proof, change), d), by in zip(kept, told, strict=True)
@@ -195,7 +183,7 @@ def _key(law: LawTerms) -> tuple:
 
 
 def _by_series(
-    library: TermLibrary, law: LawTerms, linear_relaxation: bool, order: int
+    library: TermLibrary, law: LawTerms, linear_relaxation: bool
 ) -> Iterator[_Candidate]:
     """Return twins with one term of the law exchanged for another.
 
@@ -207,7 +195,7 @@ def _by_series(
         return
     short = {n: _fraction(v, _SHORT_DENOMINATOR) for n, v in present.items()}
     exact = {n: _fraction(v, _LARGEST_DENOMINATOR) for n, v in present.items()}
-    settings = {"order": order, "linear_relaxation": linear_relaxation}
+    settings = {"order": DEFAULT_ORDER, "linear_relaxation": linear_relaxation}
     for replaced in present:
         rest = [name for name in present if name != replaced]
         for term in library.terms:

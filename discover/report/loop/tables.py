@@ -16,6 +16,7 @@ from discover.report.loop.verdict import KINDS, named
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay
 from discover.report.page import safe_name
+from discover.report.plots.loop.errors import MOST_RANKED
 from discover.report.wording import (
     FIGURE_SYMBOLS,
     effect_title,
@@ -229,7 +230,7 @@ def fold_row(fold: Fold) -> dict[str, Any]:
     }
 
 
-def ranking_rows(ranking: Sequence[CandidateScore], shown: int = 12) -> list[dict[str, Any]]:
+def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:
     """Return the best candidates of a stage."""
     return [
         {
@@ -241,7 +242,7 @@ def ranking_rows(ranking: Sequence[CandidateScore], shown: int = 12) -> list[dic
             "left_out_error": c.left_out_error,
             "aliases": ", ".join(map(effect_title, c.aliases)),
         }
-        for c in ranking[:shown]
+        for c in ranking[:MOST_RANKED]
     ]
 
 

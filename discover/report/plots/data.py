@@ -18,9 +18,11 @@ from discover.report.plots.style import (
     SPARSE,
     Picture,
     figure,
+    label_rows,
     legend_above,
     literal,
     make_logarithmic,
+    panels_of,
     picture,
     runs_through_decades,
 )
@@ -58,20 +60,14 @@ def data_pictures(dataset: Dataset, spectrum: RelaxationSpectrum | None) -> list
 
 def _runs(runs: Sequence[Run]) -> Picture:
     shown = runs[:_MOST_RUNS]
-    columns = min(4, len(shown))
-    rows = -(-len(shown) // columns)
-    with figure(rows, columns, width=10.0, height=2.1) as (drawing, axes):
-        for panel in axes.ravel()[len(shown) :]:
-            panel.set_visible(False)
-        for panel, run in zip(axes.ravel(), shown, strict=False):
+    with panels_of(len(shown), width=10.0, height=2.1) as (drawing, axes, panels):
+        for panel, run in zip(panels, shown, strict=True):
             _draw_run(panel, run)
         for panel in axes[-1]:
             panel.set_xlabel("time (s)")
-        for place, (panel, run) in enumerate(zip(axes.ravel(), shown, strict=False)):
-            # once a row, unless something else is recorded
-            if place % columns == 0 or run.quantity != shown[place - 1].quantity:
-                unit = "" if run.quantity == "strain" else " (Pa)"
-                panel.set_ylabel(FIGURE_SYMBOLS[run.quantity] + unit)
+        units = ["" if run.quantity == "strain" else " (Pa)" for run in shown]
+        symbols = [FIGURE_SYMBOLS[run.quantity] for run in shown]
+        label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units, strict=True)])
         legend_above(drawing, axes)
         more = f" The first {len(shown)} of {len(runs)} runs." if len(runs) > len(shown) else ""
         return picture(

@@ -4,7 +4,7 @@ import html
 import io
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -198,6 +198,33 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
     with mpl.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType]
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
         yield drawing, drawing.subplots(rows, columns, squeeze=False)
+
+
+@contextmanager
+def panels_of(
+    count: int, columns: int = 4, width: float = 9.0, height: float = 2.6
+) -> Iterator[tuple]:
+    """Yield a figure, its axes, and as many panels as are asked for; those left over are hidden.
+
+    Parameters
+    ----------
+    count, columns
+        Number of panels, and how many stand side by side at most.
+    width, height
+        As of `figure`.
+    """
+    columns = min(columns, count)
+    with figure(-(-count // columns), columns, width, height) as (drawing, axes):
+        for panel in axes.ravel()[count:]:
+            panel.set_visible(False)
+        yield drawing, axes, axes.ravel()[:count]
+
+
+def label_rows(axes, labels: Sequence[str]) -> None:
+    """Label the ordinates of panels once a row, and where something else is drawn than before."""
+    for place, (panel, label) in enumerate(zip(axes.ravel(), labels, strict=False)):
+        if place % axes.shape[1] == 0 or label != labels[place - 1]:
+            panel.set_ylabel(label)
 
 
 def legend_above(drawing: Figure, axes, columns: int = 4) -> None:

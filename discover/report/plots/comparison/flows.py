@@ -19,10 +19,12 @@ from discover.report.plots.style import (
     TRUTH_STYLE,
     Picture,
     figure,
+    label_rows,
     learner_style,
     legend_above,
     literal,
     make_logarithmic,
+    panels_of,
     picture,
     runs_through_decades,
 )
@@ -138,12 +140,8 @@ def training_picture(comparison: Comparison) -> Picture:
     stress_unit, _, _ = units(comparison)
     kinds = {flow.protocol.quantity for flow in flows}
     recorded = listed([symbol for kind, symbol in FIGURE_SYMBOLS.items() if kind in kinds])
-    columns = min(4, len(flows))
-    rows = -(-len(flows) // columns)
-    with figure(rows, columns, height=1.8) as (drawing, axes):
-        for panel in axes.ravel()[len(flows) :]:
-            panel.set_visible(False)
-        for panel, flow in zip(axes.ravel(), flows, strict=False):
+    with panels_of(len(flows), height=1.8) as (drawing, axes, panels):
+        for panel, flow in zip(panels, flows, strict=True):
             if flow.measured is not None:
                 panel.plot(flow.along, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
@@ -158,14 +156,11 @@ def training_picture(comparison: Comparison) -> Picture:
             _set_scales(panel, flow, "sigma12", truth_too=True)
             if flow.is_of_states:
                 panel.set_xlabel(_axis_of(comparison, flow))
-        for panel, flow in zip(axes[-1], flows[(rows - 1) * columns :], strict=False):
+        for panel, flow in zip(axes[-1], flows[axes[:-1].size :], strict=False):
             panel.set_xlabel(_axis_of(comparison, flow))
-        for place, (panel, flow) in enumerate(zip(axes.ravel(), flows, strict=False)):
-            # once a row, unless something else is recorded
-            quantity = flow.protocol.quantity
-            if place % columns == 0 or quantity != flows[place - 1].protocol.quantity:
-                unit = "" if flow.records_strain else stress_unit
-                panel.set_ylabel(FIGURE_SYMBOLS[quantity] + unit)
+        units_of = ["" if flow.records_strain else stress_unit for flow in flows]
+        symbols = [FIGURE_SYMBOLS[flow.protocol.quantity] for flow in flows]
+        label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
         legend_above(drawing, axes)
         return picture(
             drawing, "training", f"The only data that the learners saw: {recorded} of these runs."

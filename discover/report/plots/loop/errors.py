@@ -13,9 +13,13 @@ from discover.report.plots.style import (
     legend_above,
     literal,
     make_percentage,
+    panels_of,
     picture,
 )
 from discover.report.wording import effect_title, percent
+
+MOST_RANKED = 12
+"""Candidates of a stage that are shown, the best."""
 
 
 def waterfall_picture(result: LoopResult) -> Picture:
@@ -65,18 +69,14 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     panel.vlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
-def ranking_picture(result: LoopResult, shown: int = 12) -> Picture | None:
+def ranking_picture(result: LoopResult) -> Picture | None:
     """Return what each candidate would remove of the residual, stage by stage."""
     rankings = [ranking for ranking in result.rankings if ranking]
     if not rankings:
         return None
-    columns = min(3, len(rankings))
-    rows = -(-len(rankings) // columns)
-    with figure(rows, columns, width=10.0, height=3.0) as (drawing, axes):
-        for panel in axes.ravel()[len(rankings) :]:
-            panel.set_visible(False)
-        for number, (panel, ranking) in enumerate(zip(axes.ravel(), rankings, strict=False)):
-            best = ranking[:shown][::-1]
+    with panels_of(len(rankings), 3, width=10.0, height=3.0) as (drawing, _, panels):
+        for number, (panel, ranking) in enumerate(zip(panels, rankings, strict=True)):
+            best = ranking[:MOST_RANKED][::-1]
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(
                 [effect_title(c.effect) for c in best],

@@ -2,14 +2,7 @@
 
 from discover.closed_loop import LoopResult
 from discover.report.free_form_words import free_form_sentence
-from discover.report.plots.style import (
-    NETWORK,
-    SHADE,
-    Picture,
-    figure,
-    legend_above,
-    picture,
-)
+from discover.report.plots.style import NETWORK, SHADE, Picture, figure, legend_above, picture
 
 _AXES = {
     "recorded_stress": ("true stress (Pa)", "recorded less true stress (Pa)"),

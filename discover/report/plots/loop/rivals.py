@@ -7,9 +7,9 @@ from discover.report.plots.loop.runs import FIT_COLOUR, HELD_COLOUR
 from discover.report.plots.style import (
     INK,
     Picture,
-    figure,
     legend_above,
     make_logarithmic,
+    panels_of,
     picture,
     runs_through_decades,
 )
@@ -29,13 +29,8 @@ def rivals_picture(result: LoopResult) -> Picture | None:
         return None
     shown = told[:_MOST]
     chosen = result.explanations.holding([stage.effect for stage in result.stages])
-    rows = -(-len(shown) // _COLUMNS)
-    columns = min(_COLUMNS, len(shown))
-    with figure(rows, columns, width=10.0, height=2.1) as (drawing, axes):
+    with panels_of(len(shown), _COLUMNS, width=10.0, height=2.1) as (drawing, axes, panels):
         limit = 0.0
-        for panel in axes.ravel()[len(shown) :]:
-            panel.set_visible(False)
-        panels = axes.ravel()[: len(shown)]
         for place, (panel, one) in enumerate(zip(panels, shown, strict=True)):
             for record in records:
                 assert record.by_explanation is not None
@@ -55,7 +50,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
                 make_logarithmic(panel.xaxis)
         for panel in panels:
             panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
-        for panel in panels[-columns:]:  # below which there is none
+        for panel in panels[-axes.shape[1] :]:  # below which there is none
             panel.set_xlabel("time (s)")
         for panel in axes[:, 0]:
             panel.set_ylabel("residual (% of rms)")

@@ -16,10 +16,11 @@ from discover.report.plots.style import (
     SPARSE,
     TRUTH,
     Picture,
-    figure,
+    label_rows,
     legend_above,
     literal,
     make_logarithmic,
+    panels_of,
     picture,
     runs_through_decades,
 )
@@ -32,6 +33,8 @@ Samples = slice | np.ndarray
 FIT_COLOUR, HELD_COLOUR = NETWORK, SPARSE
 """Of runs fitted and held out."""
 
+
+_LONGEST_NAME = 30  # of a run over its panel, in characters
 
 THOUSANDS = 1e4
 """In Pa, from which digits would crowd an axis."""
@@ -81,12 +84,8 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
 def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
     """Return every run: measured, declared model, augmented model, and overlays."""
     records = result.records
-    columns = min(4, len(records))
-    rows = -(-len(records) // columns)
-    with figure(rows, columns, width=10.0, height=2.2) as (drawing, axes):
-        for panel in axes.ravel()[len(records) :]:
-            panel.set_visible(False)
-        for panel, record in zip(axes.ravel(), records, strict=False):
+    with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
+        for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
             draw_overlays(panel, record, overlays, record.along[1], slice(None))
@@ -103,13 +102,10 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
                 panel.yaxis.set_major_formatter(EngFormatter(sep=""))  # 200k
             panel.set_title(short_title(record), fontsize=8)
         below = {panel for panel in axes[-1]}
-        for panel, record in zip(axes.ravel(), records, strict=False):
+        for panel, record in zip(panels, records, strict=True):
             if panel in below or not record.is_transient:
                 panel.set_xlabel(record.along[0])
-        for place, (panel, record) in enumerate(zip(axes.ravel(), records, strict=False)):
-            # once a row, unless something else is recorded
-            if place % columns == 0 or record.quantity != records[place - 1].quantity:
-                panel.set_ylabel(axis_label([record]))
+        label_rows(axes, [axis_label([record]) for record in records])
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -191,20 +187,18 @@ def short_title(record: RunRecord) -> str:
     return f"{name}\n{' → '.join(map(percent, errors))}"
 
 
-def shortened(name: str, longest: int = 30) -> str:
+def shortened(name: str) -> str:
     """Return the name of a run as it fits over a panel: its beginning and its end.
 
     Parameters
     ----------
     name
         Of the run, which may be a file's.
-    longest
-        Most characters.
     """
     for modulus in MODULI:
         name = name.replace(f".csv ({modulus})", f" {FIGURE_SYMBOLS[modulus]}")
     name = name.removesuffix(".csv")
-    if len(name) <= longest:
+    if len(name) <= _LONGEST_NAME:
         return name
-    end = longest // 2
-    return f"{name[: longest - end - 1]}…{name[-end:]}"
+    end = _LONGEST_NAME // 2
+    return f"{name[: _LONGEST_NAME - end - 1]}…{name[-end:]}"

@@ -4,8 +4,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 
-from discover.closed_loop.explanations.discrepancy import changed
-from discover.closed_loop.search.left_out import left_out_parts
+from discover.closed_loop.explanations.bands.discrepancy import changed
+from discover.closed_loop.search.scoring.left_out import left_out_parts
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, covariance_and_noise
 
@@ -39,7 +40,7 @@ def widening(
     # of a relative error each sample has an equal share
     noise = left / np.sqrt(np.maximum(np.count_nonzero(weighted, axis=1), 1))[:, None]
     needed = [1.0]
-    for out, missed in left_out_parts(model, fitted, fit):
+    for out, missed in left_out_parts(FitProblem(model, fitted), fit):
         kept = weighted & ~out
         variance = np.broadcast_to(noise**2, weighted.shape).copy()
         if fit.free:

@@ -6,18 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.search.attribution import TRIED_AT, CandidateScore, with_other_inner
-from discover.closed_loop.search.evidence import BARE_MENTION, INDISTINGUISHABLE, evidence
-from discover.closed_loop.search.left_out import (
+from discover.closed_loop.search.scoring.attribution import (
+    TRIED_AT,
+    CandidateScore,
+    with_other_inner,
+)
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.left_out import (
     FEWEST_FOLDS,
     left_out_parts,
     part_errors,
     run_errors,
 )
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import AbstractEffect
-from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, intervals
-from discover.statistics.residual import summarise
+from discover.forward import AugmentedModel
+from discover.forward.least_squares import Fit, intervals
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""
@@ -59,14 +63,7 @@ class Choice:
     parts: Float[np.ndarray, "2 parts"]
 
 
-def refit(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    leaders: Sequence[CandidateScore],
-    n_candidates: int,
-    prior: Prior = NO_PRIOR,
-) -> list[Choice]:
+def refit(problem: FitProblem, fit: Fit, leaders: Sequence[CandidateScore]) -> list[Choice]:
     """Refit each leading candidate together with all that is fitted already.
 
     The refit carries no penalty, so its coefficients are not biased towards zero; it is as sharp as
@@ -74,30 +71,25 @@ def refit(
 
     Parameters
     ----------
-    model, batch, fit
-        The model, the fitted runs and the current fit.
+    problem, fit
+        What is fitted to what, and the current fit.
     leaders
         Candidates to refit.
-    n_candidates
-        Number of candidates they were chosen from.
-    prior
-        What is known of some parameters.
     """
     if not leaders:
         return []
-    weight = np.asarray(batch.weight)
-    free = [(*fit.free, *model.positions(candidate.effect)) for candidate in leaders]
+    weight = problem.weight
+    free = [(*fit.free, *problem.model.positions(candidate.effect)) for candidate in leaders]
     starts = [candidate.start for candidate in leaders]
-    fits = fit_batch(model, batch, starts, free, tolerance=RANKING, prior=prior, rivals=True)
-    fits = _restarted(model, batch, fits, prior)
+    fits = _restarted(problem, problem.fits(starts, free, tolerance=RANKING, rivals=True))
     best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
-    effective = summarise(best.residual, weight).effective_samples
+    effective = problem.independent_samples(best)
     choices = []
     samples = np.count_nonzero(weight)
     for candidate, trial in zip(leaders, fits, strict=True):
         if not trial.usable or samples < len(trial.free) + FEWEST_SAMPLES:
             continue
-        parts = left_out_parts(model, batch, trial, prior)
+        parts = left_out_parts(problem, trial)
         left_out = run_errors(parts, weight)
         errors = [
             part_errors([(held, trial.residual**2) for held, _ in parts], weight),
@@ -105,12 +97,12 @@ def refit(
         ]
         candidate.error = float(np.mean(trial.run_errors))
         candidate.left_out_error = float(np.mean(left_out))
-        candidate.evidence = evidence(fit, trial, weight, effective, n_candidates)
+        candidate.evidence = problem.evidence(fit, trial, effective)
         choices.append(Choice(candidate, trial, left_out, np.array(errors)))
     return choices
 
 
-def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: Prior) -> list[Fit]:
+def _restarted(problem: FitProblem, fits: Sequence[Fit]) -> list[Fit]:
     """Return fits of which the best were also started from other inner times and exponents.
 
     In these a misfit has several minima: where two effects share a misfit, the inner time at which
@@ -118,7 +110,7 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
     stands at the end of its range, the best or not, is started from inside it too: a first step
     beyond a minimum may end in another one there, and what is at an end is never a finding.
     """
-    fits = list(fits)
+    model, fits = problem.model, list(fits)
     order = sorted((i for i, fit in enumerate(fits) if fit.usable), key=lambda i: fits[i].cost)
     starts, owners = [], []
     for i in order[:_RESTARTED]:
@@ -137,7 +129,7 @@ def _restarted(model: AugmentedModel, batch: Batch, fits: Sequence[Fit], prior: 
     if not starts:
         return fits
     free = [fits[i].free for i in owners]
-    again = fit_batch(model, batch, starts, free, tolerance=RANKING, prior=prior, rivals=True)
+    again = problem.fits(starts, free, tolerance=RANKING, rivals=True)
     for i, fit in zip(owners, again, strict=True):
         if fit.usable and fit.cost < fits[i].cost:
             fits[i] = fit
@@ -244,28 +236,18 @@ def _near(best: Choice, other: Choice) -> bool:
 
 
 def prune(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    active: Sequence[str],
-    n_candidates: int,
-    settled: Sequence[str] = (),
-    prior: Prior = NO_PRIOR,
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
 ) -> tuple[Fit, list[str]]:
     """Drop effects that later ones have made redundant, one after another.
 
     Parameters
     ----------
-    model, batch, fit
-        The model, the fitted runs and the current fit.
+    problem, fit
+        What is fitted to what, and the current fit.
     active
         Effects in the model, in the order they were added; the last is never dropped.
-    n_candidates
-        As in `evidence`.
-    settled
-        Effects established on other grounds, which stay.
-    prior
-        What is known of some parameters.
+    established
+        Effects that other data showed, which stay.
 
     Returns
     -------
@@ -273,19 +255,13 @@ def prune(
     """
 
     def optional(fit: Fit, active: list[str]) -> list[str]:
-        return [name for name in active[:-1] if name not in settled]
+        return [name for name in active[:-1] if name not in established]
 
-    return _drop(model, batch, fit, active, optional, 0.0, n_candidates, prior)
+    return _drop(problem, fit, active, optional, 0.0)
 
 
 def drop_undecided(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    active: Sequence[str],
-    n_candidates: int,
-    settled: Sequence[str] = (),
-    prior: Prior = NO_PRIOR,
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
 ) -> tuple[Fit, list[str]]:
     """Drop effects whose amplitude may be zero, one after another, the weakest first.
 
@@ -295,7 +271,7 @@ def drop_undecided(
 
     Parameters
     ----------
-    model, batch, fit, active, n_candidates, settled, prior
+    problem, fit, active, established
         As in `prune`, but that the last effect may be dropped too.
 
     Returns
@@ -304,31 +280,28 @@ def drop_undecided(
     """
 
     def optional(fit: Fit, active: list[str]) -> list[str]:
-        bounds = intervals(model, batch, fit)
-        amplitudes = {name: bounds[model.positions(name)[0]] for name in active}
+        bounds = intervals(problem.model, problem.batch, fit)
+        amplitudes = {name: bounds[problem.model.positions(name)[0]] for name in active}
         return [
             name
             for name, (low, high) in amplitudes.items()
-            if low <= 0.0 <= high and name not in settled
+            if low <= 0.0 <= high and name not in established
         ]
 
-    return _drop(model, batch, fit, active, optional, INDISTINGUISHABLE, n_candidates, prior)
+    return _drop(problem, fit, active, optional, INDISTINGUISHABLE)
 
 
 def _drop(
-    model: AugmentedModel,
-    batch: Batch,
+    problem: FitProblem,
     fit: Fit,
     active: Sequence[str],
     optional: Callable[[Fit, list[str]], list[str]],
     enough: float,
-    n_candidates: int,
-    prior: Prior,
 ) -> tuple[Fit, list[str]]:
     """Drop the weakest of the optional effects until the evidence for it is enough to stay."""
     active = list(active)
     while names := optional(fit, active):
-        support, name, without = _weakest(model, batch, fit, names, n_candidates, prior)
+        support, name, without = _weakest(problem, fit, names)
         if support > enough:
             break
         fit = without
@@ -336,30 +309,13 @@ def _drop(
     return fit, active
 
 
-def taken_out(model: AugmentedModel, fit: Fit, effect: str) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return a fit's parameters with one effect at zero, and those still free without it."""
-    own = [*model.positions(effect), *model.varying(effect)]
-    theta = fit.theta.copy()
-    theta[own] = model.zero()[own]
-    return theta, tuple(p for p in fit.free if p not in own)
-
-
-def _weakest(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    optional: Sequence[str],
-    n_candidates: int,
-    prior: Prior,
-) -> tuple[float, str, Fit]:
+def _weakest(problem: FitProblem, fit: Fit, optional: Sequence[str]) -> tuple[float, str, Fit]:
     """Return the least evidence for one of several effects, its name, and the fit without it."""
-    starts, free = zip(*(taken_out(model, fit, name) for name in optional), strict=True)
-    fits = fit_batch(model, batch, starts, free, prior=prior)
-    weight = np.asarray(batch.weight)
-    effective = summarise(fit.residual, weight).effective_samples
+    starts, free = zip(*(problem.without(fit, name) for name in optional), strict=True)
+    fits = problem.fits(starts, free)
+    effective = problem.independent_samples(fit)
     support = [
-        evidence(trial, fit, weight, effective, n_candidates) if trial.usable else np.inf
-        for trial in fits
+        problem.evidence(trial, fit, effective) if trial.usable else np.inf for trial in fits
     ]
     weakest = int(np.argmin(support))
     return float(support[weakest]), optional[weakest], fits[weakest]

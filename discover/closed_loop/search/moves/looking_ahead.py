@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from discover.closed_loop.search.augment import IMPROVEMENT, prune
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.evidence import BARE_MENTION, evidence
-from discover.closed_loop.search.exchanging import exchange
-from discover.closed_loop.search.left_out import left_out_errors
-from discover.statistics.residual import summarise
+from discover.closed_loop.search.moves.exchanging import exchange
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.refitting import IMPROVEMENT, prune
 
 
 def look_ahead(search: CurrentModel, max_effects: int) -> str | None:
@@ -27,17 +26,14 @@ def look_ahead(search: CurrentModel, max_effects: int) -> str | None:
         fit = best.fit
         kept.append(best.candidate.effect)
         added = len(kept) - len(active)
-        weight = np.asarray(search.batch.weight)
-        effective = summarise(fit.residual, weight).effective_samples
-        support = evidence(before, fit, weight, effective, search.n_candidates, added)
-        errors = left_out_errors(search.model, search.batch, fit, search.prior)
+        problem = search.problem
+        support = problem.evidence(before, fit, problem.independent_samples(fit), added)
+        errors = left_out_errors(problem, fit)
         if added < 2 or support <= BARE_MENTION or np.mean(errors) >= IMPROVEMENT * left_out:
             continue
         fit = search.sharpened(fit)
         search.fit = fit
-        search.fit, search.active = prune(
-            search.model, search.batch, fit, kept, search.n_candidates, search.settled, search.prior
-        )
+        search.fit, search.active = prune(search.problem, fit, kept, search.established)
         new = [name for name in search.active if name not in active]
         for name in new:
             search.aliases[name] = ()
@@ -47,6 +43,6 @@ def look_ahead(search: CurrentModel, max_effects: int) -> str | None:
         # the first was taken on trust, with the others still missing
         for name in new[:-1]:
             exchange(search, name)
-        search.unasked = set(search.active)
+        search.without_aliases = set(search.active)
         return ", ".join(name for name in search.active if name not in active)
     return None

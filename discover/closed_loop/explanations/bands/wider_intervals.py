@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.telling_apart import contenders
+from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit

@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.effects import AbstractEffect, EffectParameter
+from discover.closed_loop.search.scoring.problem import effect_of
+from discover.effects import EffectParameter
 from discover.forward import AugmentedModel
 
 _TOLERANCE = 1e-3
@@ -34,7 +35,7 @@ def at_an_end(model: AugmentedModel, theta: np.ndarray, names: Sequence[str]) ->
         Parameters, and the effects among them that are asked for.
     """
     for name in names:
-        effect = _effect(model, name)
+        effect = effect_of(model, name)
         for parameter, at in zip(effect.parameters, model.positions(name), strict=True):
             value, low, high = theta[at], model.low[at], model.high[at]
             stopped = "high" not in parameter.ends and _reached(value, high)
@@ -69,7 +70,7 @@ def undetermined(
         Length of the longest run in s. A time beyond it that may be endless is known well enough,
         but not from steady states, which know no time: there it is zero.
     """
-    effect = _effect(model, name)
+    effect = effect_of(model, name)
     for parameter, at in zip(effect.parameters, model.positions(name), strict=True):
         value, (below, above) = theta[at], bounds[at]
         low, high = model.low[at], model.high[at]
@@ -101,7 +102,3 @@ def _reached(value: float, end: float) -> bool:
 
 def _said(parameter: EffectParameter, value: float) -> str:
     return f"{parameter.name} = {value:.3g} {parameter.unit}".rstrip()
-
-
-def _effect(model: AugmentedModel, name: str) -> AbstractEffect:
-    return next(effect for effect in model.effects if effect.name == name)

@@ -6,25 +6,17 @@ name that is not needed once it is allowed is no finding.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from discover.closed_loop.search.evidence import INDISTINGUISHABLE, evidence
+from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
+from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import ModeDependence
-from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
-from discover.statistics.residual import summarise
+from discover.forward.least_squares import Fit
 
 _STARTS = (-0.5, 0.5)
 
 
-def names_not_needed(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    names: Sequence[str],
-    prior: Prior = NO_PRIOR,
-) -> tuple[str, ...]:
+def names_not_needed(problem: FitProblem, fit: Fit, names: Sequence[str]) -> tuple[str, ...]:
     """Return the effects without which the data are explained as well, by constants by mode.
 
     Each is left out alone, and with all that came after it; the exponent of the modes is then
@@ -33,37 +25,32 @@ def names_not_needed(
 
     Parameters
     ----------
-    model
-        With a `ModeDependence` among its effects; without one nothing is said.
-    batch, fit
-        The fitted runs, and the fit.
+    problem, fit
+        What is fitted to what, and the fit. Without a `ModeDependence` among the effects nothing is
+        said.
     names
         Effects that may go, in the order in which they came.
-    prior
-        What is known of some parameters.
     """
-    by_mode = next((e for e in model.effects if isinstance(e, ModeDependence)), None)
+    by_mode = next((e for e in problem.model.effects if isinstance(e, ModeDependence)), None)
     if by_mode is None or not names:
         return ()
     groups = list(dict.fromkeys([*(tuple(names[i:]) for i in range(len(names))), *zip(names)]))
-    at = model.positions(by_mode.name)
+    at = problem.model.positions(by_mode.name)
     starts, free, owners = [], [], []
     for group in groups:
-        gone = [p for name in group for p in (*model.positions(name), *model.varying(name))]
         for exponent in _STARTS:
-            theta = fit.theta.copy()
-            theta[gone] = model.zero()[gone]
+            theta, rest = problem.without(fit, *group)
             theta[at] = exponent
             starts.append(theta)
-            free.append((*(p for p in fit.free if p not in gone), *at))
+            free.append((*rest, *at))
             owners.append(group)
-    rivals = fit_batch(model, batch, starts, free, prior=prior, rivals=True)
-    effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
+    rivals = problem.fits(starts, free, rivals=True)
+    effective = problem.independent_samples(fit)
+    # both are fitted here, and neither pays for a choice among many
+    alone = replace(problem, n_candidates=1)
     enough = [
         group
         for group, rival in zip(owners, rivals, strict=True)
-        if rival.usable
-        # both were fitted here, and neither pays for a choice among many
-        and evidence(rival, fit, np.asarray(batch.weight), effective, 1) <= INDISTINGUISHABLE
+        if rival.usable and alone.evidence(rival, fit, effective) <= INDISTINGUISHABLE
     ]
     return max(enough, key=len, default=())

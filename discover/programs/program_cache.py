@@ -19,8 +19,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from discover.programs.fingerprint import NotTold, fingerprint, found_by_name
-from discover.programs.room import drop_all, is_crowded
+from discover.programs.fingerprint import NotDescribable, fingerprint, found_by_name
+from discover.programs.memory import drop_all, is_crowded
 from discover.programs.store import load_program, program_folder, save_program
 from discover.programs.structure import put_together, take_apart
 
@@ -142,7 +142,7 @@ class Compiled(Generic[P, R]):
             nesting, data = kept
             options = options if len(data) < _LARGE else None
             exported = jax.export.deserialize(bytearray(data))
-        except (NotTold, NotImplementedError, ValueError, TypeError) as reason:
+        except (NotDescribable, NotImplementedError, ValueError, TypeError) as reason:
             _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)
             return traced
 

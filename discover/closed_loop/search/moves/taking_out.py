@@ -4,24 +4,24 @@ from collections.abc import Callable
 
 import numpy as np
 
-from discover.closed_loop.search.augment import drop_undecided
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.evidence import WINDOW, criterion
-from discover.closed_loop.search.mode_dependence import names_not_needed
-from discover.closed_loop.search.physical_range import at_an_end, undetermined
+from discover.closed_loop.search.scoring.evidence import WINDOW
+from discover.closed_loop.search.scoring.mode_dependence import names_not_needed
+from discover.closed_loop.search.scoring.physical_range import at_an_end, undetermined
+from discover.closed_loop.search.scoring.refitting import drop_undecided
+from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import intervals
-from discover.statistics.residual import judged_cost, summarise
 
 
-def hold_against_modes(search: CurrentModel, say: Callable[[str], None]) -> None:
+def drop_what_modes_explain(search: CurrentModel, say: Callable[[str], None]) -> None:
     """Take out effects that constants that differ from mode to mode make needless.
 
     Asked only where the names would explain the data: elsewhere nobody is to believe them.
     """
-    names = [name for name in search.active if name not in search.settled]
+    names = [name for name in search.active if name not in search.established]
     if not names or not search.explained:
         return
-    needless = names_not_needed(search.model, search.batch, search.fit, names, search.prior)
+    needless = names_not_needed(search.problem, search.fit, names)
     if not needless:
         return
     for name in needless:
@@ -30,17 +30,14 @@ def hold_against_modes(search: CurrentModel, say: Callable[[str], None]) -> None
             f"{name} fits, but is not needed where the constants of the law differ from one "
             "relaxation mode to the next"
         )
-    search.active = [name for name in search.active if name not in needless]
-    search.unasked = set(search.active)
-    search.fit = search.fitted(search.active, search.fit.theta)
-    search.fit_path()
-    search.leave_out()
+    left = [name for name in search.active if name not in needless]
+    search.take(search.fitted(left, search.fit.theta), left)
     say(f"not needed where constants differ from mode to mode: {', '.join(needless)}")
 
 
 def refuse(search: CurrentModel) -> str:
     """Take out one effect whose parameters are no finding, and return its name."""
-    names = [name for name in reversed(search.active) if name not in search.settled]
+    names = [name for name in reversed(search.active) if name not in search.established]
     if not names:
         return ""
     bounds = intervals(search.model, search.batch, search.fit)
@@ -56,27 +53,17 @@ def refuse(search: CurrentModel) -> str:
             search.left_open.add(name)
         search.not_named[name] = reason or open_
         search.refused.add(name)
-        search.fit = search.without(name)
-        search.active.remove(name)
-        search.unasked = set(search.active)
-        search.fit_path()
-        search.leave_out()
+        search.take(search.without(name), [other for other in search.active if other != name])
         return name
     return ""
 
 
 def drop_undecided_effects(search: CurrentModel) -> list[str]:
     """Take out effects of which the whole leaves open whether they are there; name them."""
-    fit, kept = drop_undecided(
-        search.model, search.batch, search.fit, search.active, search.n_candidates, search.settled,
-        search.prior,
-    )  # fmt: skip
+    fit, kept = drop_undecided(search.problem, search.fit, search.active, search.established)
     dropped = [name for name in search.active if name not in kept]
     if dropped:
-        search.fit, search.active = fit, kept
-        search.unasked = set(kept)
-        search.fit_path()
-        search.leave_out()
+        search.take(fit, kept)
     return dropped
 
 
@@ -90,14 +77,14 @@ def restore_left_open(search: CurrentModel) -> str:
     """
     if not search.left_open or (search.explained and not search.active):
         return ""
-    weight = np.asarray(search.batch.weight)
-    effective = summarise(search.fit.residual, weight).effective_samples
+    problem = search.problem
+    effective = problem.independent_samples(search.fit)
 
-    def worth(cost: float, free: int, effects: int) -> float:
-        return criterion(cost, free, effects, effective, search.n_candidates)
+    def worth(one: SeenSet) -> float:
+        return problem.criterion(one.cost, one.free, one.effects, effective)
 
-    cost = judged_cost(search.fit.residual, weight)
-    own = worth(cost, len(search.fit.free), len(search.active))
+    cost = problem.cost(search.fit)
+    own = problem.criterion(cost, search.fit.free, search.active, effective)
     impossible = search.refused - search.left_open
     instead = [
         one
@@ -106,17 +93,13 @@ def restore_left_open(search: CurrentModel) -> str:
     ]
     if not instead:
         return ""
-    best = min(instead, key=lambda one: worth(one.cost, len(one.free), len(one.effects)))
-    if worth(best.cost, len(best.free), len(best.effects)) > own - 2.0 * np.log(WINDOW):
+    best = min(instead, key=worth)
+    if worth(best) > own - 2.0 * np.log(WINDOW):
         return ""
     fit = search.fitted(list(best.effects), best.theta(search.model))
     if not search.tolerated.explained(fit, best.effects):
         return ""
     search.refused -= set(best.effects)
     search.left_open -= set(best.effects)
-    search.active = list(best.effects)
-    search.unasked = set(search.active)
-    search.fit = fit
-    search.fit_path()
-    search.leave_out()
+    search.take(fit, best.effects)
     return ", ".join(best.effects)

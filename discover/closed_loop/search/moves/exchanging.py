@@ -3,9 +3,9 @@
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.attribution import attribute
-from discover.closed_loop.search.augment import Choice, aliases_of, refit, simplest
 from discover.closed_loop.search.current_model import LEADERS, CurrentModel
+from discover.closed_loop.search.scoring.attribution import attribute
+from discover.closed_loop.search.scoring.refitting import Choice, aliases_of, refit, simplest
 from discover.effects import AbstractEffect
 
 _COMPARED = 16
@@ -21,7 +21,7 @@ def reexamine(search: CurrentModel) -> bool:
     small strains said for it.
     """
     asked = list(search.active)
-    if search.active and not search.settled:
+    if search.active and not search.established:
         asked = [name for name in asked if name != search.active[-1]]
     exchanged = False
     for name in asked:
@@ -34,7 +34,7 @@ def ask_for_aliases(search: CurrentModel, name: str) -> None:
     own, choices = in_place_of(search, name)
     if own is not None:
         search.aliases[name] = aliases_of(own, choices)
-        search.unasked.discard(name)
+        search.without_aliases.discard(name)
 
 
 def in_place_of(search: CurrentModel, name: str) -> tuple[Choice | None, list[Choice]]:
@@ -54,8 +54,7 @@ def in_place_of(search: CurrentModel, name: str) -> tuple[Choice | None, list[Ch
     leading = attribute(search.model, search.batch, without, others, LEADERS, rival).leading
     current = CandidateScore(name, "", 1.0, 0.0, start=search.fit.theta.copy())
     asked = [current, *leading][:_COMPARED]
-    choices = refit(search.model, search.batch, without, asked, search.n_candidates, search.prior)
-    choices = search.possible(choices, others)
+    choices = search.possible(refit(search.problem, without, asked), others)
     return next((c for c in choices if c.candidate is current), None), choices
 
 
@@ -74,18 +73,18 @@ def exchange(search: CurrentModel, name: str) -> bool:
         best = own_choice
     explained = search.tolerated.explained(best.fit, [*others, best.candidate.effect])
     gain = (best.candidate.evidence or 0.0) - (current.evidence or 0.0)
-    if name in search.settled and not (explained and gain > search.support[name]):
+    if name in search.established and not (explained and gain > search.support[name]):
         return False
     search.aliases[name] = aliases_of(best, choices)
-    search.unasked.discard(name)
+    search.without_aliases.discard(name)
     if best.candidate is current:
         return False
     new = best.candidate.effect
     search.aliases[new] = search.aliases.pop(name)
     search.support[new] = search.support.pop(name)
     search.active[search.active.index(name)] = new
-    search.unasked = {other for other in search.active if other != new}
-    search.settled = tuple(n for n in search.settled if n != name)
+    search.without_aliases = {other for other in search.active if other != new}
+    search.established = tuple(n for n in search.established if n != name)
     own = search.model.positions(name)
     search.known = {at: value for at, value in search.known.items() if at not in own}
     search.fit = search.sharpened(best.fit)

@@ -5,19 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, gauss_newton_step
+from discover.closed_loop.search.scoring.problem import FitProblem
+from discover.forward.least_squares import Fit, gauss_newton_step
 
 _MISSED = 10.0
 _WORSE = 2.0
 """Squared misfit of what is kept, over that of the whole fit, from which on a step is no fit."""
 
 
-def left_out_errors(
-    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
-) -> Float[np.ndarray, " runs"]:
+def left_out_errors(problem: FitProblem, fit: Fit) -> Float[np.ndarray, " runs"]:
     """Return the relative error of each run left out of the fit; see `left_out_parts`."""
-    return run_errors(left_out_parts(model, batch, fit, prior), np.asarray(batch.weight))
+    return run_errors(left_out_parts(problem, fit), problem.weight)
 
 
 def run_errors(
@@ -32,7 +30,7 @@ def run_errors(
 
 
 def left_out_parts(
-    model: AugmentedModel, batch: Batch, fit: Fit, prior: Prior = NO_PRIOR
+    problem: FitProblem, fit: Fit
 ) -> list[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]]:
     """Return which samples are left out together, and the squared residuals without them.
 
@@ -45,14 +43,12 @@ def left_out_parts(
 
     Parameters
     ----------
-    model, batch
-        The model and the runs.
+    problem
+        What is fitted to what.
     fit
-        The fit to all of them.
-    prior
-        What is known of some parameters.
+        The fit to all of it.
     """
-    weighted = np.asarray(batch.weight) > 0
+    model, weighted = problem.model, problem.weight > 0
     folds = _folds(weighted)
     at = list(fit.free)
     trials = []
@@ -60,13 +56,13 @@ def left_out_parts(
         # rows of zeros count for nothing
         kept = weighted & ~left_out
         step = gauss_newton_step(
-            fit.jacobian * kept, fit.residual * kept, 1e-8, prior.rows(fit.theta, at)
+            fit.jacobian * kept, fit.residual * kept, 1e-8, problem.prior.rows(fit.theta, at)
         )
         theta = fit.theta.copy()
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)
     with np.errstate(over="ignore", invalid="ignore"):
-        squares = [residual**2 for residual in model.residuals(trials, batch)]
+        squares = [residual**2 for residual in model.residuals(trials, problem.batch)]
         # what is left has to fit better without the others than with them: a step that does not is
         # too long for a first derivative, as of a constant that the data leave open
         own = fit.residual**2

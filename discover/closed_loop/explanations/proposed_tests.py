@@ -79,7 +79,7 @@ def next_tests(
     tests = possible_tests(runs, longest)
     predicted = _predicted(model, varied, make_batch([t.run for t in tests])) if tests else []
     found = [
-        _weighed(test, [of[:, i, : len(test.run)] for of in predicted], share, noise, fresh)
+        _expected_of(test, [of[:, i, : len(test.run)] for of in predicted], share, noise, fresh)
         for i, test in enumerate(tests)
     ]
     if kept:
@@ -89,7 +89,7 @@ def next_tests(
             again = _predicted(model, altered, batch)
             test = PossibleTest(f"{runs[fastest].name} again, {title}", runs[fastest])
             seen = [of[:, fastest, : len(runs[fastest])] for of in again]
-            found.append(_weighed(test, seen, share, noise, fresh))
+            found.append(_expected_of(test, seen, share, noise, fresh))
     told = [one for one in found if one is not None]
     told.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
     names = tuple(one.effects for one, _ in weighed)
@@ -163,7 +163,7 @@ def _elsewhere(model: AugmentedModel):
         yield "on another instrument, without flaws of this one", other
 
 
-def _weighed(
+def _expected_of(
     test: PossibleTest,
     predicted: Sequence[Float[np.ndarray, "_ n"]],
     share: Float[np.ndarray, " e"],

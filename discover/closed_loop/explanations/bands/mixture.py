@@ -7,10 +7,10 @@ from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 from scipy.stats import t as student
 
+from discover.closed_loop.explanations.bands.discrepancy import discrepancy, signatures
+from discover.closed_loop.explanations.bands.growth import growth
+from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.discrepancy import discrepancy, signatures
-from discover.closed_loop.explanations.growth import growth
-from discover.closed_loop.explanations.widening import widening
 from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians

@@ -1,0 +1,1 @@
+"""How far predictions and constants are known, over all explanations."""

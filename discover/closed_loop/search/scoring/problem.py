@@ -1,0 +1,89 @@
+"""A model with all candidates, the runs that it is fitted to, and what its fits are worth."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.search.scoring.evidence import criterion, evidence
+from discover.effects import AbstractEffect
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
+from discover.statistics.residual import judged_cost, summarise
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """What is fitted, to what.
+
+    Attributes
+    ----------
+    model
+        The declared model with all candidates.
+    batch
+        The fitted runs.
+    n_candidates
+        Number of candidates, the price of choosing among which every effect must pay.
+    prior
+        What is known of some parameters.
+    """
+
+    model: AugmentedModel
+    batch: Batch
+    n_candidates: int = 1
+    prior: Prior = NO_PRIOR
+
+    @property
+    def weight(self) -> Float[np.ndarray, "runs n"]:
+        """Weights of the runs, zero at padding."""
+        return np.asarray(self.batch.weight)
+
+    def fits(
+        self, starts: Sequence[np.ndarray], free: Sequence[Sequence[int]], **how: float | bool
+    ) -> list[Fit]:
+        """Return a fit from each start in its own free parameters; options as of `fit_batch`."""
+        return fit_batch(self.model, self.batch, starts, free, prior=self.prior, **how)  # pyright: ignore
+
+    def fit(self, start: np.ndarray, free: Sequence[int]) -> Fit:
+        """Return the fit from one start."""
+        return self.fits([start], [free])[0]
+
+    def best_fit(
+        self, starts: Sequence[np.ndarray], free: Sequence[int], rivals: bool = False
+    ) -> Fit:
+        """Return the best of the fits from several starts; one that is not usable if all are so."""
+        fits = self.fits(starts, [free] * len(starts), rivals=rivals)
+        usable = (fit for fit in fits if fit.usable)
+        return min(usable, key=lambda fit: fit.cost, default=fits[0])
+
+    def without(self, fit: Fit, *effects: str) -> tuple[np.ndarray, tuple[int, ...]]:
+        """Return a fit's parameters with effects at zero, and those still free without them."""
+        model = self.model
+        own = [p for name in effects for p in (*model.positions(name), *model.varying(name))]
+        theta = fit.theta.copy()
+        theta[own] = model.zero()[own]
+        return theta, tuple(p for p in fit.free if p not in own)
+
+    def independent_samples(self, fit: Fit) -> float:
+        """Return how many independent samples what a fit leaves is worth."""
+        return summarise(fit.residual, self.weight).effective_samples
+
+    def cost(self, fit: Fit) -> float:
+        """Return the sum over the runs that judge of the squared relative errors."""
+        return judged_cost(fit.residual, self.weight)
+
+    def evidence(self, before: Fit, after: Fit, effective: float, n_effects: int = 1) -> float:
+        """Return the evidence for what one fit has more than another; see `evidence`."""
+        return evidence(before, after, self.weight, effective, self.n_candidates, n_effects)
+
+    def criterion(
+        self, cost: float, free: Sequence[int], effects: Sequence[str], effective: float
+    ) -> float:
+        """Return the information criterion of a fit with some effects; see `criterion`."""
+        return criterion(cost, len(free), len(effects), effective, self.n_candidates)
+
+
+def effect_of(model: AugmentedModel, name: str) -> AbstractEffect:
+    """Return the effect of a name among the candidates of a model."""
+    return next(effect for effect in model.effects if effect.name == name)
