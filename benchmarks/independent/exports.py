@@ -204,7 +204,7 @@ def _rheowin() -> Export:
         _lines(10.0 * np.arange(1, 12), RATES, 3.0 * RATES, np.full(11, 25.0), mark=";"),
         start=1)]  # fmt: skip
     holds = _run("rheowin-1.csv", {}, time_s=TIMES, stress_Pa=START) | _CURVE
-    shape = 'RheoWin: segments "1|1"'
+    shape = "RheoWin: segment and row in the first column"
     return Export(shape, "rheowin.csv", "\n".join(rows), holds, encoding="cp1252")
 
 
@@ -268,4 +268,5 @@ def _two_header_rows() -> Export:
     a, b = moduli(OMEGA)
     columns = OMEGA / (2.0 * np.pi), np.hypot(a, b) / OMEGA, np.degrees(np.arctan2(b, a))
     rows += _lines(*columns, mark=",")
-    return Export("Units in a second row; |η*| and δ", "angle.csv", "\n".join(rows), _SWEEP)
+    shape = "Units in a second row; complex viscosity and δ"
+    return Export(shape, "angle.csv", "\n".join(rows), _SWEEP)
