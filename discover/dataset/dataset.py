@@ -7,6 +7,7 @@ from typing import Any, overload
 import numpy as np
 import pandas as pd
 
+from discover.dataset.checking.normal_stress import impossible_normal_stress
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
@@ -231,14 +232,18 @@ class Dataset(NotebookView):
     def quantity_by_quantity(self) -> "Dataset":
         """Return the data with N1 and N2, where recorded, as records of their own beside σ12.
 
-        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run.
+        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run. One
+        that no fluid can have is set aside, and is neither fitted nor judges.
         """
+        reasons = impossible_normal_stress(self.runs, self.linear_sweep)
+        aside = {f"{name} (N1)": why for name, why in reasons.items()}
         runs = [
             seen
             for run in self.runs
             for seen in (run, *(run.observing(name) for name in run.beside))
+            if seen.name not in aside
         ]
-        return replace(self, runs=tuple(runs))
+        return replace(self, runs=tuple(runs), set_aside={**self.set_aside, **aside})
 
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.forward.modified_newton import (
+    FROM_REST,
     Approximation,
     first_approximation,
     goes_on,
@@ -105,13 +106,15 @@ def periodic_start(
         change = jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0)
         return _Iterate(modes, levels, change)
 
-    stress, levels = rest
-    start = _Iterate(first_approximation(stress), levels, jnp.asarray(jnp.inf))
+    # the cycles from rest need no derivative
+    begun = jax.lax.fori_loop(0, FROM_REST, lambda _, state: after_cycle(*state), rest)
+    start = _Iterate(first_approximation(begun[0], FROM_REST), begun[1], jnp.asarray(jnp.inf))
     end = jax.lax.while_loop(
         lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
         improved,
         start,
     )
     found = jnp.where(end.change < _TOLERANCE, end.modes.stress, jnp.nan)
+    stress, levels = rest
     levels = tuple(jnp.where(is_periodic, a, b) for a, b in zip(end.levels, levels, strict=True))
     return jnp.where(is_periodic, found, stress), levels

@@ -23,6 +23,9 @@ from discover.simulate.exponential_runge_kutta import relax
 # is seen: Newton's error goes as its square
 _MOST, _TOLERANCE = 60, 1e-8
 
+# The same of modes alone, where one more step follows, whose derivative errs by as much
+_STEP = 1e-6
+
 # Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
 _SHARE, _SECANT = 10.0, (0.2, 5.0)
 
@@ -106,6 +109,15 @@ def complex_modulus(
         found, jacobian = _end_with_derivative(half, now.modes.stress, now.levels, now.felt)
         # what changed beside the modes since may cost its share
         modes, better = next_approximation(now.modes, found.stress, jacobian, _SHARE * now.moved)
+        return moved_to(now, found, modes, better)
+
+    def followed(_, now: _Iterate) -> _Iterate:
+        """Return where half a cycle ends: those from rest need no derivative."""
+        found = half(now.modes.stress, now.levels, now.felt)
+        modes = first_approximation(found.stress, FROM_REST)
+        return moved_to(now, found, modes, jnp.asarray(True))
+
+    def moved_to(now: _Iterate, found: _Half, modes: Approximation, better) -> _Iterate:
         levels = tuple(
             # what a cycle adds and leaves decides where a level comes to rest
             (after - left * before) / (1.0 - left)
@@ -154,7 +166,7 @@ def complex_modulus(
     end = jax.lax.while_loop(
         lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
         improved,
-        start,
+        jax.lax.fori_loop(0, FROM_REST, followed, start),
     )
     whole = modulus(half(end.modes.stress, end.levels, end.felt), end.felt)
     found = whole / taken(whole)
@@ -233,15 +245,15 @@ def periodic_state(
         )(units)
         jacobian = jnp.moveaxis(ends, 2, 0)
         following, better = next_approximation(now.modes, end, jacobian)
-        change = relative_change(now.modes, following, slowness, _TOLERANCE)
+        change = relative_change(now.modes, following, slowness, _STEP)
         change = jnp.where(jnp.all(better), change, jnp.inf)
         return _Solving(following, change, jacobian, harmonics)
 
     def hopeful(now: _Solving):
-        further = goes_on(now.modes, now.change, _MOST, _TOLERANCE)
+        further = goes_on(now.modes, now.change, _MOST, _STEP)
         if together is None:
             return further
-        given_up = ~further & ~(now.change < _TOLERANCE)
+        given_up = ~further & ~(now.change < _STEP)
         return further & (jax.lax.pmax(given_up.astype(int), together) == 0)
 
     size, modes = fixed.rest()[0].shape
@@ -266,7 +278,7 @@ def periodic_state(
     step = jnp.linalg.solve(matrix, (found.stress - end.modes.stress).T[:, :, None])[:, :, 0].T
     recorded = found.wave + dynamics.viscosity * strain * wave[::2]
     whole = first_harmonic(recorded, phase[::2]) + jnp.sum(end.harmonics * step)
-    whole = jnp.where(end.change < _TOLERANCE, whole / strain, jnp.nan)
+    whole = jnp.where(end.change < _STEP, whole / strain, jnp.nan)
     return PeriodicState(end.modes.stress + step, whole)
 
 

@@ -11,14 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from discover.protocols.kinematics import MODULI, RecordedQuantity
+from discover.protocols.kinematics import MODULI, STATES, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
 
 # Of its strain, what an oscillation keeps that is to be still: without any it has no modulus
 _SMALL_STRAIN = 1e-3
 
-# Numbers of periodic states are rounded up to multiples of this
+# Numbers of steady and periodic states are rounded up to multiples of this
 _STATES = 8
 
 # What no sum of stresses is
@@ -86,7 +86,7 @@ class FlowBatch(eqx.Module):
         for part, shown in zip(self.parts, self.shown, strict=True):
             if told is not None:
                 part = _after(told, part)
-            of_flows = jax.vmap(function)(*part)
+            of_flows = _of_flows(function, part)
             told = jax.tree.leaves(of_flows)[0]
             found.append(jax.tree.map(partial(_of_runs, shown), of_flows))
         if len(found) == 1:
@@ -99,8 +99,9 @@ class FlowBatch(eqx.Module):
         parts = []
         for protocols, grids in self.parts:
             times = np.asarray(grids.times)
-            # those of oscillations are states, each of which costs many steps
-            more = -times.shape[1] % (multiple if grids.phase is None else min(multiple, _STATES))
+            # a state costs many steps
+            few = min(multiple, _STATES) if protocols.control in STATES else multiple
+            more = -times.shape[1] % few
             spacing = (times[:, -1] - times[:, -2])[:, None] if times.shape[1] > 1 else 1.0
             added = times[:, -1:] + spacing * np.arange(1, more + 1)
             longer = jnp.asarray(np.concatenate([times, added], axis=1))
@@ -151,6 +152,15 @@ class FlowBatch(eqx.Module):
         (part,), (shown,) = self.parts, self.shown
         chosen = jax.tree.map(lambda leaf: jax.lax.dynamic_slice_in_dim(leaf, first, count), part)
         return FlowBatch((chosen,), (shown[:count],))
+
+
+def _of_flows(function: Callable[..., Any], part: tuple[FlowProtocol, IntegrationGrid]) -> Any:
+    """Return what a function makes of each flow, with a leading axis."""
+    if len(part[1].sample_index) > 1:
+        return jax.vmap(function)(*part)
+    # where one flow is by itself a choice in it takes one branch, and not both
+    alone = jax.tree.map(lambda leaf: leaf[0], part)
+    return jax.tree.map(lambda leaf: leaf[None], function(*alone))
 
 
 def _of_runs(shown: tuple[Shown, ...], of_flows: Array) -> Array:

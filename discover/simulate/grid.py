@@ -1,8 +1,10 @@
 """Fixed time grids, made once on the host, so that every run of a batch shares one compilation."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -67,6 +69,20 @@ class IntegrationGrid(eqx.Module):
     def sample_times(self) -> Float[Array, "*batch n"]:
         """Times of the samples in s; of steady and periodic states they count them."""
         return self.times[self.sample_index]
+
+    def of_states(self, solve: Callable[[Float[Array, ""]], Any]) -> Any:
+        """Return what is found of each steady state, at the samples of one grid.
+
+        States are few where samples are padded to those of a long record beside them: each is
+        solved for once, and none for padding.
+
+        Parameters
+        ----------
+        solve
+            From the number of a state to a tree of arrays.
+        """
+        found = jax.vmap(solve)(self.times)
+        return jax.tree.map(lambda leaf: leaf[self.sample_index], found)
 
 
 def make_grid(

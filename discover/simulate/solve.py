@@ -262,7 +262,7 @@ def _in_steady_flow(fluid, protocol, grid, observe):
         state = steady_state(fluid, protocol.velocity_gradient(time))
         return state if observe is None else observe(time, state, (fluid, protocol))
 
-    return jax.vmap(at)(grid.sample_times)
+    return grid.of_states(at)
 
 
 @compiled

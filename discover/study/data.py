@@ -150,9 +150,10 @@ def _observed(
     whole = dataset.quantity_by_quantity()
     missing = set(observe) - {run.quantity for run in whole}
     if missing:
+        left = f" {whole.left_out}" if whole.left_out else ""
         raise InputError(
             f"[data] observe names {sorted(missing)[0]}, which no run of {dataset.name!r} has. "
-            f"Write some of {', '.join(sorted({run.quantity for run in whole}))}."
+            f"Write some of {', '.join(sorted({run.quantity for run in whole}))}.{left}"
         )
     wanted = dataset.names if fit is None else fit
     by_name = {run.name: [] for run in dataset}

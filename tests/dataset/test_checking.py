@@ -7,7 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
-from discover.dataset import check_folder
+from discover.dataset import check_folder, load_dataset
+from discover.errors import InputError
+from discover.study import parse_study
+from discover.study.data import load_study_data
 
 MODULUS, RELAXATION_TIME = 100.0, 2.0
 TIMES = np.concatenate([[0.0], np.geomspace(2e-3, 20.0, 120)])
@@ -171,6 +174,45 @@ def test_a_large_normal_force_on_a_slow_run_is_held_against_second_order(folder)
     findings = check_folder(folder(bad))
     # 2 G λ² γ̇² = 2 · 100 · 4 · 0.0025 = 2 Pa
     assert any("between 0 and 2 Pa" in f.text for f in findings)
+
+
+def thinning(rate):
+    """A start-up whose steady stress is |G*| at the rate, with N1 over Laun's rule as given."""
+    x = rate * RELAXATION_TIME
+    storage, loss = MODULUS * x**2 / (1 + x**2), MODULUS * x / (1 + x**2)
+    rise = -np.expm1(-TIMES * max(rate, 1.0))
+    return (
+        {
+            "time_s": TIMES,
+            "shear_rate_1_s": np.full(len(TIMES), rate),
+            "stress_Pa": np.hypot(storage, loss) * rise,
+        },
+        2 * storage * (1 + (storage / loss) ** 2) ** 0.7 * rise**3,
+    )
+
+
+@pytest.mark.parametrize(("factor", "doubted"), [(1.0, False), (0.6, False), (0.1, True)])
+def test_a_steady_normal_stress_is_held_against_laun_where_cox_and_merz_hold(
+    folder, factor, doubted
+):
+    run, normal = thinning(2.0)
+    findings = check_folder(folder({**run, "N1_Pa": factor * normal}))
+    assert any("Laun's rule" in f.text for f in findings) is doubted
+
+
+def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):
+    sound, bad = start_up(0.05), with_column(start_up(0.1), N1_Pa=np.full(len(TIMES), 50.0))
+    path = folder(sound, bad)
+    seen = load_dataset(path).quantity_by_quantity()
+    assert seen.names == ("r0.csv", "r0.csv (N1)", "r1.csv")
+    assert "r1.csv (N1) is set aside: it cannot be right early" in seen.left_out
+    told = {"folder": str(path), "observe": ["sigma12", "N1"]}
+    study = load_study_data(parse_study({"data": told}))
+    assert study.fit.names == seen.names
+    # the control: where that is all there is, it is said why there is none
+    told = {"folder": str(folder(bad)), "observe": ["N1"]}
+    with pytest.raises(InputError, match="cannot be right early"):
+        load_study_data(parse_study({"data": told}))
 
 
 def test_runs_that_are_all_linear_teach_nothing(folder):

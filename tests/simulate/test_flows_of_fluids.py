@@ -11,10 +11,15 @@ from independent.imposed_stress import strain_at
 from independent.sweeps import modulus_of
 
 from discover.errors import InputError
-from discover.forward.fluids import observe, observed_on_grid
+from discover.forward.fluids import (
+    dynamics_of_fluid,
+    observe,
+    observed_on_grid,
+    solved_on_grid,
+)
 from discover.laws.giesekus import Giesekus
 from discover.laws.multimode import Fluid
-from discover.protocols import imposed_stress, oscillations, start_up
+from discover.protocols import imposed_stress, oscillations, start_up, steady_rates
 from discover.protocols.protocol import recording
 from discover.simulate import SimulationError, lay_out, simulate
 
@@ -62,6 +67,40 @@ def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own():
         alone = observe(fluid(), protocol, COUNTED[: int(mask.sum())])[:, 0]
         # both end where Newton's next step would change 1e-8
         np.testing.assert_allclose(one[mask], alone, rtol=1e-7)
+
+
+def swept(law, strains, together):
+    """Return the moduli of a sweep, given up as a whole or state by state."""
+    n = len(strains)
+    protocol = oscillations(np.asarray(strains), np.full(n, FREQUENCY))
+    ((flows, grids),) = lay_out([protocol], [np.arange(1.0, n + 1.0)]).parts
+    flow, grid = jax.tree.map(lambda leaf: leaf[0], (flows, grids))
+    make = partial(dynamics_of_fluid, protocol=flow)
+    return np.asarray(solved_on_grid(make, law, flow, grid, together).observed[:, 0])
+
+
+def test_once_one_strain_has_no_periodic_state_no_other_of_a_sweep_is_solved_for():
+    # a trial law that drives itself: periodic up to a strain of 0.437, where it takes many steps
+    runaway, strains = Fluid(Giesekus(-1.2), MODULUS, TIME, SOLVENT), (0.1, 0.435, 10.0)
+    alone = swept(runaway, strains, together=False)
+    np.testing.assert_array_equal(np.isfinite(alone), [True, True, False])
+    given_up = swept(runaway, strains, together=True)
+    # the first was found before the last was given up
+    np.testing.assert_array_equal(np.isfinite(given_up), [True, False, False])
+    # the control: without the last strain the other two are found, in longer steps
+    both = swept(runaway, strains[:2], together=True)
+    np.testing.assert_allclose(both, alone[:2], rtol=1e-4)
+
+
+def test_steady_states_are_solved_for_once_each_however_many_samples_stand_beside_them():
+    rates, times = np.geomspace(0.1, 10.0, 5), np.linspace(0.01, 3.0, 200)
+    curve, counted = steady_rates(rates), np.arange(1.0, 6.0)
+    flows = lay_out([curve, start_up(1.0)], [counted, times]).with_steps_in(256)
+    number = {protocols.control: grids.times.size for protocols, grids in flows.parts}
+    assert number["steady"] == 8  # five, rounded up
+    found, _ = flows.over(partial(observed_on_grid, fluid()))
+    np.testing.assert_allclose(found[:5], observe(fluid(), curve, counted), rtol=1e-12)
+    np.testing.assert_array_equal(found[5:], np.broadcast_to(found[4], found[5:].shape))
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from discover.dataset.checking.among_runs import doubts_among_runs, doubts_of_te
 from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
+from discover.dataset.checking.normal_stress import doubts_of_normal_stress
 from discover.dataset.checking.one_run import doubts_of_run
 from discover.dataset.checking.start import doubts_of_start, doubts_of_unseen_start
 from discover.dataset.kind_of_test import reason_to_set_aside
@@ -119,6 +120,7 @@ def check_folder(
         if not doubts and spectrum is None:
             doubts = doubts_of_unseen_start(run)
         findings += doubts
+        findings += doubts_of_normal_stress(run, sweep, spectrum)
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
     if clock_factor is None and not _shift_columns(index):

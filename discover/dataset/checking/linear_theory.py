@@ -39,8 +39,6 @@ _FEWEST_FOR_INERTIA = 6
 # A sweep that modes describe better than this is as good as sweeps are
 _VISIBLE_MISFIT = 0.02
 _STRONG_EVIDENCE = 6.0
-# Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number
-_SLOW = 0.3
 
 
 def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterator[Finding]:
@@ -113,7 +111,6 @@ def against_linear_theory(
     fastest = max((np.max(np.abs(run.rate)) for run in runs), default=0.0)
     runs = [run for run in runs if run.flow == "shear" and run.from_rest]
     start_ups = [run for run in runs if _is_start_up(run)]
-    yield from _second_order(start_ups, spectrum)
     if sweep is None or spectrum is None:
         return
     # mean relaxation time, weighted by what each mode adds to the viscosity
@@ -297,28 +294,3 @@ def _cox_merz(run: Run, sweep: LinearSweep, mean_time: float) -> Iterator[Findin
             f"{SWEEP_FILE} at the same rate (Cox–Merz rule). Slip, edge fracture, units or "
             "another sample do that; so do structured fluids.",
         )
-
-
-def _second_order(
-    start_ups: Sequence[Run], spectrum: RelaxationSpectrum | None
-) -> Iterator[Finding]:
-    """Hold the last N1 of slow runs against N1 = 2 γ̇² Σ G_k λ_k²   [Coleman & Markovitz 1964]."""
-    if spectrum is None:
-        return
-    moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
-    mean_time = moment / spectrum.zero_shear_viscosity
-    for run in start_ups:
-        normal, rate = run.first_normal_stress_difference, abs(run.rate[0])
-        if normal is None or rate * mean_time > _SLOW:
-            continue
-        last = float(np.median(normal[-max(3, len(run) // 10) :]))
-        most = 2.0 * moment * rate**2
-        if last > 3.0 * most or last < 0:
-            yield Finding(
-                "warning",
-                "N1",
-                run.name,
-                f"N1 in {run.name} ends at {last:.3g} Pa; at this slow rate {SWEEP_FILE} foretells "
-                f"a value between 0 and {most:.3g} Pa, quadratic in the rate. The normal force is "
-                "below what the transducer resolves, or has a baseline.",
-            )

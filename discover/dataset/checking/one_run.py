@@ -21,11 +21,6 @@ _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 
-# Elastic limit: N1 = σ12 γ where all modes are still elastic, less later. Beyond this factor of it,
-# or below zero by as much, the transducer speaks, not the fluid
-_NORMAL_STRESS_FACTOR = 2.0
-_SMALL_STRAIN = 0.5
-
 
 def doubts_of_run(run: Run) -> Iterator[Finding]:
     """Yield what is doubtful about a run.
@@ -76,7 +71,6 @@ def doubts_of_run(run: Run) -> Iterator[Finding]:
     if np.ptp(run.rate) <= 1e-6 * np.max(np.abs(run.rate)):
         if run.from_rest and np.any(run.rate):
             yield from _start_up(run)
-            yield from _normal_stress(run)
     else:
         yield from _cycles(run)
 
@@ -249,40 +243,4 @@ def _work(run: Run) -> Iterator[Finding]:
             f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
             "exchange, and a fluid at rest before has none to return: the stress or the rate has "
             "the wrong sign, or one lags the other.",
-        )
-
-
-def _normal_stress(run: Run) -> Iterator[Finding]:
-    """Hold N1 against what elasticity allows in start-up from rest: 0 ≤ N1 ≤ σ12 γ, about.
-
-    With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
-    only lowers it.
-    """
-    normal = run.first_normal_stress_difference
-    if normal is None:
-        return
-    rate = abs(run.rate[0])
-    strain = rate * run.time
-    limit = np.abs(run.stress) * strain
-    small = strain < _SMALL_STRAIN
-    bad = (normal > _NORMAL_STRESS_FACTOR * limit) | (normal < -0.5 * limit)
-    if np.sum(small) >= 5 and np.mean(bad[small]) > 0.3:
-        until = run.time[np.flatnonzero(bad & small)[-1]]
-        yield Finding(
-            "warning",
-            "N1",
-            run.name,
-            f"N1 in {run.name} cannot be right early: {100 * np.mean(bad[small]):.0f} % of its "
-            f"samples below strain {_SMALL_STRAIN:g} (the last at {until:.4g} s) are negative or "
-            f"above {_NORMAL_STRESS_FACTOR:g} times stress × strain, the elastic limit. Do not "
-            "judge a law by them.",
-        )
-    late = normal[-max(3, len(run) // 10) :]
-    if np.median(late) < 0 and strain[-1] > _SMALL_STRAIN:
-        yield Finding(
-            "warning",
-            "N1",
-            run.name,
-            f"N1 in {run.name} ends negative ({np.median(late):.3g} Pa). Few fluids do that; "
-            "check its sign and the baseline of the normal force.",
         )

@@ -143,7 +143,7 @@ def states_and_jacobian(
             by_weight, state = jax.jacrev(recorded, has_aux=True)(weights)
             return state, by_weight
 
-        return jax.vmap(at)(grid.sample_times)
+        return grid.of_states(at)
 
     def solved_run(protocol, grid):
         law = with_cheap_tangents(lambda made, w, *flow: made(w).stress_rate(*flow), rebuild)

@@ -164,7 +164,7 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
         columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
         return jnp.concatenate([value[:, None], *columns], axis=1)
 
-    return jax.vmap(at)(grid.sample_times)
+    return grid.of_states(at)
 
 
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
@@ -230,11 +230,11 @@ def predict_many(
 
     def run(problem, coefficients, inner, protocol, grid):
         if protocol.control == "steady":
-            return jax.vmap(
+            return grid.of_states(
                 lambda time: _observed_in_steady_flow(
                     problem, active, protocol, time, coefficients, inner
                 )
-            )(grid.sample_times)
+            )
         if protocol.control not in FOLLOWED:
             numbers = coefficients, inner
             return _observed_where_solved(problem, active, numbers, protocol, grid)

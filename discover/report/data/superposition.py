@@ -40,8 +40,8 @@ def superposition_words(
     said = [_verdict(found, kind) for kind in found.leading]
     if found.verdict == "not_superposed":
         return said
-    others = [kind for kind in found.tests if kind not in found.leading]
-    said += [_verdict(found, kind, led=True) for kind in others if found.misfits(kind)]
+    led = [kind for kind in found.tests if kind not in found.leading]
+    said += [_verdict(found, kind) for kind in led if found.misfits(kind)]
     said += [_own_words(found, one, kind) for kind, one in (own or {}).items()]
     open_ = [
         f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
@@ -59,7 +59,7 @@ def superposition_words(
     return [*said, *(_law_words(law, found) for law in found.laws)]
 
 
-def _verdict(found: Superposition, kind: str, led: bool = False) -> str:
+def _verdict(found: Superposition, kind: str) -> str:
     misfits = found.misfits(kind)
     if not misfits:  # shifts that nothing determines may leave no overlap
         return (
@@ -68,7 +68,8 @@ def _verdict(found: Superposition, kind: str, led: bool = False) -> str:
         )
     (cold, warm), size = max(misfits.items(), key=lambda item: item[1])
     worst, where = percent(size), f"{cold:g} and {warm:g} °C"
-    moved = f" with the shifts of the {_PLURALS[found.leading[0]]}" if led else ""
+    own = kind in found.leading
+    moved = "" if own else f" with the shifts of the {_PLURALS[found.leading[0]]}"
     what = _PLURALS[kind]
     verdict = found.verdict_of(kind)
     if verdict == "superposed":
