@@ -377,7 +377,9 @@ class Program:
             return None
 
         def slip(stress):
-            found = sum(e.slip_at(self._values(theta, e), stress) for e in elements)
+            found = jnp.zeros(())
+            for element in elements:
+                found = found + element.slip_at(self._values(theta, element), stress)
             return _where_in_shear(flow, found, jnp.zeros(()))
 
         return slip

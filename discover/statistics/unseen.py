@@ -63,11 +63,11 @@ class Unseen:
             What a complete model may leave.
         """
         outliers = what_is_left(self.residuals, self.records, expectation).outlier_samples
-        parts = (
+        residuals, records, columns = (
             [np.delete(row, list(off), axis=-1) for row, off in zip(part, outliers, strict=True)]
             for part in (self.residuals, self.records, self.columns)
         )
-        return Unseen(*parts, self.correlation)
+        return Unseen(residuals, records, columns, self.correlation)
 
     @property
     def error(self) -> float:
