@@ -48,7 +48,7 @@ def hold_against_unseen(
         if flow.kind == "held_out" and not flow.is_truth and "sigma12" in flow.reference
     ]
     if not unseen:
-        return explanation
+        return _held_against_folds(explanation, outcomes)
     found, outliers = dict(explanation.lack_of_fit), {}
     for name in explanation.by:
         outliers[name] = _outliers(outcomes[name], unseen, expectation)
@@ -59,6 +59,31 @@ def hold_against_unseen(
         if reason:
             found[name] = found[name].refuted(reason)
     return replace(explanation, lack_of_fit=found, outliers=outliers)
+
+
+def _held_against_folds(
+    explanation: Explanation, outcomes: Mapping[str, LearnerOutcome]
+) -> Explanation:
+    """Return what is not refuted by runs that a fit leaves out in turn, where none is held out.
+
+    Terms that together follow a few runs by chance miss most of the runs left out by far more than
+    noise. One that is missed may be the only one that tells a constant.
+    """
+    found = dict(explanation.lack_of_fit)
+    for name in explanation.by:
+        details, left = outcomes[name].details, found[name]
+        if not outcomes[name].terms or details.get("chosen") is None:
+            continue
+        by_run = details["path"][details["chosen"]].get("held_out_by_run") or {}
+        errors = np.array([error for error in by_run.values() if error is not None])
+        limit = CARRIED * max(left.misfit, left.expected, ARITHMETIC)
+        if len(errors) > 1 and np.mean(errors > limit) > 0.5:
+            found[name] = left.refuted(
+                f"most runs are missed by more than {percent_of(limit)} where they are left out of "
+                f"the fit, {percent_of(float(np.max(errors)))} at worst; all runs together by "
+                f"{percent_of(left.misfit)}"
+            )
+    return replace(explanation, lack_of_fit=found)
 
 
 def _outliers(
