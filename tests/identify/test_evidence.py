@@ -115,7 +115,7 @@ def test_the_rule_keeps_ties_and_drops_what_the_data_rule_out(monkeypatch):
     from discover.learners.tensor_sindy.refit import Fit
     from tensor_library import build_library
 
-    monkeypatch.setattr(fitted_rivals, "_polish", lambda search, fits: fits)
+    monkeypatch.setattr(fitted_rivals, "_polish", lambda search, fits, chosen: fits)
     shape = (2, N // 2, 3)
     weight = np.zeros(shape)
     weight[..., 0] = 1.0 / np.sqrt(N)
