@@ -94,7 +94,7 @@ def compare(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
         "verdict": str(found.verdict.verdict),
         "undetermined": found.undetermined,
         "terms": {
-            name: [term.name for term in outcome.terms] for name, outcome in found.outcomes.items()
+            name: [term.term for term in outcome.terms] for name, outcome in found.outcomes.items()
         },
         "bands": bands,
     }

@@ -104,6 +104,7 @@ class FakeSearch(SupportSearch):
     floor: float = 1e-5
     n_terms: int = 8
     slots: int = 5
+    _far: set = field(default_factory=set)
     scale: np.ndarray = field(default_factory=lambda: np.ones(8))
 
     def complexity(self, support):
