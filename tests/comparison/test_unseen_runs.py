@@ -7,12 +7,14 @@ import pytest
 from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
-from discover.comparison.judging.explanation import explain
+from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
+from discover.learners.recovered_term import RecoveredTerm
 from discover.protocols import start_up as protocol
+from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import Expectation
 
 TIMES = np.geomspace(0.05, 10.0, 80)
@@ -95,3 +97,36 @@ def test_a_law_that_runs_away_in_a_run_held_out_is_refuted(drawn):
 def test_flows_of_which_the_truth_is_computed_do_not_judge(drawn):
     other = stress(RoliePoly(1.0, 0.1, 100.0), RATES["held"])
     assert judged(drawn, other, exact=True).verdict == "explained"
+
+
+def explained_by_folds(errors, terms=(RecoveredTerm("sigma.sigma", 0.3),)):
+    """Return whether a law that leaves 1 % explains runs that miss by this where left out."""
+    left = LackOfFit("explained", 0.01, 0.01, 0.0, 0.5)
+    path = [{"held_out_by_run": dict(enumerate(errors))}]
+    details = {"chosen": 0, "path": path}
+    outcome = LearnerOutcome("tensor_sindy", terms, 1.0, EMPTY, details=details)
+    told = hold_against_unseen(
+        Explanation({"tensor_sindy": left}), {"tensor_sindy": outcome}, [], {}, Expectation()
+    )
+    return told.verdict == "explained"
+
+
+@pytest.mark.parametrize(
+    ("errors", "holds"),
+    [
+        ([0.011, 0.012, 0.009], True),
+        # a run that alone tells a constant is missed without it, whatever the law
+        ([0.011, 0.5], True),
+        ([0.011, 0.012, 0.5], True),
+        ([0.011, 0.2, 0.5], False),
+        # the law runs away
+        ([0.011, None, float("nan")], False),
+        ([0.5], True),
+    ],
+)
+def test_a_law_that_misses_most_runs_where_they_are_left_out_explains_nothing(errors, holds):
+    assert explained_by_folds(errors) == holds
+
+
+def test_a_law_without_a_term_has_nothing_that_runs_left_out_speak_against():
+    assert explained_by_folds([0.5, 0.5, 0.5], terms=())
