@@ -20,6 +20,7 @@ from discover.statistics.residual import Expectation
 TIMES = np.geomspace(0.05, 10.0, 80)
 RATES = {"slow": 0.5, "fast": 2.0, "held": 4.0}
 EMPTY = (np.zeros(0), np.zeros(0))
+ONE_TERM = (RecoveredTerm("sigma.sigma", 0.3),)
 ALPHAS = 0.3 + 1e-3 * np.random.default_rng(0).standard_normal(20)
 
 
@@ -99,7 +100,7 @@ def test_flows_of_which_the_truth_is_computed_do_not_judge(drawn):
     assert judged(drawn, other, exact=True).verdict == "explained"
 
 
-def explained_by_folds(errors, terms=(RecoveredTerm("sigma.sigma", 0.3),)):
+def explained_by_folds(errors, terms=ONE_TERM):
     """Return whether a law that leaves 1 % explains runs that miss by this where left out."""
     left = LackOfFit("explained", 0.01, 0.01, 0.0, 0.5)
     path = [{"held_out_by_run": dict(enumerate(errors))}]
