@@ -68,6 +68,10 @@ def loop_table(cases: Cases) -> str:
     for number in (1, 2):
         some = [r for r, c in zip(right, planted, strict=True) if len(c["effects"]) == number]
         lines.append(f"  {number} at a time: {share(sum(some), len(some))}")
+    for what in ("protocol", "noise"):
+        for kind in sorted({c[what] for c in planted}):
+            some = [r for r, c in zip(right, planted, strict=True) if c[what] == kind]
+            lines.append(f"  {what} {kind}: {share(sum(some), len(some))}")
     beside = sum(bool(_beside(c)) for c in planted)
     lines.append(f"a name beside it, 50 % or more: {share(beside, len(planted))}")
     named = sum(c["verdict"] == "effects_added" for c in clean)
