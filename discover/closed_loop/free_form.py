@@ -246,6 +246,8 @@ def _held_out_error(search: Search, trial: _Trial, batch: Batch | None, runs) ->
         return None
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     residual = search.model.residuals([trial.theta], batch)[0]
+    if not np.all(np.isfinite(residual)):
+        return np.inf  # the law beside the curve runs away
     seen = weight > 0
     predicted = np.where(seen, residual / np.where(seen, weight, 1.0) + recorded, 0.0)
     variable = _variable(trial.slot, runs, batch, predicted)

@@ -166,6 +166,8 @@ def _error_of(model: AugmentedModel, fit: Fit, batch: Batch | None) -> float | N
     if batch is None:
         return None
     left = model.residuals([fit.theta], batch)[0]
+    if not np.all(np.isfinite(left)):
+        return np.inf  # the model runs away
     return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))
 
 

@@ -306,7 +306,8 @@ def _most_probable(forms: Sequence[FreeForm]) -> tuple[FreeForm, ...]:
 
 def _predicts_worse(error: ErrorPair, than: ErrorPair) -> bool:
     """Return whether runs that no fit saw speak against what explains those that were fitted."""
-    return (error.held_out or 0.0) > (than.held_out or np.inf)
+    missed = error.held_out or 0.0
+    return not np.isfinite(missed) or missed > (than.held_out or np.inf)
 
 
 def _with_refusals(judgement: Judgement, search: Search) -> str:
