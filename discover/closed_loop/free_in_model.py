@@ -152,6 +152,7 @@ def _start(
     # what is declared stands first, in both models
     own = min(at.start for at in search.model.slices.values())
     theta[:own] = known[:own]
+    theta[model.instants] = known[search.model.instants]
     free = list(model.free_positions)
     for name in beside:
         theta[model.slices[name]] = known[search.model.slices[name]]

@@ -21,6 +21,7 @@ from discover.forward import (
     make_batch,
 )
 from discover.forward.least_squares import Fit, fit_batch
+from discover.forward.step_instants import with_own_instants
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise
@@ -155,6 +156,7 @@ def with_law(
         linear_error=declared.linear_error,
         modulus_covariance=declared.modulus_covariance,
         effects=declared.effects,
+        step_instants=declared.step_instants,
     )
 
 
@@ -176,5 +178,6 @@ def _errors(model, fit: Fit, fitted: Sequence[Run], held_out: Sequence[Run]) -> 
     with np.errstate(over="ignore", invalid="ignore"):
         for runs, held in ((fitted, False), (held_out, True)):
             if runs:
-                records += record_runs(model, make_batch(runs), runs, [fit.theta], held_out=held)
+                own = with_own_instants(model, fit.theta, runs) if held else runs
+                records += record_runs(model, make_batch(own), own, [fit.theta], held_out=held)
         return errors_of(records, 0)

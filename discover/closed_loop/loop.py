@@ -18,6 +18,7 @@ from discover.closed_loop.explanations import (
     explain,
     next_tests,
     over_explanations,
+    turn_to_likelier,
     with_band,
 )
 from discover.closed_loop.explanations.limits import names_of_limits
@@ -64,7 +65,11 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
+from discover.forward.step_instants import instants_found, with_own_instants, with_places
 from discover.statistics.residual import Expectation, summarise
+
+_TURNS = 2
+"""How often a search goes on from an explanation that is far likelier than its own."""
 
 
 def run_loop(
@@ -140,6 +145,7 @@ def run_loop(
     candidates = candidates_of(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
+    declared, fitted_runs, held_runs = with_places(declared, fitted_runs, held_runs)
     require_samples(fitted_runs, declared)
     known = {effect.name for effect in declared.effects}
     require_present(declared, {*known, *(effect.name for effect in candidates)})
@@ -180,8 +186,17 @@ def run_loop(
     if not silent:
         search.run(max_effects, say)
         carried = carry(search, max_effects, explanations, say)
+        for _ in range(_TURNS):
+            if not turn_to_likelier(search, carried):
+                break
+            say(f"going on from a likelier explanation: {', '.join(search.active)}")
+            search.run(max_effects, say)
+            carried = carry(search, max_effects, explanations, say)
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
+    if held_batch is not None:
+        held_runs = with_own_instants(model, current.theta, held_runs)
+        held_batch = make_batch(held_runs)
     order = dataset.names
     records = record_runs(model, batch, fitted_runs, thetas, held_out=False, order=order)
     judging = []
@@ -211,6 +226,7 @@ def run_loop(
         silence = "fluid"
     judgement = judge(tolerated, current, active, records, held, silence, mistaken)
     judgement = judged_with(judgement, coarse)
+    instants = instants_found(model, current, bounds, fitted_runs, held_runs)
     times = other_times(search, carried, judgement) if carried else []
     judgement, instead = compared_with_times(judgement, active, carried, times)
     for name in instead:
@@ -280,6 +296,7 @@ def run_loop(
             "worst_run": judgement.worst.name,
             "worst_run_error": float(judgement.worst.errors[-1]),
             "description": _with_refusals(judgement, search),
+            "step_instants": instants,
             "not_named": {n: text for n, text in search.not_named.items() if n not in active},
         },
         rankings=tuple(search.rankings),

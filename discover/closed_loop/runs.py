@@ -12,6 +12,7 @@ from discover.dataset.run import same_samples
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import DeclaredModel
+from discover.forward.step_instants import with_rate_steps
 from discover.statistics import isolated
 from discover.statistics.residual import fast_part
 
@@ -78,7 +79,9 @@ def split_runs(
     fitted_runs, held_runs = (
         [
             thin_run(run, _needed(run, most))
-            for run in _without_spikes(cut_to_strain(part.runs, strain), spikes)
+            for run in _without_spikes(
+                cut_to_strain([*map(with_rate_steps, part.runs)], strain), spikes
+            )
         ]
         for part in (fitted, held)
     )

@@ -13,6 +13,7 @@ from discover.comparison.fitting.prepared import (
     settled_by,
     thinned_to,
 )
+from discover.comparison.fitting.step_instants import with_step_instants
 from discover.comparison.fitting.training import study_library
 from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known, known_part
@@ -83,6 +84,7 @@ def compare(
     data = settled_by(data, float(max(declared.relaxation_time)))
     pipkin = itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers)
     library = study_library(study) if library is None else library
+    data, of_steps = with_step_instants(declared, data, library)
     known = known_part(declared, data, library, options.high_deborah, list(pipkin), fit_constants)
     if sweep and (known.along is not None or declared.effects):
         raise InputError(
@@ -125,7 +127,8 @@ def compare(
     return Comparison(
         name=study.name,
         data_summary=data_in_words(data, study)
-        + (_TAKEN_OUT if known.along is None and known.effects else ""),
+        + (_TAKEN_OUT if known.along is None and known.effects else "")
+        + (f". {of_steps}" if of_steps else ""),
         known_part=known_in_words(declared, known, study),
         flows=known.flows,
         before=known.alone(),

@@ -14,6 +14,7 @@ from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
+from discover.protocols.rate_steps import RateStep
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
@@ -79,6 +80,8 @@ class Run:
         Of oscillations by their first harmonic the amplitude, as are rate and stress.
     storage_modulus, loss_modulus
         G′ and G″ in Pa of such oscillations, shape (n,).
+    rate_steps
+        Steps of the rate between two samples whose instants are fitted, or were.
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``; differs from one for data that
         were shifted to another temperature.
@@ -118,6 +121,7 @@ class Run:
     metadata: Mapping[str, float | str] = field(default_factory=dict)
     storage_modulus: Float[np.ndarray, " _"] | None = None
     loss_modulus: Float[np.ndarray, " _"] | None = None
+    rate_steps: tuple[RateStep, ...] = ()
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -41,7 +41,8 @@ class AugmentedModel:
         The declared model.
     effects
         Candidates; their parameters follow one another in the vector, after the declared ones.
-        Those that the declared model knows follow, if they are not among them.
+        Those that the declared model knows follow, if they are not among them, and last the
+        instants at which rates step.
     scales
         Size of each property of the data in which parameters are scaled; see `data_scales`.
     """
@@ -66,24 +67,31 @@ class AugmentedModel:
                 declared.parameters if free else (),
                 declared.fit_modulus,
                 tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
+                declared.step_instants,
             )
         )
         self.slices, self.size = self._program.slices, self._program.size
+        self.instants = self._program.instants
         parameters = [p for effect in self.effects for p in effect.parameters]
         sizes = {"one": 1.0} | dict(scales or {})
         units = [sizes.get(p.range_scale, 1.0) for p in parameters]
         lows = [p.low * unit for p, unit in zip(parameters, units, strict=True)]
         highs = [p.high * unit for p, unit in zip(parameters, units, strict=True)]
         varying = [LARGEST] * (declared.size - 2 - len(free))
-        self.low = np.array([-10.0, -10.0, *(p.low for p in free), *np.negative(varying), *lows])
-        self.high = np.array([10.0, 10.0, *(p.high for p in free), *varying, *highs])
+        steps = declared.step_instants
+        before = [-10.0, -10.0, *(p.low for p in free), *np.negative(varying)]
+        self.low = np.array([*before, *lows, *[0.0] * steps])
+        self.high = np.array(
+            [10.0, 10.0, *(p.high for p in free), *varying, *highs, *[1.0] * steps]
+        )
         trials = [p.first_trial * sizes.get(p.scale, 1.0) for p in parameters]
         # well inside the range, whatever the data's own size suggests
         trials = [
             float(np.clip(trial, max(low, _TRIAL_SHARE * low), _TRIAL_SHARE * high))
             for trial, low, high in zip(trials, lows, highs, strict=True)
         ]
-        self.first_trial = np.array([0.01] * (2 + len(free)) + [1.0] * len(varying) + trials)
+        first = [0.01] * (2 + len(free)) + [1.0] * len(varying)
+        self.first_trial = np.array([*first, *trials, *[0.5] * steps])
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -111,9 +119,11 @@ class AugmentedModel:
     def zero(self) -> Float[np.ndarray, " p"]:
         """Return the vector of the declared model: amplitudes zero, inner parameters at start.
 
-        Known effects have their values, and where these are to be fitted, a first trial.
+        Known effects have their values, and where these are to be fitted, a first trial. A rate
+        steps halfway between its samples.
         """
         theta = np.zeros(self.size)
+        theta[self.instants] = self.first_trial[self.instants]
         for i, parameter in enumerate(self.declared.free_parameters):
             theta[2 + i] = parameter.start
         for effect in self.effects:
@@ -132,7 +142,7 @@ class AugmentedModel:
         for known in self.declared.effects:
             pairs = zip(self.positions(known.name), known.values, strict=True)
             free += [position for position, value in pairs if value is None]
-        return free
+        return [*free, *range(self.instants.start, self.instants.stop)]
 
     def positions(self, name: str) -> list[int]:
         """Return the positions of an effect's parameters in the vector."""

@@ -52,6 +52,9 @@ class DeclaredModel:
         Of the moduli in Pa², shape (k, k), as those data leave them; None where they are exact.
     effects
         What is known beside the law: effects of fluid and instrument, with values or to be fitted.
+    step_instants
+        How many instants of steps of the rate in the fitted runs are fitted; `Run.rate_steps` say
+        which is whose.
     by_mode
         Free parameters of the law, and effects by the amplitude of their term, that may differ from
         mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
@@ -75,6 +78,7 @@ class DeclaredModel:
     effects: tuple[KnownEffect, ...] = ()
     by_mode: tuple[str, ...] = ()
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    step_instants: int = 0
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):

@@ -60,6 +60,8 @@ class Structure(NamedTuple):
     fit_modulus: bool
     by_mode: tuple[tuple[str, int, int], ...] = ()
     """Constants that may differ from mode to mode, and where what varies them begins and ends."""
+    step_instants: int = 0
+    """How many instants of steps of the rate are fitted, each as a share of its interval."""
 
 
 class Program:
@@ -76,7 +78,8 @@ class Program:
         for effect in effects:
             self.slices[effect.name] = slice(position, position + len(effect.parameters))
             position += len(effect.parameters)
-        self.size = position
+        self.instants = slice(position, position + structure.step_instants)
+        self.size = self.instants.stop
         self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
         # of the law's constants, and of effects' amplitudes
         slots = {name: slice(start, end) for name, start, end in structure.by_mode}
@@ -135,6 +138,8 @@ class Program:
         # tool is the angle's over the nominal gap
         flow = run.kinematics
         rate = run.commanded_rate
+        if run.steps is not None:
+            rate = run.steps.in_rate(rate, run.times, theta[self.instants])
         for effect in self._upstream:
             changed = effect.felt_rate(self._values(theta, effect), instrument_times, rate)
             rate = _where_in_shear(flow, changed, rate)

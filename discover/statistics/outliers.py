@@ -51,7 +51,8 @@ def stray(
 
     Those of the record alone (`isolated`), and those that a model misses by far more than the
     samples around, where the record too is off on its own: a step that a model takes a sample too
-    late is missed as much, but the record is level on one side of it.
+    late is missed as much, but the record is level on one side of it. Nothing is said of the first
+    and the last sample.
 
     Parameters
     ----------
@@ -96,6 +97,13 @@ def _missed_alone(
         for i in range(width):
             at = start + i
             off[at] |= far[at] & (-np.sign(missed[at]) * excess > 0.5 * np.abs(missed[at]))
+    # so near an end that nothing can be extrapolated: alone, and beyond both samples beside it
+    low, high = np.sort([record[:-2], record[2:]], axis=0)
+    excess = record[1:-1] - np.clip(record[1:-1], low, high)
+    alone = far[1:-1] & ~far[:-2] & ~far[2:]
+    beyond = alone & (-np.sign(missed[1:-1]) * excess > 0.5 * np.abs(missed[1:-1]))
+    near = np.minimum(np.arange(len(record)), np.arange(len(record))[::-1]) < _BESIDE
+    off[1:-1] |= beyond & near[1:-1]
     return off
 
 

@@ -1,7 +1,7 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
-from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry
+from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry, turn_to_likelier
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
 
@@ -11,5 +11,6 @@ __all__ = [
     "explain",
     "next_tests",
     "over_explanations",
+    "turn_to_likelier",
     "with_band",
 ]

@@ -12,6 +12,8 @@ import numpy as np
 
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.scoring.evidence import WINDOW
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import Fit
 
@@ -78,6 +80,43 @@ def carry(
         followed.append(ahead[0])
         spent += _follow(search, ahead[0], max_effects, width - spent)
     return _fitted(search, _in_window(search, effective)[: 2 * width], effective, width)
+
+
+def turn_to_likelier(search: Search, carried: Sequence[Carried]) -> bool:
+    """Let a search go on from an explanation far likelier than its own; say if there is one.
+
+    A path that began with the wrong effect may end where no single exchange leads to the right
+    ones, and a neighbour of what it passed by may. It has to be likelier than what is chosen by
+    more than Occam's window, and to predict runs left out better, or to be a part of it.
+
+    Parameters
+    ----------
+    search
+        The search that has ended.
+    carried
+        What it was carried beside.
+    """
+    own = tuple(sorted(search.active))
+    chosen = next(one for one in carried if tuple(sorted(one.effects)) == own)
+    best, problem, model = carried[0], search.problem, search.model
+    if (
+        chosen.criterion - best.criterion <= 2.0 * np.log(WINDOW)
+        or not set(search.established) <= set(best.effects)
+        or at_an_end(model, best.fit.theta, best.effects)
+    ):
+        return False
+    part = set(best.effects) < set(own)
+    if not part and np.mean(left_out_errors(problem, best.fit)) >= search.left_out:
+        return False
+    search.take(best.fit, best.effects)
+    effective = problem.independent_samples(best.fit)
+    for name in best.effects:
+        without = search.without(name)
+        gain = problem.evidence(without, best.fit, effective) if without.usable else 0.0
+        search.support[name] = gain
+        search.aliases.setdefault(name, ())
+    search.rounds = 0
+    return True
 
 
 def _note_shorter(search: Search) -> None:

@@ -77,6 +77,8 @@ def coarse_rates(
     wider = dict(bounds)
     moved, kept = constants_that_follow(fit, change)
     for position, shift in zip(fit.free, np.abs(moved), strict=True):
+        if model.instants.start <= position < model.instants.stop:
+            continue  # when a rate steps is unknown as it is
         value, (low, high) = float(fit.theta[position]), bounds[position]
         half = max(0.5 * (high - low), np.finfo(float).tiny)
         # what is left are coefficients of a constant by mode

@@ -102,6 +102,7 @@ def change_on_finer_steps(
     values = small.zero()
     shared = model.declared.size
     values[:shared] = theta[:shared]
+    values[small.instants] = theta[model.instants]
     for effect in effects:
         values[small.positions(effect.name)] = theta[model.positions(effect.name)]
     finer = [_with_another_rate(run) for run in runs] if other_rates else runs

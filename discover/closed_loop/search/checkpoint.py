@@ -59,9 +59,11 @@ class SearchCheckpoint:
 
 def _model_of(search: SearchState) -> list[str]:
     """Return what the positions in a parameter vector mean."""
-    return [f"{name} by mode" for name in search.model.declared.by_mode] + [
-        effect.name for effect in search.model.effects
-    ]
+    return (
+        [f"{name} by mode" for name in search.model.declared.by_mode]
+        + [effect.name for effect in search.model.effects]
+        + ["instant of a step"] * search.model.declared.step_instants
+    )
 
 
 def _state(search: SearchState) -> dict[str, Any]:

@@ -158,9 +158,15 @@ class CurrentModel(SearchState):
             jacobians(self.model, self.batch, [theta], residual, [free])[0],
         )
 
-    def choices_beside(self, fit: Fit, others: Sequence[str]) -> tuple[Attribution, list[Choice]]:
+    def choices_beside(
+        self,
+        fit: Fit,
+        others: Sequence[str],
+        among: Callable[[AbstractEffect], bool] | None = None,
+    ) -> tuple[Attribution, list[Choice]]:
         """Return what may be added to a fit with other effects: all as scored, and the refitted."""
-        attribution = attribute(self.model, self.batch, fit, others, LEADERS, self.candidate)
+        admitted = among or self.candidate
+        attribution = attribute(self.model, self.batch, fit, others, LEADERS, admitted)
         choices = refit(self.problem, fit, attribution.leading)
         return attribution, self.possible(choices, others)
 

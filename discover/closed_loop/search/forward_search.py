@@ -10,6 +10,7 @@ from discover.closed_loop.search.checkpoint import SearchCheckpoint
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.closed_loop.search.moves.exchanging import ask_for_aliases, reexamine
 from discover.closed_loop.search.moves.looking_ahead import look_ahead
+from discover.closed_loop.search.moves.one_law import put_one_law_in_place
 from discover.closed_loop.search.moves.taking_out import (
     drop_undecided_effects,
     drop_what_modes_explain,
@@ -114,7 +115,7 @@ class Search(CurrentModel):
                 say(f"{name}: error {self.error:.4f}, runs left out {self.left_out:.4f}")
                 self.checkpoint.save(self)
             self.rounds += 1
-            if not reexamine(self):
+            if not reexamine(self) and not (whole and put_one_law_in_place(self)):
                 break
             say(f"exchanged: {', '.join(self.active)}: error {self.error:.4f}")
             self.checkpoint.save(self)

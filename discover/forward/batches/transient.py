@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
+from discover.forward.batches.rate_steps import RateSteps, rate_steps
 from discover.forward.batches.samples import measured
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
@@ -44,6 +45,8 @@ class RunBatch(eqx.Module):
         Total strain of the sample before each run, shape (runs,).
     kinematics
         Which flow each run is; None where all are simple shear.
+    steps
+        Steps of the rate whose instants are fitted, or were; None where there is none.
     cycle
         Positions among step ends of the last cycle before the first sample, shape (runs, 2);
         −1 where the run has no periodic start.
@@ -60,6 +63,7 @@ class RunBatch(eqx.Module):
     strain_before: Float[Array, " runs"]
     cycle: Int[Array, "runs 2"]
     kinematics: Kinematics | None = None
+    steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)
 
     @property
@@ -128,5 +132,6 @@ def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
     return RunBatch(
         *columns,
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
+        steps=rate_steps(runs),
         cycle_steps=cycle_steps,
     )

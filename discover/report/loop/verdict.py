@@ -155,6 +155,11 @@ def _loop_sure(result: LoopResult) -> str:
         parts.append("no run was held out to judge by")
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
+    if steps := result.remaining.get("step_instants"):
+        sentences.append(
+            f"The rate of {_several([*steps], 'and')} steps between two samples, which do not tell "
+            "when: the instants are fitted along, those of a run held out to that run itself."
+        )
     if few := result.remaining.get("not_judging", ()):
         verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
         parts.append(f"{_several(few, 'and')} {verb}")

@@ -1,12 +1,18 @@
 """Effects of a model asked again, whether another serves better in the place of one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.current_model import LEADERS, CurrentModel
 from discover.closed_loop.search.scoring.attribution import attribute
+from discover.closed_loop.search.scoring.evidence import BARE_MENTION
+from discover.closed_loop.search.scoring.left_out import left_out_errors
+from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.scoring.refitting import Choice, aliases_of, refit, simplest
 from discover.effects import AbstractEffect
+from discover.forward.least_squares import Fit
 
 _COMPARED = 16
 
@@ -63,7 +69,7 @@ def exchange(search: CurrentModel, name: str) -> bool:
     others = [other for other in search.active if other != name]
     own_choice, choices = in_place_of(search, name)
     if own_choice is None:
-        return False
+        return exchange_for_alias(search, name)
     current = own_choice.candidate
     # evidence alone would let a term in that fits a little better and predicts worse
     expected = np.mean(own_choice.left_out)
@@ -91,4 +97,45 @@ def exchange(search: CurrentModel, name: str) -> bool:
     search.polish()
     search.fit_path()
     search.leave_out()
+    return True
+
+
+def exchange_for_alias(search: CurrentModel, name: str) -> bool:
+    """Put an alias in the place of an effect without which the law runs away; say if one serves.
+
+    What was added later may stand for a difference between the two, and run away where the effect
+    does not hold it. So each alias is tried from where it was fitted alone, and the others both as
+    they are and from nothing.
+    """
+    model, problem = search.model, search.problem
+    alone = {one.effects[0]: one for one in search.seen if len(one.effects) == 1}
+    candidates = {effect.name for effect in model.effects if search.candidate(effect)}
+    effective = problem.independent_samples(search.fit)
+
+    def worth(fit: Fit, active: Sequence[str]) -> float:
+        return problem.criterion(problem.cost(fit), fit.free, active, effective)
+
+    best, chosen, least = None, [], worth(search.fit, search.active) - BARE_MENTION
+    for alias in search.aliases.get(name, ()):
+        if alias in search.active or alias not in alone or alias not in candidates:
+            continue
+        active = [alias if other == name else other for other in search.active]
+        values = alone[alias].theta(model)
+        beside = values.copy()
+        for other in search.active:
+            if other != name:
+                at = model.positions(other)
+                beside[at] = search.fit.theta[at]
+        fit = problem.best_fit([values, beside], search.positions(active))
+        if not fit.usable or at_an_end(model, fit.theta, active):
+            continue
+        if worth(fit, active) < least and np.mean(left_out_errors(problem, fit)) < search.left_out:
+            best, chosen, least = fit, active, worth(fit, active)
+    if best is None:
+        return False
+    new = next(other for other in chosen if other not in search.active)
+    search.aliases[new] = (name, *(a for a in search.aliases.pop(name) if a != new))
+    search.support[new] = search.support.pop(name)
+    search.established = tuple(n for n in search.established if n != name)
+    search.take(best, chosen)
     return True

@@ -1,0 +1,94 @@
+"""Steps of the rate between two samples of the runs of a batch, padded."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from discover.dataset import Run
+
+_NEVER = -1.0
+
+
+class RateSteps(eqx.Module):
+    """Steps of the rate between two samples, with a leading axis of runs.
+
+    Attributes
+    ----------
+    start, end
+        Times of the samples in s; padding lies before any record.
+    change
+        Of the rate in 1/s.
+    share
+        Of the interval at whose end the rate steps, where that is not fitted.
+    place
+        Which of the fitted shares is its own; −1 where it is not fitted.
+    """
+
+    start: Float[Array, "*runs steps"]
+    end: Float[Array, "*runs steps"]
+    change: Float[Array, "*runs steps"]
+    share: Float[Array, "*runs steps"]
+    place: Int[Array, "*runs steps"]
+
+    def in_rate(
+        self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
+    ) -> Float[Array, " m"]:
+        """Return the rate of one run with its steps where they happen.
+
+        Between the two samples Simpson's rule gives the strain of each step of the integration, and
+        rates change smoothly with the instant on a grid that stays as it is.
+
+        Parameters
+        ----------
+        rate, times
+            Rate in 1/s at ends and middles of steps in turn, with a straight line where it steps;
+            and times in s.
+        fitted
+            The fitted shares.
+        """
+        share = self.share
+        if fitted.shape[0]:
+            share = jnp.where(self.place < 0, share, fitted[self.place])
+        instant = self.start + share * (self.end - self.start)
+        ends = times[::2]
+        first, last = ends[:-1], ends[1:]
+        # of the two steps that meet at an end; beyond those of the record there is none
+        reach = jnp.concatenate([jnp.ones(1), ends[2:] - ends[:-2], jnp.ones(1)])
+
+        def added(start, end, change, instant):
+            at_ends = jnp.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
+            at_ends = jnp.where(ends <= start, 0.0, jnp.where(ends >= end, 1.0, at_ends))
+            strain = jnp.clip((last - instant) / (last - first), 0.0, 1.0)
+            in_middle = 1.5 * strain - 0.25 * (at_ends[:-1] + at_ends[1:])
+            stepped = jnp.zeros_like(times).at[::2].set(at_ends).at[1::2].set(in_middle)
+            straight = jnp.clip((times - start) / (end - start), 0.0, 1.0)
+            between = (times > start) & (times < end)
+            return change * jnp.where(between, stepped - straight, 0.0)
+
+        return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
+
+
+def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
+    """Return the steps of runs whose instants are fitted or were; None where there is none.
+
+    Parameters
+    ----------
+    runs
+        Runs at a given rate.
+    """
+    most = max(len(run.rate_steps) for run in runs)
+    if not most:
+        return None
+    rows = np.full((len(runs), most, 4), [_NEVER - 1.0, _NEVER, 0.0, 0.5])
+    place = np.full((len(runs), most), -1)
+    for i, run in enumerate(runs):
+        for k, step in enumerate(run.rate_steps):
+            rows[i, k] = step.start, step.end, step.change, step.share
+            place[i, k] = -1 if step.place is None else step.place
+    return RateSteps(
+        *(jnp.asarray(column) for column in np.moveaxis(rows, -1, 0)), jnp.asarray(place)
+    )
