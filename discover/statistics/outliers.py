@@ -52,7 +52,7 @@ def stray(
     Those of the record alone (`isolated`), and those that a model misses by far more than the
     samples around, where the record too is off on its own: a step that a model takes a sample too
     late is missed as much, but the record is level on one side of it. Nothing is said of the first
-    and the last sample.
+    sample.
 
     Parameters
     ----------
@@ -97,13 +97,22 @@ def _missed_alone(
         for i in range(width):
             at = start + i
             off[at] |= far[at] & (-np.sign(missed[at]) * excess > 0.5 * np.abs(missed[at]))
-    # so near an end that nothing can be extrapolated: alone, and beyond both samples beside it
-    low, high = np.sort([record[:-2], record[2:]], axis=0)
-    excess = record[1:-1] - np.clip(record[1:-1], low, high)
-    alone = far[1:-1] & ~far[:-2] & ~far[2:]
-    beyond = alone & (-np.sign(missed[1:-1]) * excess > 0.5 * np.abs(missed[1:-1]))
-    near = np.minimum(np.arange(len(record)), np.arange(len(record))[::-1]) < _BESIDE
-    off[1:-1] |= beyond & near[1:-1]
+    # so near an end that nothing can be extrapolated: alone, and beyond both samples beside it; the
+    # last beyond what comes before it. The first may be what an instrument needs to settle
+    start, end = residual[:_NEIGHBOURHOOD], residual[-_NEIGHBOURHOOD:]
+    for at in [*range(1, _BESIDE), *range(len(record) - _BESIDE, len(record))]:
+        level = np.median(start if at < _BESIDE else end)
+        here = slice(at - 1, at + 2)
+        apart = np.abs(residual[here] - level) > _ABOVE_SPREAD * spread[here]
+        ahead = record[at] - np.array([*record[at - 1 : at], *record[at + 1 : at + 2]])
+        if at == len(record) - 1:
+            ahead = np.append(ahead, record[at] - 2.0 * record[at - 1] + record[at - 2])
+        away = level - residual[at]
+        off[at] |= (
+            apart[1]
+            & (np.count_nonzero(apart) == 1)
+            & (np.min(np.sign(away) * ahead) > 0.5 * np.abs(away))
+        )
     return off
 
 

@@ -70,3 +70,25 @@ def test_peaks_and_steps_are_no_outliers(samples, noise):
         # nor are they to a model that has them not, or a sample too late
         assert not np.any(stray(-drawn, drawn))
         assert np.count_nonzero(stray(np.roll(record, 1) - drawn, drawn)) == 0
+
+
+@pytest.mark.parametrize("at", [1, 2, -3, -2, -1])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_knock_near_an_end_is_an_outlier_of_a_fit(at, sign):
+    record = WAVE + correlated(0.0, np.random.default_rng(2))
+    record[at] = record[at - 1] + sign * 30.0 * 0.02
+    assert np.flatnonzero(stray(WAVE - record, record)).tolist() == [at % 200]
+
+
+@pytest.mark.parametrize("ringing", [1, 3, 8])
+def test_what_rings_at_the_start_is_no_outlier(ringing):
+    """An instrument that settles in a few samples: what is off in them is real."""
+    record = WAVE + correlated(0.0, np.random.default_rng(2))
+    record[:ringing] += 30.0 * 0.02 * 0.8 ** np.arange(ringing) * (-1.0) ** np.arange(ringing)
+    assert not np.any(stray(WAVE - record, record)[:ringing])
+
+
+def test_what_gives_way_at_the_end_is_no_outlier():
+    record = WAVE + correlated(0.0, np.random.default_rng(2))
+    record[-4:] -= 30.0 * 0.02 * np.arange(1.0, 5.0)
+    assert not np.any(stray(WAVE - record, record))
