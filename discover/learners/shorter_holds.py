@@ -8,7 +8,7 @@ clock that slows down once the fluid has settled, and what they find is held aga
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -30,6 +30,7 @@ _CHANGE = 0.01
 """A rate is held while it stays within this fraction of what it was first."""
 
 
+@runtime_checkable
 class _Laid(Protocol):
     @property
     def flows(self) -> FlowBatch: ...
@@ -175,5 +176,5 @@ def _on_clock(
     last = np.clip(np.searchsorted(changes, times, side="right") - 1, 0, None)
     since = times - changes[last]
     after = begun[last] + passed(np.maximum(since, 0.0))
-    # what came before began as long ago as has to pass
-    return np.where(times > 0.0, after, -passed(np.maximum(-times, 0.0)))
+    # what came before began as long ago as it takes to settle
+    return np.where(times > 0.0, after, np.maximum(times, -settled))

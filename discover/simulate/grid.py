@@ -18,7 +18,8 @@ MAX_GRID_POINTS = 200_000
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
 
-_FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS = 100, 0.08
+# Of a steady flow before the record: steps, their shrinking towards its end, relaxation times
+_FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS, _SETTLED_BEFORE = 100, 0.08, 50.0
 
 # Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
 _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
@@ -142,7 +143,10 @@ def make_grid(
     # Step to just before a jump and on from it, so that no step straddles one
     before = jumps - 1e-12 * np.where(jumps == 0.0, -begins, np.abs(jumps))
     later = times[times > 0.0]
-    steady = _steady_history(protocol, float(later[0]) if later.size else np.inf)
+    first = float(later[0]) if later.size else np.inf
+    steady = _steady_history(protocol, first, relaxation_time)
+    if steady.size:
+        begins = float(steady[0])
     # what is gone through in steady steps sets no pace for the record
     recorded = rates[max(int(np.searchsorted(knots, 0.0, side="right")) - 1, 0) :]
     table = np.max(np.abs(recorded if steady.size else rates))
@@ -250,10 +254,13 @@ def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:
     return np.geomspace(first, later[-1], count + 1)[:-1]
 
 
-def _steady_history(protocol: FlowProtocol, first: float) -> Float[np.ndarray, " p"]:
+def _steady_history(
+    protocol: FlowProtocol, first: float, relaxation_time: float | None
+) -> Float[np.ndarray, " p"]:
     """Return steps through a constant rate before t = 0; none where it was anything else.
 
-    The last of them is as long as the first of the record.
+    The last of them is as long as the first of the record. It begins later where the fluid settles
+    sooner: steps of many relaxation times would run away.
     """
     begins = float(protocol.begins)
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
@@ -261,6 +268,8 @@ def _steady_history(protocol: FlowProtocol, first: float) -> Float[np.ndarray, "
     constant = len(history) == 2 and history[0] == history[1] and knots[1] == 0.0
     if begins == 0.0 or np.any(np.asarray(protocol.amplitudes)) or not constant:
         return np.zeros(0)
+    if relaxation_time is not None:
+        begins = max(begins, -_SETTLED_BEFORE * relaxation_time)
     strain = abs(history[0] * begins)
     count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / COARSEST_STRAIN)))
     coarse = np.linspace(begins, 0.0, count + 1)[:-1]

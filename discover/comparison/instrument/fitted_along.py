@@ -64,8 +64,8 @@ _LONGER_TIMES = (1.0, 10.0)
 a viscosity that falls with the rate only where it relaxes at once."""
 
 _STRAIN_STEP = 0.1
-"""Where times are fitted, the largest strain of a step. In steps of many relaxation times a law that
-thins is followed wrongly, and the fit finds constants for which that looks like the record."""
+"""Where times are fitted, the largest strain of a step. In steps of many relaxation times a law
+that thins is followed wrongly, and the fit finds constants for which that looks like the record."""
 
 Train = Callable[[DeclaredModel, StudyData, TermLibrary], tuple[LearnerResult, Fluid]]
 """From a known part without free constants, corrected data and candidate terms."""
@@ -158,10 +158,13 @@ class FittedAlong:
     def batch(self) -> Batch:
         """The fitted runs; where times are fitted, in short steps and with shorter holds."""
         time = self.declared.relaxation_time
-        if MODE_CONSTANTS[1] in self.positions:
+        # an instrument may act by its own clock, as a drift does
+        if MODE_CONSTANTS[1] in self.positions and not self.declared.effects:
             # a Maxwell law is linear, and right in steps of any length
-            whole = make_batch(self.runs)
-            alone = self._best(self.model, *self._first_starts(), whole)
+            small = AugmentedModel(self.forward, [], data_scales(self.runs))
+            modes = [self.positions[name] for name in MODE_CONSTANTS if name in self.positions]
+            starts = [start[: len(small.zero())] for start in self._first_starts()[0]]
+            alone = self._best(small, starts, [modes] * len(starts), make_batch(self.runs))
             time = time * np.exp(alone.theta[1])
             shorter = with_shorter_holds(self.runs, float(np.max(time)))
             return make_batch(shorter, strain_step=_STRAIN_STEP)
