@@ -22,9 +22,9 @@ SETTLED = 50.0
 """Relaxation times after a change of the rate from which on time passes faster, in proportion to
 what has passed: a law that relaxes fifty times as slowly as the known one is still followed."""
 
-SAME = 1e-3
-"""Difference of a law's stress on the shortened and on the whole runs, over its size, below which
-holds were shortened rightly."""
+_SAME, _OF_MISFIT = 1e-3, 0.1
+"""Difference of a law's stress on the shortened and on the whole runs, over its size and over its
+misfit: holds were shortened rightly if it is below either."""
 
 _CHANGE = 0.01
 """A rate is held while it stays within this fraction of what it was first."""
@@ -88,6 +88,19 @@ def apart(
     ]
     worst = float(np.max(off))
     return worst if np.isfinite(worst) else np.inf
+
+
+def shortened_rightly(off: float, misfit: float) -> bool:
+    """Return whether a law may be fitted on shortened runs.
+
+    Parameters
+    ----------
+    off
+        From `apart`.
+    misfit
+        What the law leaves, relative to the records.
+    """
+    return off <= max(_SAME, _OF_MISFIT * misfit)
 
 
 def shortened_in_words(whole: _Laid, shorter: _Laid, off: float) -> str:

@@ -29,9 +29,9 @@ from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
 from discover.learners.shorter_holds import (
-    SAME,
     apart,
     shortened_in_words,
+    shortened_rightly,
     shorter_where_it_pays,
 )
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
@@ -208,6 +208,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             held = problem
             if work(problem) > recipe.affordable:
                 problem, fitted = _rougher(problem, followed, known, recipe.samples)
+            if work(whole) > recipe.affordable:
                 recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
@@ -233,7 +234,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         shortened = ""
         if followed is not runs:
             off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
-            if off > SAME:
+            if not shortened_rightly(off, best.misfit):
                 return self._fitted(X, runs, known, shorten=False)
             shortened = shortened_in_words(whole, held, off)
         cloud = sample_states(best.law, problem)

@@ -23,9 +23,9 @@ from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_library, check_settings
 from discover.learners.shorter_holds import (
-    SAME,
     apart,
     shortened_in_words,
+    shortened_rightly,
     shorter_where_it_pays,
 )
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
@@ -327,7 +327,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         shortened = ""
         if followed is not runs:
             off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
-            if off > SAME:
+            if not shortened_rightly(off, fit.misfit):
                 return self._fitted(X, runs, known, shorten=False)
             shortened = f"; {shortened_in_words(whole, problem, off)}"
         self.stability_ = None
