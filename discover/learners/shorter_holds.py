@@ -17,6 +17,7 @@ from jaxtyping import Float
 from discover.dataset.run import Run
 from discover.learners.rough_grid import AFFORDABLE, WORTH_IT
 from discover.simulate.flow_batch import FlowBatch
+from discover.words import percent_of
 
 SETTLED = 50.0
 """Relaxation times after a change of the rate from which on time passes faster, in proportion to
@@ -117,7 +118,8 @@ def shortened_in_words(whole: _Laid, shorter: _Laid, off: float) -> str:
     return (
         f"to save time the rates that are held for more than {SETTLED:.0f} relaxation times were "
         f"followed in {share:.2g} times fewer steps, which changes the stress of the law found by "
-        f"{off:.1g} of its size (recipe 'thorough' follows the whole runs)"
+        f"{'less than 0.1 %' if off < 1e-3 else percent_of(off)} (recipe 'thorough' follows the "
+        "whole runs)"
     )
 
 

@@ -4,6 +4,7 @@ A learner is given the constants, then the constants are fitted given what it fo
 they settle. Both learners, and the classical laws, start from the same constants.
 """
 
+import copy
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -325,8 +326,8 @@ class FittedAlong:
         names = {term.name for term in self.terms}
         joint = result.learner == "tensor_sindy" and all(t.term in names for t in result.terms)
         if joint:
-            model, start = self.model, self._vector(self.model, raw)
             at = [self.model.positions(term.term)[0] for term in result.terms]
+            model, start = _without_limits(self.model, at), self._vector(self.model, raw)
             start[at] = [term.coefficient for term in result.terms]
             free = [*self.free, *at]
         else:
@@ -491,6 +492,14 @@ class FittedAlong:
                 "away. Check its parameters, modes and units."
             )
         return best
+
+
+def _without_limits(model: AugmentedModel, at: Sequence[int]) -> AugmentedModel:
+    """Return a model in which some parameters may have any size, as where they were found."""
+    free = copy.copy(model)
+    free.low, free.high = model.low.copy(), model.high.copy()
+    free.low[at], free.high[at] = -np.inf, np.inf
+    return free
 
 
 def _valued(known: KnownEffect, raw: Mapping[str, float]) -> KnownEffect:
