@@ -68,6 +68,9 @@ _STRAIN_STEP = 0.1
 """Where times are fitted, the largest strain of a step. In steps of many relaxation times a law
 that thins is followed wrongly, and the fit finds constants for which that looks like the record."""
 
+_LARGEST = 10.0
+"""Coefficients of terms fitted with constants may be as large as this, or as they were found."""
+
 Train = Callable[[DeclaredModel, StudyData, TermLibrary], tuple[LearnerResult, Fluid]]
 """From a known part without free constants, corrected data and candidate terms."""
 
@@ -323,12 +326,15 @@ class FittedAlong:
 
         The coefficients of a sum of terms are fitted with them; other laws stay as they are.
         """
+        at: list[int] = []
         names = {term.name for term in self.terms}
         joint = result.learner == "tensor_sindy" and all(t.term in names for t in result.terms)
         if joint:
             at = [self.model.positions(term.term)[0] for term in result.terms]
-            model, start = _without_limits(self.model, at), self._vector(self.model, raw)
+            start = self._vector(self.model, raw)
             start[at] = [term.coefficient for term in result.terms]
+            # a search has no limits, and its steps follow coefficients as large as it found
+            model = _with_limits(self.model, at, np.maximum(np.abs(start[at]), _LARGEST))
             free = [*self.free, *at]
         else:
             law = replace(
@@ -346,8 +352,11 @@ class FittedAlong:
         if not joint:
             return _Given(values, gained)
         shifts = modulus_shifts(model, fit.theta, self.batch)
-        bounds = intervals(model, self.batch, fit, shifts)
-        halves = [0.5 * (bounds[at][1] - bounds[at][0]) for at in free[: len(raw)]]
+        at = free[len(raw) :]
+        bounds = intervals(
+            _with_limits(model, at, np.full(len(at), np.inf)), self.batch, fit, shifts
+        )
+        halves = [0.5 * (bounds[i][1] - bounds[i][0]) for i in self.free]
         return _Given(values, gained, fit, halves, bounds, shifts)
 
     def _vector(self, model: AugmentedModel, raw: Mapping[str, float]) -> np.ndarray:
@@ -494,12 +503,14 @@ class FittedAlong:
         return best
 
 
-def _without_limits(model: AugmentedModel, at: Sequence[int]) -> AugmentedModel:
-    """Return a model in which some parameters may have any size, as where they were found."""
-    free = copy.copy(model)
-    free.low, free.high = model.low.copy(), model.high.copy()
-    free.low[at], free.high[at] = -np.inf, np.inf
-    return free
+def _with_limits(
+    model: AugmentedModel, at: Sequence[int], size: Float[np.ndarray, " q"]
+) -> AugmentedModel:
+    """Return a model in which some parameters may have these sizes."""
+    other = copy.copy(model)
+    other.low, other.high = model.low.copy(), model.high.copy()
+    other.low[at], other.high[at] = -size, size
+    return other
 
 
 def _valued(known: KnownEffect, raw: Mapping[str, float]) -> KnownEffect:
