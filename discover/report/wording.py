@@ -232,8 +232,14 @@ def selection_sentence(outcome: LearnerOutcome) -> str:
 
 
 def chosen_names(support: Sequence[str]) -> list[str]:
-    """Return the terms of a support in the field's letters."""
+    """Return the terms of a support in the field's letters; of many only how many they are."""
+    if len(support) > _MOST_NAMED:
+        return [f"{len(support)} terms"]
     return [readable(name) for name in support] or ["no term"]
+
+
+_MOST_NAMED = 8
+"""Terms that a sentence bears: a rule may choose half a library."""
 
 
 QUESTIONS = ("What was found", "How sure", "What to measure next")

@@ -18,7 +18,8 @@ MAX_GRID_POINTS = 200_000
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
 
-_FEWEST_HISTORY_STEPS = 100
+# Of a steady flow before the record: steps, their shrinking towards its end, relaxation times
+_FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS, _SETTLED_BEFORE = 100, 0.08, 50.0
 
 # Steps of a relaxation: the first, in the time to the first sample, and by how much each is longer
 _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
@@ -99,8 +100,8 @@ def make_grid(
     Every sample and every kink of the protocol is a step; between them no step turns the fluid
     through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
     defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
-    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`: a steady state is a fixed point
-    of the method whatever its step.
+    rate before t = 0 is gone through in steps of `COARSEST_STRAIN` that shrink towards its end: a
+    steady state is a fixed point of the method whatever its step, but stable in short ones only.
 
     Parameters
     ----------
@@ -141,7 +142,11 @@ def make_grid(
     jumps = np.intersect1d(kinks, knots[1:][np.diff(knots) <= 0.0])
     # Step to just before a jump and on from it, so that no step straddles one
     before = jumps - 1e-12 * np.where(jumps == 0.0, -begins, np.abs(jumps))
-    steady = _steady_history(protocol)
+    later = times[times > 0.0]
+    first = float(later[0]) if later.size else np.inf
+    steady = _steady_history(protocol, first, relaxation_time)
+    if steady.size:
+        begins = float(steady[0])
     # what is gone through in steady steps sets no pace for the record
     recorded = rates[max(int(np.searchsorted(knots, 0.0, side="right")) - 1, 0) :]
     table = np.max(np.abs(recorded if steady.size else rates))
@@ -249,17 +254,30 @@ def _relaxation(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " p"]:
     return np.geomspace(first, later[-1], count + 1)[:-1]
 
 
-def _steady_history(protocol: FlowProtocol) -> Float[np.ndarray, " p"]:
-    """Return steps through a constant rate before t = 0; none where it was anything else."""
+def _steady_history(
+    protocol: FlowProtocol, first: float, relaxation_time: float | None
+) -> Float[np.ndarray, " p"]:
+    """Return steps through a constant rate before t = 0; none where it was anything else.
+
+    The last of them is as long as the first of the record. It begins later where the fluid settles
+    sooner: steps of many relaxation times would run away.
+    """
     begins = float(protocol.begins)
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     history = rates[(knots >= begins) & (knots <= 0.0)][:2]
     constant = len(history) == 2 and history[0] == history[1] and knots[1] == 0.0
     if begins == 0.0 or np.any(np.asarray(protocol.amplitudes)) or not constant:
         return np.zeros(0)
+    if relaxation_time is not None:
+        begins = max(begins, -_SETTLED_BEFORE * relaxation_time)
     strain = abs(history[0] * begins)
     count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / COARSEST_STRAIN)))
-    return np.linspace(begins, 0.0, count + 1)[:-1]
+    coarse = np.linspace(begins, 0.0, count + 1)[:-1]
+    # the fixed point is only reached in steps that follow the relaxation, however fast it is, so
+    # the last ones shrink to the first of the record
+    first, longest = min(first, -begins / count), -begins / count / _HISTORY_SHRINKS
+    fine = -np.geomspace(longest, first, 1 + int(np.log(longest / first) / _HISTORY_SHRINKS))
+    return np.concatenate([coarse[coarse < fine[0]], fine])
 
 
 def _grown(

@@ -4,6 +4,8 @@ A learner is given the constants, then the constants are fitted given what it fo
 they settle. Both learners, and the classical laws, start from the same constants.
 """
 
+import copy
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,13 +20,14 @@ from discover.comparison.instrument.corrected import InRecord, corrected
 from discover.comparison.outcomes.constant import Constant
 from discover.effects import KnownEffect, library_term, make_effect
 from discover.errors import InputError
-from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward import AugmentedModel, Batch, data_scales, make_batch
 from discover.forward.least_squares import Fit, fit_batch, intervals, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
+from discover.learners.shorter_holds import with_shorter_holds
 from discover.protocols import strains
 from discover.statistics import least_squares_covariance, root_of
 from discover.study.data import StudyData
@@ -57,6 +60,16 @@ _GAINED = 0.02
 """Share of the squared misfit that constants must remove to be worth another round."""
 
 _TIME_STARTS = (0.1, 0.3, 1.0, 3.0, 10.0)
+_LONGER_TIMES = (1.0, 10.0)
+"""A law that thins may relax much more slowly than the Maxwell law that fits best, which comes near
+a viscosity that falls with the rate only where it relaxes at once."""
+
+_STRAIN_STEP = 0.1
+"""Where times are fitted, the largest strain of a step. In steps of many relaxation times a law
+that thins is followed wrongly, and the fit finds constants for which that looks like the record."""
+
+_LARGEST = 10.0
+"""Coefficients of terms fitted with constants may be as large as this, or as they were found."""
 
 Train = Callable[[DeclaredModel, StudyData, TermLibrary], tuple[LearnerResult, Fluid]]
 """From a known part without free constants, corrected data and candidate terms."""
@@ -144,7 +157,22 @@ class FittedAlong:
         self.runs = list(data.fit)
         self.forward = forward
         self.model = AugmentedModel(forward, [*classical, *terms], data_scales(self.runs))
-        self.batch = make_batch(self.runs)
+
+    @cached_property
+    def batch(self) -> Batch:
+        """The fitted runs; where times are fitted, in short steps and with shorter holds."""
+        time = self.declared.relaxation_time
+        # an instrument may act by its own clock, as a drift does
+        if MODE_CONSTANTS[1] in self.positions and not self.declared.effects:
+            # a Maxwell law is linear, and right in steps of any length
+            small = AugmentedModel(self.forward, [], data_scales(self.runs))
+            modes = [self.positions[name] for name in MODE_CONSTANTS if name in self.positions]
+            starts = [start[: len(small.zero())] for start in self._first_starts()[0]]
+            alone = self._best(small, starts, [modes] * len(starts), make_batch(self.runs))
+            time = time * np.exp(alone.theta[1])
+            shorter = with_shorter_holds(self.runs, float(np.max(time)))
+            return make_batch(shorter, strain_step=_STRAIN_STEP)
+        return make_batch(self.runs)
 
     @cached_property
     def positions(self) -> dict[str, int]:
@@ -191,6 +219,9 @@ class FittedAlong:
     @cached_property
     def alone(self) -> Fit:
         """The constants fitted with the declared law alone, to all samples."""
+        return self._best(self.model, *self._first_starts())
+
+    def _first_starts(self) -> tuple[list[np.ndarray], list[list[int]]]:
         starts = [self.model.zero()]
         if MODE_CONSTANTS[1] in self.positions:
             starts = [self.model.zero() for _ in _TIME_STARTS]
@@ -198,7 +229,7 @@ class FittedAlong:
                 start[1] = np.log(factor)
                 if MODE_CONSTANTS[0] in self.positions:
                     start[0] = -start[1]  # the viscosity is known better than either
-        return self._best(self.model, starts, [self.free] * len(starts))
+        return starts, [self.free] * len(starts)
 
     @cached_property
     def classical(self) -> dict[str, Fit]:
@@ -207,16 +238,22 @@ class FittedAlong:
         if model is not self.model:
             fits["ucm"] = self._best(model, [self.alone.theta], [self.free])
         start = fits["ucm"].theta
+        longer_times = _LONGER_TIMES if MODE_CONSTANTS[1] in self.positions else (1.0,)
         for law, effect in CLASSICAL_EFFECTS.items():
             at = self.model.positions(effect)
             starts = []
-            for share in (1.0, 10.0):
+            for share, longer in itertools.product((1.0, 10.0), longer_times):
                 theta = start.copy()
+                for name, sign in zip(MODE_CONSTANTS, (-1.0, 1.0), strict=True):
+                    if name in self.positions:  # the viscosity stays
+                        theta[self.positions[name]] += sign * np.log(longer)
                 theta[at] = np.clip(
                     share * self.model.first_trial[at], self.model.low[at], self.model.high[at]
                 )
                 starts.append(theta)
-            fits[law] = self._best(model, starts, [[*self.free, *at]] * len(starts))
+            best = self._best(model, starts, [[*self.free, *at]] * len(starts))
+            # constants that stand for one another may have come to their last step in a valley
+            fits[law] = self._best(model, [best.theta], [best.free])
         return fits
 
     @cached_property
@@ -289,12 +326,15 @@ class FittedAlong:
 
         The coefficients of a sum of terms are fitted with them; other laws stay as they are.
         """
+        at: list[int] = []
         names = {term.name for term in self.terms}
         joint = result.learner == "tensor_sindy" and all(t.term in names for t in result.terms)
         if joint:
-            model, start = self.model, self._vector(self.model, raw)
             at = [self.model.positions(term.term)[0] for term in result.terms]
+            start = self._vector(self.model, raw)
             start[at] = [term.coefficient for term in result.terms]
+            # a search has no limits, and its steps follow coefficients as large as it found
+            model = _with_limits(self.model, at, np.maximum(np.abs(start[at]), _LARGEST))
             free = [*self.free, *at]
         else:
             law = replace(
@@ -312,8 +352,11 @@ class FittedAlong:
         if not joint:
             return _Given(values, gained)
         shifts = modulus_shifts(model, fit.theta, self.batch)
-        bounds = intervals(model, self.batch, fit, shifts)
-        halves = [0.5 * (bounds[at][1] - bounds[at][0]) for at in free[: len(raw)]]
+        at = free[len(raw) :]
+        bounds = intervals(
+            _with_limits(model, at, np.full(len(at), np.inf)), self.batch, fit, shifts
+        )
+        halves = [0.5 * (bounds[i][1] - bounds[i][0]) for i in self.free]
         return _Given(values, gained, fit, halves, bounds, shifts)
 
     def _vector(self, model: AugmentedModel, raw: Mapping[str, float]) -> np.ndarray:
@@ -443,9 +486,14 @@ class FittedAlong:
         return AugmentedModel(plain, self.model.effects, data_scales(self.runs))
 
     def _best(
-        self, model: AugmentedModel, starts: Sequence[np.ndarray], free: Sequence[Sequence[int]]
+        self,
+        model: AugmentedModel,
+        starts: Sequence[np.ndarray],
+        free: Sequence[Sequence[int]],
+        batch: Batch | None = None,
     ) -> Fit:
-        fits = fit_batch(model, self.batch, list(starts), free, rivals=True)
+        batch = self.batch if batch is None else batch
+        fits = fit_batch(model, batch, list(starts), free, rivals=True)
         best = min((fit for fit in fits if fit.usable), key=lambda fit: fit.cost, default=fits[0])
         if not best.usable:
             raise InputError(
@@ -453,6 +501,16 @@ class FittedAlong:
                 "away. Check its parameters, modes and units."
             )
         return best
+
+
+def _with_limits(
+    model: AugmentedModel, at: Sequence[int], size: Float[np.ndarray, " q"]
+) -> AugmentedModel:
+    """Return a model in which some parameters may have these sizes."""
+    other = copy.copy(model)
+    other.low, other.high = model.low.copy(), model.high.copy()
+    other.low[at], other.high[at] = -size, size
+    return other
 
 
 def _valued(known: KnownEffect, raw: Mapping[str, float]) -> KnownEffect:

@@ -28,6 +28,12 @@ from discover.learners.rough_grid import WORTH_IT, rough_limits
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
+from discover.learners.shorter_holds import (
+    apart,
+    shortened_in_words,
+    shortened_rightly,
+    shorter_where_it_pays,
+)
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import law_misfit
@@ -177,16 +183,33 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             If a parameter or a run is unusable.
         """
         del y
-        started = time.perf_counter()
         check_settings(self.get_params(deep=False))
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)
         require_known_rate(known, runs)
+        return self._fitted(X, runs, known, known.linear_relaxation)
+
+    def _fitted(
+        self, X: Iterable[Run], runs: list[Run], known: KnownPart, shorten: bool
+    ) -> "TBNNUDE":
+        started = time.perf_counter()
         recipe = self._recipe()
-        problem, fitted = _problem(runs, known), ""
-        if isinstance(recipe, DefaultRecipe) and work(problem) > recipe.affordable:
-            problem, fitted = _rougher(problem, runs, known, recipe.samples)
-            recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
+        whole = held = problem = _problem(runs, known)
+        followed, fitted = runs, ""
+        if isinstance(recipe, DefaultRecipe):
+            if shorten:
+                followed, problem = shorter_where_it_pays(
+                    runs,
+                    whole,
+                    lambda shorter: _problem(shorter, known),
+                    known.relaxation_time,
+                    recipe.affordable,
+                )
+            held = problem
+            if work(problem) > recipe.affordable:
+                problem, fitted = _rougher(problem, followed, known, recipe.samples)
+            if work(whole) > recipe.affordable:
+                recipe = replace(recipe, affordable=0.0)  # the race stays too much on any grid
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
@@ -208,6 +231,12 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         modes = modulus, problem.relaxation_time, float(known.solvent_viscosity)
         self.fluid_ = Fluid(best.law, *modes)
         self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
+        shortened = ""
+        if followed is not runs:
+            off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
+            if not shortened_rightly(off, best.misfit):
+                return self._fitted(X, runs, known, shorten=False)
+            shortened = shortened_in_words(whole, held, off)
         cloud = sample_states(best.law, problem)
         library = self.projection_library or build_library(degree=1)
         projection = project(best.law, cloud, library)
@@ -237,7 +266,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
                     for law, misfit, fitting in zip(members, misfits, fits, strict=True)
                 ],
             },
-            message="; ".join(part for part in (best.message, trained[0].left_out, fitted) if part),
+            message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shortened))),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
         return self

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable, Sequence
+from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +22,12 @@ from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_library, check_settings
+from discover.learners.shorter_holds import (
+    apart,
+    shortened_in_words,
+    shortened_rightly,
+    shorter_where_it_pays,
+)
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
@@ -237,13 +244,19 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             If a parameter or a run is unusable.
         """
         del y
-        started = time.perf_counter()
         check_settings(self.get_params(deep=False))
         self._check_parameters()
-        library = build_library() if self.library is None else self.library
         known = known_part(self)
         runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
         require_known_rate(known, runs)
+        shorten = self.screening == "auto" and known.linear_relaxation
+        return self._fitted(X, runs, known, shorten)
+
+    def _fitted(
+        self, X: Iterable[Run], runs: list[Run], known: KnownPart, shorten: bool
+    ) -> "TensorSINDy":
+        started = time.perf_counter()
+        library = build_library() if self.library is None else self.library
 
         def make(runs: Sequence[Run], **limits: float) -> TrajectoryProblem:
             return make_problem(
@@ -259,8 +272,14 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
                 **limits,
             )
 
-        problem = make(runs, strain_step=self.strain_step)
-        rough = rough_problem(problem, runs, make) if self.screening == "auto" else None
+        whole = problem = make(runs, strain_step=self.strain_step)
+        followed, rough = runs, None
+        if shorten:
+            followed, problem = shorter_where_it_pays(
+                runs, whole, partial(make, strain_step=self.strain_step), known.relaxation_time
+            )
+        if self.screening == "auto":
+            rough = rough_problem(problem, followed, make)
         groups = groups_of(runs)
         n_groups = int(np.max(groups)) + 1
         validates = min(n_groups, self.n_folds) > 1
@@ -305,6 +324,12 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.fluid_ = Fluid(
             self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
         )
+        shortened = ""
+        if followed is not runs:
+            off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
+            if not shortened_rightly(off, fit.misfit):
+                return self._fitted(X, runs, known, shorten=False)
+            shortened = f"; {shortened_in_words(whole, problem, off)}"
         self.stability_ = None
         if self.n_stability:
             self.stability_ = selection_stability(
@@ -365,7 +390,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             message=(
                 f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
                 f"{fit.misfit:.2g}; {search.n_refitted} supports were refitted"
-                f"{ranked_in_words(problem, rough, len(search.fits))}."
+                f"{ranked_in_words(problem, rough, len(search.fits))}{shortened}."
             ),
         )
         return self

@@ -31,6 +31,9 @@ def comparison_pictures(
     for flow in comparison.judged:
         draw = flow_picture if flow.oscillatory else start_up_picture
         found.append((f"The picture of {flow.title}", partial(draw, comparison, flow, overlays)))
+    runs = ("The picture of the training runs", partial(training_picture, comparison))
+    if not comparison.judged:  # what was fitted is then all that shows a law at work
+        found.append(runs)
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
         ("The map of identifiability", partial(identifiability_picture, comparison)),
@@ -40,11 +43,8 @@ def comparison_pictures(
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
         ("The picture of the sweep", partial(sweep_picture, comparison)),
     ]
-    training = [
-        ("The picture of the training runs", partial(training_picture, comparison)),
-        ("The picture of the loss", partial(loss_picture, comparison)),
-    ]
-    return _drawn(found), _drawn(training)
+    loss = ("The picture of the loss", partial(loss_picture, comparison))
+    return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
 
 
 def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:

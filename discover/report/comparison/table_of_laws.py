@@ -22,17 +22,19 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     one_mode = comparison.known is None or len(comparison.known.modulus) == 1
     rows = []
     for fit in comparison.classical:
-        constants = ", ".join(
-            f"{name} = {significant(value, 3)}"
-            for name, value in (
-                *((readable(name), value) for name, value in fit.parameters.items()),
-                *((constant_in_words(name, one_mode), value) for name, value in fit.along.items()),
-            )
-        )
+        end = " (the end of its range)" if fit.at_bound else ""
+        constants = [
+            f"{readable(name)} = {significant(value, 3)}{end}"
+            for name, value in fit.parameters.items()
+        ]
+        constants += [
+            f"{constant_in_words(name, one_mode)} = {significant(value, 3)}"
+            for name, value in fit.along.items()
+        ]
         rows.append(
             {
                 "law": fit.title,
-                "constants": constants + (", the end of its range" if fit.at_bound else ""),
+                "constants": ", ".join(constants),
                 "number": len(fit.parameters) + len(fit.along),
                 "misfit": fit.misfit,
                 "criterion": fit.criterion,

@@ -1,5 +1,6 @@
 """The tables of a comparison's page, row by row, as the templates take them."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -307,16 +308,29 @@ def physics_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
+_LAW_SPELLED = re.compile(r"^h = .*? (?=(?:leaves|gives|predicts) )")
+
+
+def _sign(value: float, first: bool) -> str:
+    if first and value >= 0:
+        return ""
+    form = "prefix" if first else "infix"  # between spaces
+    return f'<mo form="{form}">{"−" if value < 0 else "+"}</mo>'
+
+
 def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
-    sum_of_terms = "".join(
-        f"<mo>{'−' if value < 0 else '+'}</mo>{term_mathml(name, rival.inner, abs(value))}"
-        for name, value in rival.terms.items()
-    ).removeprefix("<mo>+</mo>")
+    # one element a term, so that a long law breaks between them
+    terms = [
+        f"<math><mrow>{_sign(value, first=not i)}{term_mathml(name, rival.inner, abs(value))}"
+        "</mrow></math>"
+        for i, (name, value) in enumerate(rival.terms.items())
+    ]
     place = rival.separated_by
     return {
-        "math": f"<math><mrow>{sum_of_terms}</mrow></math>",
-        "reason": rival.reason,
+        "math": " ".join(terms),
+        # it stands above the sentence
+        "reason": _LAW_SPELLED.sub("It ", rival.reason),
         "errors": rival.errors_to_chosen,
         "separated": f"{FIGURE_SYMBOLS.get(place['quantity'], place['quantity'])} in "
         f"{titles.get(place['protocol'], place['protocol'])}"

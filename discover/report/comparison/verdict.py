@@ -266,7 +266,8 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     beyond = [flow for flow in comparison.judged if not comparison.placement(flow).inside]
     parts, runaway = [], []
     for flows, where in ((inside, "inside the fitted range"), (beyond, "beyond the fitted range")):
-        runaway += [f"{flow.title}, {where}" for flow in flows if predictions[flow.key] is None]
+        lost = [flow.title for flow in flows if predictions[flow.key] is None]
+        runaway += [f"{listed(lost)}, {where}"] if lost else []
         errors = {flow.name: comparison.errors(name, flow) for flow in flows}
         recorded = quantities_in_words(flow.protocol.quantity for flow in flows)
         said = [
@@ -280,7 +281,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     law = _within(name)
     told = [f"in flows that no fit saw, {law} misses {', and '.join(parts)}"]
     return (told if parts else []) + (
-        [f"{law}'s stress runs away in {'; '.join(runaway)}"] if runaway else []
+        [f"{law}'s stress runs away in {', and in '.join(runaway)}"] if runaway else []
     )
 
 
@@ -294,8 +295,9 @@ def _without_outliers(comparison: Comparison, name: str, flows: Sequence[Flow]) 
         error = comparison.error_without_outliers(name, flow)
         errors.append(comparison.errors(name, flow)["sigma12"] if error is None else error)
     which = "the outlier that does" if count == 1 else f"the {count} outliers that do"
-    largest = max((error for error in errors if error is not None), default=None)
-    return f" ({percent(largest)} without {which} not count)"
+    largest = percent(max((error for error in errors if error is not None), default=None))
+    whole = percent(worst({flow.name: comparison.errors(name, flow) for flow in flows}, "sigma12"))
+    return "" if largest == whole else f" ({largest} without {which} not count)"
 
 
 def _open(comparison: Comparison) -> str:

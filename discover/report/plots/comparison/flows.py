@@ -293,6 +293,12 @@ def last_cycle(flow: Flow) -> np.ndarray:
     """Return which samples of a flow lie in its last cycle, a little more so that it closes."""
     frequencies = np.asarray(flow.protocol.frequencies)
     active = frequencies[np.asarray(flow.protocol.amplitudes) != 0]
-    if active.size == 0 or np.min(active) <= 0:
+    if active.size and np.min(active) > 0:
+        return in_last_cycle(flow.times, float(np.min(active)))
+    # of a rate that was measured, from where the strain last crossed its middle in this sense
+    strain = flow.strain - 0.5 * (np.max(flow.strain) + np.min(flow.strain))
+    turns = np.flatnonzero((strain[1:] > 0.0) & (strain[:-1] <= 0.0))
+    if turns.size < 2:
         return np.ones(flow.times.size, dtype=bool)
-    return in_last_cycle(flow.times, float(np.min(active)))
+    period = float(np.median(np.diff(flow.times[turns])))
+    return in_last_cycle(flow.times, 2.0 * np.pi / period)

@@ -1,0 +1,195 @@
+"""Runs in which a rate that is held for hundreds of relaxation times passes faster.
+
+Where the slowest mode relaxes in milliseconds and the rate is held for a minute, nearly all steps
+are spent on a stress that has long been steady. They cannot just be made longer: in steps of many
+relaxation times the method runs away, or comes to rest elsewhere. So learners follow such runs on a
+clock that slows down once the fluid has settled, and what they find is held against the whole runs.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar, runtime_checkable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.run import Run
+from discover.learners.rough_grid import AFFORDABLE, WORTH_IT
+from discover.simulate.flow_batch import FlowBatch
+from discover.words import percent_of
+
+SETTLED = 50.0
+"""Relaxation times after a change of the rate from which on time passes faster, in proportion to
+what has passed: a law that relaxes fifty times as slowly as the known one is still followed."""
+
+_SAME, _OF_MISFIT = 1e-3, 0.1
+"""Difference of a law's stress on the shortened and on the whole runs, over its size and over its
+misfit: holds were shortened rightly if it is below either."""
+
+_CHANGE = 0.01
+"""A rate is held while it stays within this fraction of what it was first."""
+
+
+@runtime_checkable
+class _Laid(Protocol):
+    @property
+    def flows(self) -> FlowBatch: ...
+
+
+_Problem = TypeVar("_Problem", bound=_Laid)
+
+
+def shorter_where_it_pays(
+    runs: Sequence[Run],
+    problem: _Problem,
+    make: Callable[[Sequence[Run]], _Problem],
+    relaxation_time: Float[np.ndarray, " k"],
+    affordable: float = AFFORDABLE,
+) -> tuple[Sequence[Run], _Problem]:
+    """Return runs with shorter holds and their problem where that saves half the steps or more.
+
+    Parameters
+    ----------
+    runs, problem
+        Whole runs, and a learner's problem of them.
+    make
+        Returns the problem of other runs.
+    relaxation_time
+        Of the modes, in s.
+    affordable
+        Modes times steps of all runs up to which runs are followed whole.
+    """
+    times = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
+    if times.size * problem.flows.n_steps <= affordable:
+        return runs, problem
+    shorter = with_shorter_holds(runs, float(np.max(times)))
+    if all(one is other for one, other in zip(shorter, runs, strict=True)):
+        return runs, problem
+    laid = make(shorter)
+    paid = laid.flows.n_steps <= WORTH_IT * problem.flows.n_steps
+    return (shorter, laid) if paid else (runs, problem)
+
+
+def apart(
+    whole: Sequence[Float[np.ndarray, " n"]], shorter: Sequence[Float[np.ndarray, " n"]]
+) -> float:
+    """Return how far what a law records on whole runs is from that on shortened ones.
+
+    Root-mean-square over that of the run, of the worst run; infinite where the law runs away.
+
+    Parameters
+    ----------
+    whole, shorter
+        What is recorded of it, for each run.
+    """
+    off = [
+        np.sqrt(np.mean((one - other) ** 2) / np.mean(one**2))
+        for one, other in zip(whole, shorter, strict=True)
+    ]
+    worst = float(np.max(off))
+    return worst if np.isfinite(worst) else np.inf
+
+
+def shortened_rightly(off: float, misfit: float) -> bool:
+    """Return whether a law may be fitted on shortened runs.
+
+    Parameters
+    ----------
+    off
+        From `apart`.
+    misfit
+        What the law leaves, relative to the records.
+    """
+    return off <= max(_SAME, _OF_MISFIT * misfit)
+
+
+def shortened_in_words(whole: _Laid, shorter: _Laid, off: float) -> str:
+    """Return what was passed over to save time, and what that changes.
+
+    Parameters
+    ----------
+    whole, shorter
+        Problems of the whole and of the shortened runs.
+    off
+        From `apart`.
+    """
+    share = whole.flows.n_steps / shorter.flows.n_steps
+    return (
+        f"to save time the rates that are held for more than {SETTLED:.0f} relaxation times were "
+        f"followed in {share:.2g} times fewer steps, which changes the stress of the law found by "
+        f"{'less than 0.1 %' if off < 1e-3 else percent_of(off)} (recipe 'thorough' follows the "
+        "whole runs)"
+    )
+
+
+def with_shorter_holds(runs: Sequence[Run], relaxation_time: float) -> list[Run]:
+    """Return runs whose holds beyond `SETTLED` relaxation times are shortened to their logarithm.
+
+    Samples keep their stress and their place in the order; those after a long hold come earlier. A
+    run without such a hold, or in which something oscillates, is returned as it is.
+
+    Parameters
+    ----------
+    runs
+        Runs as a learner takes them.
+    relaxation_time
+        The longest, in s.
+    """
+    return [_shortened(run, SETTLED * relaxation_time) for run in runs]
+
+
+def _shortened(run: Run, settled: float) -> Run:
+    protocol = run.protocol
+    start, end = np.asarray(protocol.cycle)
+    if protocol.control != "rate" or np.any(np.asarray(protocol.amplitudes)) or start != end:
+        return run
+    knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    begins, last = float(protocol.begins), run.time[-1]
+    before = rates[(knots >= begins) & (knots < 0.0)]
+    if begins < -settled and np.ptp(before) > 0.0:  # no hold came before, but a history of its own
+        return run
+    changes = _changes(knots, rates)
+    holds = np.diff(np.append(changes[changes < last], last))
+    if not np.any(holds > settled):
+        return run
+
+    def on_clock(times: np.ndarray) -> np.ndarray:
+        return _on_clock(times, changes, settled)
+
+    faster = replace(
+        protocol,
+        table_times=jnp.asarray(on_clock(knots)),
+        begins=jnp.asarray(on_clock(np.array([begins]))[0]),
+    )
+    # the rate before is part of the protocol by now
+    return replace(run, time=on_clock(run.time), protocol=faster, strain=None, rate_before=0.0)
+
+
+def _changes(
+    knots: Float[np.ndarray, " m"], rates: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, " c"]:
+    """Return when the rate changed, from the beginning of the record on."""
+    held, changes = rates[int(np.searchsorted(knots, 0.0, side="right")) - 1], [0.0]
+    for time, rate in zip(knots, rates, strict=True):
+        if time > 0.0 and abs(rate - held) > _CHANGE * max(abs(rate), abs(held)):
+            held = rate
+            changes.append(float(time))
+    return np.array(changes)
+
+
+def _on_clock(
+    times: Float[np.ndarray, " n"], changes: Float[np.ndarray, " c"], settled: float
+) -> Float[np.ndarray, " n"]:
+    """Return times on the clock that slows down as the time since a change grows."""
+
+    def passed(since: np.ndarray) -> np.ndarray:
+        later = np.maximum(since / settled, 1.0)
+        return np.minimum(since, settled) + settled * np.log(later)
+
+    begun = np.concatenate([[0.0], np.cumsum(passed(np.diff(changes)))])
+    last = np.clip(np.searchsorted(changes, times, side="right") - 1, 0, None)
+    since = times - changes[last]
+    after = begun[last] + passed(np.maximum(since, 0.0))
+    # what came before began as long ago as it takes to settle
+    return np.where(times > 0.0, after, np.maximum(times, -settled))

@@ -1,0 +1,90 @@
+"""Long holds of a rate on a clock that slows down change no answer; records by scipy."""
+
+import numpy as np
+import pytest
+from independent import Giesekus, steps
+
+import discover as dc
+from discover.forward.fluids import observed_in_batch
+from discover.learners import shorter_holds
+from discover.learners.shorter_holds import with_shorter_holds
+from discover.protocols import measured_rate, oscillatory_shear, shear_rates, step_rates
+from discover.simulate import lay_out
+from tensor_library.library import build_library
+
+MODULUS, TIME, MOBILITY = 2.0, 0.02, 0.4
+BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+LIBRARY = build_library(degree=0)
+
+
+def records(noise=0.01, seed=0):
+    """Giesekus at a low rate for 2 s, then held at a high one for a minute."""
+    generator, runs = np.random.default_rng(seed), []
+    for rate in (10.0, 40.0, 100.0):
+        flow, law = ([0.0, 2.0], [1.0, rate]), Giesekus(MOBILITY, MODULUS, TIME)
+        times = np.append(np.geomspace(2e-3, 1.9, 15), 2.0 + np.geomspace(2e-3, 60.0, 40))
+        exact = law.respond(steps(*flow), times).sigma12
+        off = noise * np.sqrt(np.mean(exact**2)) * generator.standard_normal(times.size)
+        rates = np.where(times < 2.0, 1.0, rate)
+        runs.append(dc.Run(f"to_{rate:g}", times, step_rates(*flow), rates, exact + off))
+    return runs
+
+
+def predicted(runs, law):
+    flows = lay_out(
+        [run.protocol for run in runs], [run.time for run in runs], relaxation_time=TIME
+    )
+    fluid = dc.Fluid(dc.make_law(*law), MODULUS, TIME)
+    return np.asarray(observed_in_batch(fluid, flows))[..., 0], flows.n_steps
+
+
+@pytest.mark.parametrize("law", [("giesekus", {"alpha": 0.4}), ("johnson_segalman", {"xi": 0.3})])
+def test_laws_record_the_same_on_shortened_runs_in_few_steps(law):
+    runs = records(noise=0.0)
+    whole, many = predicted(runs, law)
+    shorter, few = predicted(with_shorter_holds(runs, TIME), law)
+    np.testing.assert_allclose(shorter, whole, atol=1e-5 * np.max(np.abs(whole)))
+    assert 3 * few < many
+
+
+def test_samples_keep_their_order_their_stress_and_the_rate_at_which_they_were_taken():
+    for run in records():
+        (shorter,) = with_shorter_holds([run], TIME)
+        assert np.all(np.diff(shorter.time) > 0.0)
+        assert shorter.time[-1] < 0.2 * run.time[-1]
+        np.testing.assert_array_equal(shorter.stress, run.stress)
+        rates = shear_rates(shorter.protocol, shorter.time)
+        np.testing.assert_allclose(rates, run.rate)
+
+
+def test_what_is_held_only_shortly_or_not_at_all_stays_as_it_is():
+    times = np.linspace(0.01, 60.0, 400)
+    for flow in (
+        oscillatory_shear(4.0, 1.0),
+        measured_rate(times, 4.0 * np.cos(times)),
+        measured_rate(times, np.geomspace(10.0, 0.01, times.size)),
+    ):
+        run = dc.Run("a", times, flow, np.ones(times.size), np.ones(times.size))
+        assert with_shorter_holds([run], TIME)[0] is run
+    runs = records()
+    assert all(a is b for a, b in zip(with_shorter_holds(runs, 2.0), runs, strict=True))
+
+
+@pytest.mark.slow
+def test_the_law_found_is_that_of_the_whole_runs_and_a_wrong_shortening_is_seen(monkeypatch):
+    monkeypatch.setattr(shorter_holds, "AFFORDABLE", 0.0)
+    settings = {"base": BASE, "max_terms": 2, "n_stability": 0}
+    runs = records()
+    exact = dc.TensorSINDy(LIBRARY, screening="exact", **settings).fit(runs)
+    found = dc.TensorSINDy(LIBRARY, **settings).fit(runs)
+    assert [term.term for term in found.terms_] == ["sigma.sigma"]
+    assert "held for more than" in found.result_.message
+    assert "held for more than" not in exact.result_.message
+    assert found.coefficients_ == pytest.approx(exact.coefficients_, rel=1e-3, abs=1e-9)
+    low, high = found.terms_[0].ci95
+    assert low < MOBILITY < high
+    # the control: holds shortened before the fluid has settled are seen, and runs followed whole
+    monkeypatch.setattr(shorter_holds, "SETTLED", 0.3)
+    again = dc.TensorSINDy(LIBRARY, **settings).fit(runs)
+    assert "held for more than" not in again.result_.message
+    assert again.coefficients_ == pytest.approx(exact.coefficients_, rel=1e-3, abs=1e-9)
