@@ -49,10 +49,12 @@ def main() -> None:
     tasks = {"close-loop": of_loop, "compare": of_compare}
     rows = []
     for test in options.tests.split(","):
-        for place, material in enumerate(options.materials.split(",")):
+        for material in options.materials.split(","):
             folder = options.out / f"{test}_{material}"
             if not folder.exists():
-                made = Folder(folder, options.seed + 1000 * place + 10 * list(TESTS).index(test))
+                # whatever else is asked for, so that a part makes the same records as the whole
+                place = 1000 * list(MATERIALS).index(material) + 10 * list(TESTS).index(test)
+                made = Folder(folder, options.seed + place)
                 TESTS[test](made, MATERIALS[material])
                 made.close()
             for task, ask in tasks.items():
