@@ -108,7 +108,8 @@ def test_an_import_ends_in_a_page_and_keeps_a_study_changed_by_hand(tmp_path):
     page = (out / "data.html").read_text()
     assert re.findall(r'<figure id="(\w+)"', page) == ["linear_sweep"]
     # what the block was taken for, and why, as the command itself says
-    assert "frequency sweep" in said.output and "frequency sweep" in page
+    assert "frequency sweep" in said.output
+    assert "frequency sweep" in page
     load_study_data(parse_study(tomllib.loads((out / "study.toml").read_text())))
     assert not check_folder(str(out)).of("error")
 

@@ -180,7 +180,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         started = time.perf_counter()
         check_settings(self.get_params(deep=False))
         known = known_part(self)
-        runs = as_runs(X, known.relaxation_time)
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
         recipe = self._recipe()
         problem, fitted = _problem(runs, known), ""

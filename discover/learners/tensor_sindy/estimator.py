@@ -242,7 +242,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self._check_parameters()
         library = build_library() if self.library is None else self.library
         known = known_part(self)
-        runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
+        # once, for it may be read only once
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
 
         def make(runs: Sequence[Run], **limits: float) -> TrajectoryProblem:
