@@ -256,7 +256,10 @@ def predict_many(
         predicted = problem.flows.over(partial(run, at, coefficients, inner))
         return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
 
-    return jax.lax.map(law, (coefficients, inner, modulus), batch_size=_LAWS_AT_ONCE)
+    # side by side, a law that is given up at once would cost as much as the slowest beside it
+    followed = all(protocols.control in FOLLOWED for protocols, _ in problem.flows.parts)
+    at_once = _LAWS_AT_ONCE if followed else None
+    return jax.lax.map(law, (coefficients, inner, modulus), batch_size=at_once)
 
 
 @compiled
