@@ -56,7 +56,11 @@ def told_by_kinds(
 
 def _constants(model: AugmentedModel, fit: Fit, effects: Sequence[str]) -> list[Sized]:
     declared = model.declared
-    factors = {0: MODULUS, 1: RELAXATION_TIME}
+    single = len(declared.modulus) == 1
+    factors = {
+        0: MODULUS if single else "modulus_factor",
+        1: RELAXATION_TIME if single else "relaxation_time_factor",
+    }
     names = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
     # these are fitted as the logarithm of a factor, whose error is relative already
     size = {at: 1.0 for at in factors}

@@ -82,5 +82,5 @@ def _normal_stresses(
         size = np.sqrt(np.mean([np.mean(first[i, : len(runs[i])] ** 2) for i in at]))
         columns = np.concatenate([own[i, : len(runs[i])] for i in at])
         if size > 0.0 and np.all(np.isfinite(columns)):
-            found.append(Sized(f"N1 in the {kind}", columns / size))
+            found.append(Sized(f"N1 in the {kind}, if this is the law", columns / size))
     return found
