@@ -372,8 +372,10 @@ def make_grids(
             columns[0], columns[1], columns[2], cycle=cycle, cycle_steps=cycle_steps
         )
     largest = max(float(np.max(np.asarray(p.table_strains))) for p in protocols)
-    # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested)
-    step = min(_STRAIN_OF_CYCLE, 4.0 * limits.get("strain_step", 0.1))
+    # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested), and one of
+    # twice these, on a rough grid, by sixteen times as much
+    strain_step = limits.get("strain_step", 0.1)
+    step = min(4.0 * strain_step, max(_STRAIN_OF_CYCLE, 2.0 * strain_step))
     phase = half_cycle(largest, step)
     phases = jnp.asarray(np.tile(phase, (len(grids), 1)))
     return IntegrationGrid(columns[0], columns[1], columns[2], phases)
