@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from every_test_records import MODULUS, NOISE, SOLVENT, TIME, true_n1
+from every_test_records import NOISE, true_n1
 
 PLANTED = {
     "declared": {},
@@ -71,7 +71,7 @@ def of_compare(folder: Path, material: str, base) -> dict:
                 row["false"].append(f"{term.term} is {value:g} and not {low:.3g} to {high:.3g}")
     if row["verdict"] == "explained" and "N1" not in row["undetermined"]:
         times = np.linspace(0.1, 8.0, 40)
-        fluid = dc.Fluid(found.outcomes["tensor_sindy"].law, MODULUS, TIME, SOLVENT)
+        fluid = found.equation("tensor_sindy").fluid()
         said = dc.simulate(fluid, dc.start_up(2.0), times).first_normal_stress_difference
         exact = true_n1(material)
         miss = float(np.sqrt(np.mean((np.asarray(said) - exact) ** 2) / np.mean(exact**2)))
