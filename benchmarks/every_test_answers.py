@@ -50,6 +50,7 @@ def of_loop(folder: Path, material: str, base) -> dict:
 def of_compare(folder: Path, material: str, base) -> dict:
     """Return what a comparison says, and whether it is false."""
     import discover as dc
+    from discover.simulate import simulate
 
     found = dc.compare(data_of(folder), base, learners=["tensor_sindy"], library={"degree": 1})
     terms = found.outcomes["tensor_sindy"].terms
@@ -72,7 +73,7 @@ def of_compare(folder: Path, material: str, base) -> dict:
     if row["verdict"] == "explained" and "N1" not in row["undetermined"]:
         times = np.linspace(0.1, 8.0, 40)
         fluid = found.equation("tensor_sindy").fluid()
-        said = dc.simulate(fluid, dc.start_up(2.0), times).first_normal_stress_difference
+        said = simulate(fluid, dc.start_up(2.0), times).first_normal_stress_difference
         exact = true_n1(material)
         miss = float(np.sqrt(np.mean((np.asarray(said) - exact) ** 2) / np.mean(exact**2)))
         row["n1_miss"] = miss
