@@ -31,7 +31,7 @@ _OWN = {"runs.csv", "tests.csv", "import.toml"}
 
 def tried(path: Path, options: tuple[str, ...], out: Path) -> str:
     """Import a file; return what the command said."""
-    words = ["data", "import", str(path), "--out", str(out), "--overwrite", *options]
+    words = ["data", "import", str(path), "--out", str(out), "--overwrite", "--no-page", *options]
     return CliRunner().invoke(app, words).output
 
 

@@ -3,7 +3,7 @@
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import Annotated, get_args
 
 import typer
 
@@ -11,9 +11,6 @@ from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import JsonOption, OverwriteOption
 from discover.errors import InputError
-
-if TYPE_CHECKING:  # --help needs no data
-    from discover.dataset import Dataset
 
 data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_help=True)
 
@@ -66,6 +63,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show the runs of a data set, in a table and on a page."""
+    from discover.cli.pages_on_data import write_page
     from discover.dataset.load import load_dataset
     from discover.dataset.run_table import run_line
 
@@ -74,7 +72,7 @@ def show(
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
-    page = None if out is None else _write_page(dataset, name, out)
+    page = None if out is None else write_page(dataset, name, out)
     if as_json:
         content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
         typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
@@ -97,20 +95,6 @@ def show(
     else:
         say(f"Page: {page}")
         say(f"A study to start from: discover close-loop {page.with_name('study.toml')}")
-
-
-def _write_page(dataset: "Dataset", name: str, out: Path) -> Path:
-    """Write the page on a data folder and a first study beside it; return the page's path."""
-    from discover.dataset.checking.folder import check_folder
-    from discover.report.data.page import data_page, first_study
-    from discover.study.atomic import make_folder, write_text
-
-    here = Path(name)
-    # where the study lies a relative path would be another one
-    folder = here.resolve().as_posix() if here.is_dir() else name
-    make_folder(out)
-    write_text(out / "study.toml", first_study(dataset, folder))
-    return write_text(out / "report.html", data_page(dataset, check_folder(name), folder))
 
 
 @data_app.command("check")
@@ -273,11 +257,15 @@ def import_data(
         int | None, typer.Option("--header-row", min=1, help="Line with the column names.")
     ] = None,
     encoding: Annotated[str | None, typer.Option("--encoding", help="Such as cp1252.")] = None,
+    page: Annotated[
+        bool, typer.Option(help="Write a page with every test drawn, and a study to start from.")
+    ] = True,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
+    from discover.cli.pages_on_data import STUDY_FILE, write_import_page
     from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.importing import import_files
@@ -310,6 +298,7 @@ def import_data(
     findings = check_folder(out) if whole else Findings()
     errors = findings.of("error")
     said = [*changed, *imported.said]
+    written = write_import_page(out, findings, said) if page and whole else None
     if as_json:
         content = {
             "folder": str(out),
@@ -317,6 +306,7 @@ def import_data(
             "said": said,
             "errors": [str(finding) for finding in errors],
             "warnings": [str(f) for f in findings.of("warning")],
+            "page": None if written is None else str(written),
         }
         typer.echo(json.dumps(content, indent=2))
     else:
@@ -325,7 +315,8 @@ def import_data(
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
         say(f"{out}: {len(imported.files) + 1} files written.")
-        if whole:
-            say(f"To see every test drawn: discover data show {out} --out DIR")
+        if written is not None:
+            say(f"Every test drawn, to see whether each column is what its name says: {written}")
+            say(f"A study to start from: discover close-loop {out / STUDY_FILE}")
     if errors:
         raise typer.Exit(2)

@@ -45,6 +45,7 @@ from discover.closed_loop.judging.held_out import held_out as predict_held_out
 from discover.closed_loop.judging.judgement import Judgement, Silence, judge
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.silence import fluid_is_silent, records_are_silent
+from discover.closed_loop.judging.told_by_kinds import told_by_kinds
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -204,7 +205,8 @@ def run_loop(
         judging = record_runs(model, held_batch, held_runs, thetas, held_out=True, order=order)
         records += judging
     summary = summarise(current.residual, np.asarray(batch.weight))
-    bounds = intervals(model, batch, current, modulus_shifts(model, current.theta, batch))
+    shifts = modulus_shifts(model, current.theta, batch)
+    bounds = intervals(model, batch, current, shifts)
     share = float(np.mean(current.run_errors))
     unknown = change_between_samples(model, batch, fitted_runs, current.theta, active, share)
     coarse = None
@@ -221,6 +223,8 @@ def run_loop(
     # as they were recorded: a window of strain may have cut their start off
     whole = dataset.select([run.name for run in fitted_runs]).runs
     mistaken = [run.name for run in whole if any(doubts_of_start(run))]
+    unseen_runs = None if held_batch is None else (held_batch, held_runs)
+    told = told_by_kinds(model, batch, current, fitted_runs, [*active, *known], unseen_runs, shifts)
     silence: Silence | None = "records" if silent else None
     if not silent and fluid_is_silent(model, batch, current, active):
         silence = "fluid"
@@ -262,13 +266,13 @@ def run_loop(
         following = next_tests(model, batch, carried, side_by_side, fitted_runs, judgement)
         parts = [(batch, records[: len(fitted_runs)]), (held_batch, judging)]
         records = with_band(model, batch, carried, side_by_side, parts, judgement, tried)
-        told = wider_bands(records[: len(fitted_runs)], batch, unknown)
+        wider = wider_bands(records[: len(fitted_runs)], batch, unknown)
         if held_batch is not None:
             unseen_rates = change_between_samples(
                 model, held_batch, held_runs, current.theta, active, share
             )
-            told += wider_bands(records[len(fitted_runs) :], held_batch, unseen_rates)
-        records = told
+            wider += wider_bands(records[len(fitted_runs) :], held_batch, unseen_rates)
+        records = wider
     fluid = augmented_fluid(model, current, [*active, *known])
     states = states_of(model, current, [*active, *known])
     return LoopResult(
@@ -308,6 +312,7 @@ def run_loop(
         next_tests=following,
         laws=tried_laws,
         free_form=forms,
+        told_by=told,
         fluid=None if differ or states != () else fluid,
         fluid_at_mean=fluid if differ or states else None,
         states=states or (),

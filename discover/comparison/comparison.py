@@ -173,6 +173,12 @@ class Comparison(PageView, NotebookView):
         """Quantities that the data do not decide."""
         return [s.quantity for s in self.statements if s.undetermined]
 
+    @property
+    def told_by(self) -> list[dict[str, Any]]:
+        """How well each kind of test determines the sparse law; empty if all are of one kind."""
+        sparse = self.outcomes.get("tensor_sindy")
+        return [] if sparse is None else list(sparse.details.get("told_by", []))
+
     def placement(self, flow: Flow) -> Placement:
         """Return whether a flow lies inside the range of those that were fitted."""
         return place(flow, self.flows_of("training"))
@@ -331,6 +337,7 @@ class Comparison(PageView, NotebookView):
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,
             "room_left": self.room_left,
+            "told_by": self.told_by,
             "warnings": list(self.warnings),
             "statements": [statement.to_json() for statement in self.statements],
             "structure": None if self.structure is None else self.structure.to_json(),

@@ -81,7 +81,7 @@ def compare(
     sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
-    data = settled_by(data, float(max(declared.relaxation_time)))
+    data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     pipkin = itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers)
     library = study_library(study) if library is None else library
     data, of_steps = with_step_instants(declared, data, library)

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.periodic_start import Cycle, periodic_start
 from discover.protocols.kinematics import Kinematics
+from discover.simulate.periodic_start import Cycle, periodic_start
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9

@@ -9,7 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.modified_newton import (
+from discover.simulate.exponential_runge_kutta import relax
+from discover.simulate.modified_newton import (
     FROM_REST,
     Approximation,
     first_approximation,
@@ -17,7 +18,6 @@ from discover.forward.modified_newton import (
     next_approximation,
     relative_change,
 )
-from discover.simulate.exponential_runge_kutta import relax
 
 # Most iterations in all, and the relative step below which the next one would change nothing that
 # is seen: Newton's error goes as its square

@@ -32,12 +32,12 @@ from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.integrator import integrate
-from discover.forward.periodic_start import Cycle
 from discover.forward.periodic_states import complex_modulus, first_harmonic
 from discover.forward.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
+from discover.simulate.periodic_start import Cycle
 from tensor_library.kinematics import rate_of_deformation
 
 

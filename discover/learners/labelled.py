@@ -70,7 +70,8 @@ def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Data
     wanted = getattr(estimator, "runs_", None) if runs is None else runs
     if wanted is None:
         raise InputError("A file holds no data; give the runs to predict: to_xarray(data).")
-    followed = as_runs(wanted, np.asarray(estimator.fluid_.relaxation_time))
+    fluid = estimator.fluid_
+    followed = as_runs(wanted, fluid.relaxation_time, fluid.law.linear_relaxation)
     each = [estimator.predict_members(run.protocol, run.time) for run in followed]
     variables = {
         name: (("member", "sample"), np.concatenate([getattr(one, name) for one in each], axis=1))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from discover.protocols.kinematics import FOLLOWED
+from discover.protocols.kinematics import STATES
 from discover.simulate.flow_batch import FlowBatch
 
 AFFORDABLE = 6000.0
@@ -21,7 +21,7 @@ _STRAIN_STEP, _PHASE_STEP, _GROWTH = 0.4, 0.3, 0.1
 
 
 def rough_limits(
-    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"]
+    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"], states: bool = False
 ) -> Mapping[str, float] | None:
     """Return limits of longer steps, as `make_grid` takes them; None where the flows have none.
 
@@ -35,12 +35,19 @@ def rough_limits(
         On the fine grid.
     relaxation_time
         Of the modes, in s.
+    states
+        Whether steady and periodic states have longer steps too; else there are none with them.
     """
-    if not {protocols.control for protocols, _ in flows.parts} <= set(FOLLOWED):
+    controls = {protocols.control for protocols, _ in flows.parts}
+    if not controls <= {"rate", *(STATES if states else ())}:
         return None
-    if any(protocols.control == "steady" for protocols, _ in flows.parts):
-        return None
-    longest = max(float(np.max(np.diff(grid.times, axis=1))) for _, grid in flows.parts)
+    if "rate" not in controls:
+        return {"strain_step": _STRAIN_STEP}
+    longest = max(
+        float(np.max(np.diff(grid.times, axis=1)))
+        for protocols, grid in flows.parts
+        if protocols.control == "rate"
+    )
     times = np.asarray(relaxation_time)
     followed = float(np.min(times) if longest <= np.min(times) else np.max(times))
     return {

@@ -139,7 +139,7 @@ class RunPrediction:
             If a run is unusable.
         """
         check_is_fitted(self, "fluid_")
-        return np.concatenate(self._predict_runs(as_runs(X, self.fluid_.relaxation_time)))
+        return np.concatenate(self._predict_runs(self._runs(X)))
 
     def score(self, X: Iterable[Run], y=None, sample_weight=None) -> float:
         """Return one minus the relative error of what is recorded, averaged over runs.
@@ -159,13 +159,17 @@ class RunPrediction:
         """
         del y, sample_weight
         check_is_fitted(self, "fluid_")
-        runs = as_runs(X, self.fluid_.relaxation_time)
+        runs = self._runs(X)
         errors = [
             np.sqrt(np.mean((p - run.recorded) ** 2) / np.mean(run.recorded**2))
             for p, run in zip(self._predict_runs(runs), runs, strict=True)
         ]
         error = float(np.mean(errors))
         return 1.0 - error if np.isfinite(error) else -np.inf
+
+    def _runs(self, X: Iterable[Run]) -> list[Run]:
+        fluid = self.fluid_
+        return as_runs(X, fluid.relaxation_time, fluid.law.linear_relaxation)
 
     @abstractmethod
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:

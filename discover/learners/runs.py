@@ -13,16 +13,24 @@ from discover.learners.settings import PerMode
 from discover.protocols import settled
 
 
-def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
+def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool = True) -> list[Run]:
     """Return the runs as a list, each as `as_compared` has it.
 
-    One that starts periodic gets as many cycles before it as the longest relaxation time, of these
-    in s, needs.
+    Parameters
+    ----------
+    runs
+        A data set, or runs.
+    relaxation_time
+        Of the modes, in s.
+    relaxes
+        Whether the fluid is known to relax: the state of a run that starts periodic is then solved
+        for. If not, or at a given stress, it gets as many cycles before it as the slowest mode
+        needs.
 
     Raises
     ------
     InputError
-        If there is none, one is something else, a mode is too slow to become periodic, or JAX
+        If there is none, one is something else, a mode is too slow to be waited for, or JAX
         computes in single precision.
     """
     require_double()
@@ -46,4 +54,21 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0) -> list[Run]:
                 "folder or make a synthetic data set."
             )
     longest = float(np.max(np.asarray(relaxation_time)))
-    return [replace(run, protocol=settled(run.protocol, longest)) for run in as_compared(listed)]
+    return [waiting(run, longest, relaxes) for run in as_compared(listed)]
+
+
+def waiting(run: Run, relaxation_time: float, relaxes: bool) -> Run:
+    """Return a run with the cycles before it that are waited for, if its state is not solved for.
+
+    Parameters
+    ----------
+    run
+        The run.
+    relaxation_time
+        The longest, in s.
+    relaxes
+        As `as_runs` takes it.
+    """
+    if relaxes and run.protocol.control == "rate":
+        return run
+    return replace(run, protocol=settled(run.protocol, relaxation_time))

@@ -118,8 +118,14 @@ class FlowBatch(eqx.Module):
                 times, share = np.asarray(grids.times), np.arange(count) / count
                 cut = times[:, :-1, None] + np.diff(times, axis=1)[..., None] * share
                 cut = np.concatenate([cut.reshape(len(times), -1), times[:, -1:]], axis=1)
-                index = count * grids.sample_index
-                grids = IntegrationGrid(jnp.asarray(cut), index, grids.sample_mask)
+                cycle = None if grids.cycle is None else count * grids.cycle
+                grids = replace(
+                    grids,
+                    times=jnp.asarray(cut),
+                    sample_index=count * grids.sample_index,
+                    cycle=cycle,
+                    cycle_steps=count * grids.cycle_steps,
+                )
             parts.append((protocols, grids))
         return FlowBatch(tuple(parts), self.shown)
 
@@ -193,9 +199,13 @@ def lay_out(
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
     n_samples: int = 0,
+    relaxation_time: float | None = None,
     **limits: Any,
 ) -> FlowBatch:
     """Return flows with their grids, as many padded samples in each.
+
+    Of an oscillation that had gone on for ever the periodic state is solved for if the fluid
+    relaxes; if not, the cycles with which its protocol begins are waited for.
 
     Parameters
     ----------
@@ -203,6 +213,8 @@ def lay_out(
         One flow and its sampling times for each run.
     n_samples
         Pad to so many samples, or to those of the longest run.
+    relaxation_time
+        Longest of the fluid, in s; None where only what is learned relaxes.
     **limits
         As `make_grids` takes them.
     """
@@ -213,7 +225,13 @@ def lay_out(
         firsts = [next(j for j in own if _is_one_flow(protocols, times, i, j)) for i in own]
         distinct = list(dict.fromkeys(firsts))
         flows = [replace(protocols[i], modulus=None) for i in distinct]
-        grids = make_grids(flows, [times[i] for i in distinct], **limits)
+        grids = make_grids(
+            flows,
+            [times[i] for i in distinct],
+            relaxation_time,
+            from_cycle=relaxation_time is not None,
+            **limits,
+        )
         parts.append((stack_protocols(flows), _with_samples(grids, n)))
         pairs = zip(own, firsts, strict=True)
         shown.append(tuple(Shown(i, distinct.index(j), protocols[i].modulus) for i, j in pairs))
@@ -233,5 +251,8 @@ def _with_samples(grids: IntegrationGrid, n: int) -> IntegrationGrid:
     more = ((0, 0), (0, n - index.shape[1]))
     if not more[1][1]:
         return grids
-    longer = jnp.asarray(np.pad(index, more, mode="edge")), jnp.asarray(np.pad(mask, more))
-    return IntegrationGrid(grids.times, *longer, grids.phase)
+    return replace(
+        grids,
+        sample_index=jnp.asarray(np.pad(index, more, mode="edge")),
+        sample_mask=jnp.asarray(np.pad(mask, more)),
+    )

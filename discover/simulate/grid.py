@@ -34,6 +34,9 @@ _JUMP_STEPS, _GROWTH, _STEPS_BETWEEN = 24, 0.04, 2
 _FEWEST_OF_HALF, _MOST_OF_HALF = 12.0, 4000
 _STRAIN_OF_CYCLE = 0.4
 
+# Steps of a cycle are rounded up to multiples of this, so that runs share a compilation
+_STEPS_OF_CYCLE = 16
+
 # A rate is constant while it changes by less than this fraction from sample to sample
 _CHANGE = 0.05
 
@@ -59,12 +62,19 @@ class IntegrationGrid(eqx.Module):
     phase
         Of oscillations that have gone on until they are periodic: ωt at step ends and middles in
         turn over half a cycle, shape (m,). None elsewhere.
+    cycle
+        Steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of a run
+        that had not, None where no run had.
+    cycle_steps
+        The most steps that such a cycle has.
     """
 
     times: Float[Array, "*batch s"]
     sample_index: Int[Array, "*batch n"]
     sample_mask: Bool[Array, "*batch n"]
     phase: Float[Array, "*batch m"] | None = None
+    cycle: Int[Array, "*batch"] | None = None
+    cycle_steps: int = eqx.field(static=True, default=0)
 
     @property
     def sample_times(self) -> Float[Array, "*batch n"]:
@@ -94,6 +104,7 @@ def make_grid(
     max_step: float = np.inf,
     growth: float = 0.0,
     relaxation_time: float | None = None,
+    from_cycle: bool = False,
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Return step times and the position of each sample among them.
 
@@ -123,6 +134,9 @@ def make_grid(
         rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as
         exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out
         of it. Half of this relaxation is counted on. None leaves steps as they are.
+    from_cycle
+        Whether what had gone on for ever begins with its last cycle before the record, whose state
+        is solved for, and not with all that are waited for.
 
     Raises
     ------
@@ -135,7 +149,10 @@ def make_grid(
     if protocol.control == "stress":
         grid = stress_grid(protocol, times, strain_step)
         return grid, np.searchsorted(grid, times)
-    begins, end = float(protocol.begins), float(times[-1])
+    cycle = np.asarray(protocol.cycle)
+    from_cycle = from_cycle and _follows_cycle(protocol, times)
+    begins = float(cycle[0] if from_cycle else protocol.begins)
+    end = float(times[-1])
     knots = np.asarray(protocol.table_times)
     rates = np.asarray(protocol.table_rates)
     kinks = knots[(knots > begins) & (knots < end)]
@@ -151,7 +168,6 @@ def make_grid(
     recorded = rates[max(int(np.searchsorted(knots, 0.0, side="right")) - 1, 0) :]
     table = np.max(np.abs(recorded if steady.size else rates))
     rest = _relaxation(times) if begins < 0.0 and not np.any(recorded) else ()
-    cycle = np.asarray(protocol.cycle)
     anchors = np.unique(np.concatenate([[begins, 0.0], times, kinks, before, steady, rest, cycle]))
     intensity = 1.0 if protocol.kinematics is None else float(protocol.kinematics.intensity)
     fastest = intensity * (table + np.sum(np.abs(np.asarray(protocol.amplitudes))))
@@ -185,6 +201,16 @@ def make_grid(
         + [anchors[-1:]]
     )
     return grid, np.searchsorted(grid, times)
+
+
+def had_gone_on(protocol: FlowProtocol) -> bool:
+    """Return whether a flow at a given rate is an oscillation that had gone on for ever."""
+    return protocol.control == "rate" and bool(np.ptp(np.asarray(protocol.cycle)))
+
+
+def _follows_cycle(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> bool:
+    end = float(protocol.cycle[1])
+    return had_gone_on(protocol) and float(times[0]) >= end - 1e-9 * abs(end)
 
 
 def stress_grid(
@@ -327,6 +353,7 @@ def make_grids(
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
     relaxation_time: float | None = None,
+    from_cycle: bool = False,
     **limits: float,
 ) -> IntegrationGrid:
     """Return the grids of several runs, padded to one shape with a leading batch axis.
@@ -335,14 +362,19 @@ def make_grids(
     ----------
     protocols, times
         One flow of one control and its sampling times for each run; see `make_grid`.
-    relaxation_time, **limits
-        Step limits of `make_grid`.
+    relaxation_time, from_cycle, **limits
+        Step limits of `make_grid`, and where it begins.
     """
     grids = [
-        make_grid(p, t, relaxation_time=relaxation_time, **limits)
+        make_grid(p, t, relaxation_time=relaxation_time, from_cycle=from_cycle, **limits)
         for p, t in zip(protocols, times, strict=True)
     ]
-    n_steps = max(max(len(g) for g, _ in grids), 2)
+    cycles = [
+        np.searchsorted(grid, float(p.cycle[1])) if from_cycle and _follows_cycle(p, t) else 0
+        for p, t, (grid, _) in zip(protocols, times, grids, strict=True)
+    ]
+    cycle_steps = -(-int(max(cycles)) // _STEPS_OF_CYCLE) * _STEPS_OF_CYCLE
+    n_steps = max(max(len(g) for g, _ in grids), cycle_steps + 1, 2)
     n_samples = max(len(i) for _, i in grids)
     stacked = [], [], []
     for grid, index in grids:
@@ -353,10 +385,15 @@ def make_grids(
         stacked[2].append(np.arange(n_samples) < len(index))
     columns = [jnp.asarray(np.stack(s)) for s in stacked]
     if protocols[0].control != "oscillation":
-        return IntegrationGrid(columns[0], columns[1], columns[2])
+        cycle = jnp.asarray(np.array(cycles)) if cycle_steps else None
+        return IntegrationGrid(
+            columns[0], columns[1], columns[2], cycle=cycle, cycle_steps=cycle_steps
+        )
     largest = max(float(np.max(np.asarray(p.table_strains))) for p in protocols)
-    # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested)
-    step = min(_STRAIN_OF_CYCLE, 4.0 * limits.get("strain_step", 0.1))
+    # a cycle of so large steps errs by 5e-6 of the moduli at a strain of 10 (tested), and one of
+    # twice these, on a rough grid, by sixteen times as much
+    strain_step = limits.get("strain_step", 0.1)
+    step = min(4.0 * strain_step, max(_STRAIN_OF_CYCLE, 2.0 * strain_step))
     phase = half_cycle(largest, step)
     phases = jnp.asarray(np.tile(phase, (len(grids), 1)))
     return IntegrationGrid(columns[0], columns[1], columns[2], phases)

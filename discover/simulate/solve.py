@@ -15,9 +15,9 @@ from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol, shear_rates
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
-from discover.simulate.fixed_steps import fixed_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.grid import IntegrationGrid
+from discover.simulate.following import Following, begun, follow
+from discover.simulate.grid import IntegrationGrid, had_gone_on
 from discover.simulate.steady_states import steady_state
 
 MAX_STEPS = 100_000
@@ -131,7 +131,8 @@ def simulate(
     times
         Sampling times, shape (n,), increasing, from 0 on.
     rtol, atol
-        Tolerances on the dimensionless stress of each mode.
+        Tolerances on the dimensionless stress of each mode. What begins with a periodic state is
+        followed in fixed steps instead, for that state is solved for.
 
     Raises
     ------
@@ -147,8 +148,8 @@ def simulate(
             f"{protocol.control!r}. A learned law's predict() and compare() take runs of any "
             "control."
         )
-    if protocol.control == "steady":
-        return _steady(fluid, protocol, times)
+    if protocol.control == "steady" or (had_gone_on(protocol) and fluid.settling_time):
+        return _solved_for(fluid, protocol, times)
     end = float(times[-1])
     if end == float(protocol.begins):
         gradient = protocol.velocity_gradient(jnp.asarray(end))
@@ -176,13 +177,18 @@ def simulate(
     return ShearStress(times, components)
 
 
-def _steady(fluid: Fluid, protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> ShearStress:
-    components = np.asarray(solve_batch(fluid, lay_out([protocol], [times])))[0]
+def _solved_for(
+    fluid: Fluid, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
+) -> ShearStress:
+    """Return what `simulate` does of steady states, and of what begins with a periodic one."""
+    flows = lay_out([protocol], [times], relaxation_time=fluid.settling_time)
+    components = np.asarray(solve_batch(fluid, flows))[0]
     if not np.all(np.isfinite(components)):
+        state = "steady state" if protocol.control == "steady" else "periodic state"
         lost = shear_rates(protocol, times)[np.argmax(~np.all(np.isfinite(components), axis=1))]
         raise SimulationError(
-            f"The law has no steady state that is reached from rest at a rate of {lost:g} 1/s. "
-            "Check its parameters and the rate."
+            f"The law has no {state} that is reached from rest at a rate of {lost:g} 1/s. Check "
+            "its parameters and the rate."
         )
     return ShearStress(times, components)
 
@@ -226,7 +232,7 @@ def solve_on_grid(
         grid.times[0],
         grid.times[-1],
         None,
-        fluid.rest(),
+        begun(_following(fluid, protocol), grid),
         args=(fluid, protocol),
         saveat=diffrax.SaveAt(t0=True, steps=True, fn=_observe),
         stepsize_controller=diffrax.StepTo(grid.times),
@@ -251,10 +257,11 @@ def solve_states_on_grid(
 def _in_fixed_steps(fluid, protocol, grid, observe):
     if protocol.control == "steady":
         return _in_steady_flow(fluid, protocol, grid, observe)
-    solver = exponential_steps(fluid)
-    args = (fluid, protocol)
-    values = fixed_steps(_vector_field, solver, grid.times, fluid.rest(), args, observe)
-    return values[grid.sample_index]
+    return follow(_following(fluid, protocol), grid, observe)
+
+
+def _following(fluid, protocol) -> Following:
+    return Following(_vector_field, exponential_steps(fluid), fluid.rest(), (fluid, protocol))
 
 
 def _in_steady_flow(fluid, protocol, grid, observe):

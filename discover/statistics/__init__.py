@@ -6,11 +6,14 @@ from discover.statistics.independent_samples import independent_samples
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.noise_model import NoiseModel, noise_model
 from discover.statistics.outliers import isolated
+from discover.statistics.told_by_tests import Sized, Told, told_by_tests
 
 __all__ = [
     "FitVerdict",
     "LackOfFit",
     "NoiseModel",
+    "Sized",
+    "Told",
     "holds_signal",
     "independent_samples",
     "isolated",
@@ -18,4 +21,5 @@ __all__ = [
     "least_squares_covariance",
     "noise_model",
     "root_of",
+    "told_by_tests",
 ]

@@ -203,6 +203,23 @@ def test_without_a_band_nothing_is_determined(good):
         assert [s.determined for s in statements] == ["no", "no"]
 
 
+def test_flows_without_a_normal_stress_determine_none(good):
+    """Of moduli N1 and N2 are zeros, and so is the width of their band."""
+    explanation, flows = good
+    found = {}
+    for key, band in bands(flows).items():
+        shown = {
+            name: np.asarray(getattr(band, name)) * [1.0, 0.0, 0.0]
+            for name in ("chosen", "low", "high", "rivals_low", "rivals_high")
+        }
+        found[key] = replace(band, **shown)
+    assert found[key].widths()["N1"] == 0.0
+    assert check_band("N1", flows, found, 0.01).half_width is None
+    statements = make_statements(explanation, flows, [], STRUCTURE, found)
+    assert [s.determined for s in statements] == ["no", "no"]
+    assert "No band says how far" in statements[0].text
+
+
 def test_a_band_that_misses_what_is_known_determines_nothing(good):
     explanation, flows = good
     known = [replace(f, reference={**f.reference, "N1": np.asarray(f.measured)}) for f in flows]

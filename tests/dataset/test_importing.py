@@ -24,7 +24,8 @@ OMEGA = np.geomspace(0.1, 100.0, 12)
 
 
 def invoke(*arguments):
-    return CliRunner().invoke(app, ["data", "import", *(str(a) for a in arguments)])
+    words = ["data", "import", *(str(a) for a in arguments), "--no-page"]
+    return CliRunner().invoke(app, words)
 
 
 def trios(path, comma=False):

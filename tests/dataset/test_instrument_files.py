@@ -45,7 +45,7 @@ def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
 
 def run(tmp_path, *arguments, code=0):
     out = tmp_path / "data"
-    words = ["data", "import", *map(str, arguments), "--out", str(out)]
+    words = ["data", "import", *map(str, arguments), "--out", str(out), "--no-page"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == code, result.output
     return out, result

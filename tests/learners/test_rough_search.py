@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 from independent import Giesekus, start_up
+from independent.sweeps import modulus_of
 
 import discover as dc
 from discover.learners import rough_grid
 from discover.learners.tensor_sindy import rough_problem as of_search
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.trajectories.problem import make_problem
+from discover.protocols import oscillations
+from discover.protocols.control import steady_rates
 from tensor_library.library import build_library
 
 LIBRARY = build_library(degree=0)
@@ -53,6 +56,46 @@ def test_a_rough_grid_ranks_laws_by_nearly_the_misfit_of_the_fine_one(monkeypatc
     # sixty of ninety samples, each with its noise: the two differ by some per cent of the misfit
     assert misfits[0] == pytest.approx(misfits[1], rel=0.1)
     assert np.argmin(misfits[0]) == 2
+
+
+def sweep_and_curve(noise=0.01, n=32):
+    """Return an amplitude sweep at 1 rad/s and a flow curve of one Giesekus mode."""
+    generator, material = np.random.default_rng(0), Giesekus(MOBILITY, 300.0, 2.0)
+    strain, rates = np.geomspace(0.05, 5.0, n), np.geomspace(0.05, 5.0, n)
+    moduli = np.array([modulus_of(material, each, 1.0, 4) for each in strain])
+    off = 1.0 + noise * generator.standard_normal((3, n))
+    stress = np.array([material.steady_shear(rate)[0] for rate in rates]) * off[0]
+    counted, ones = np.arange(1.0, n + 1.0), np.ones(n)
+    sweep = dc.Run(
+        "sweep", counted, oscillations(strain, ones), strain, ones, strain=strain,
+        storage_modulus=moduli.real * off[1], loss_modulus=moduli.imag * off[2],
+    )  # fmt: skip
+    return [*sweep.records, dc.Run("curve", counted, steady_rates(rates), rates, stress)]
+
+
+@pytest.mark.slow
+def test_sweeps_and_flow_curves_are_ranked_by_fewer_states(monkeypatch):
+    monkeypatch.setattr(of_search, "AFFORDABLE", 0.0)
+    runs = sweep_and_curve()
+
+    def one_mode(runs, **limits):
+        return make_problem(runs, LIBRARY, 300.0, 2.0, base=BASE.law, **limits)
+
+    fine = one_mode(runs)
+    rough = of_search.rough_problem(fine, runs, one_mode)
+    assert rough is not None
+    assert 3 * rough.flows.n_steps <= fine.flows.n_steps
+    assert "16 of a sweep or flow curve" in of_search.ranked_in_words(fine, rough, 1)
+    supports = [(LIBRARY.names.index(name),) for name in ("sigma", "gammadot", "sigma.sigma")]
+    begin = [(np.zeros(len(LIBRARY)), LIBRARY.inner_default)] * 3
+    misfits = [
+        [f.misfit for f in refit(p, supports, begin, np.ones(len(LIBRARY)), 5)]
+        for p in (rough, fine)
+    ]
+    # sixteen of 32 samples tell a misfit to a tenth or two, and wrong laws apart from the right
+    assert misfits[0] == pytest.approx(misfits[1], rel=0.3)
+    assert np.argmin(misfits[0]) == np.argmin(misfits[1]) == 2
+    assert min(misfits[0][:2]) > 5.0 * misfits[0][2]
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from independent.folders import maxwell_sweep, write_table
 from typer.testing import CliRunner
 
 from discover.cli.app import app
+from discover.cli.pages_on_data import write_import_page
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
 from discover.report.data.page import data_page, first_study
@@ -95,3 +96,35 @@ def test_the_command_writes_page_and_study_and_says_where(tmp_path):
     assert sorted(path.name for path in out.iterdir()) == ["report.html", "study.toml"]
     assert str(folder) in (out / "study.toml").read_text()
     assert not [path for path in folder.iterdir() if path.suffix != ".csv"]
+
+
+def test_an_import_ends_in_a_page_and_keeps_a_study_changed_by_hand(tmp_path):
+    export = tmp_path / "export.csv"
+    write_table(export, maxwell_sweep([100.0], [1.0], OMEGA))
+    out = tmp_path / "melt"
+    words = ["data", "import", str(export), "--out", str(out)]
+    said = CliRunner().invoke(app, words)
+    assert said.exit_code == 0, said.output
+    page = (out / "data.html").read_text()
+    assert re.findall(r'<figure id="(\w+)"', page) == ["linear_sweep"]
+    # what the block was taken for, and why, as the command itself says
+    assert "frequency sweep" in said.output
+    assert "frequency sweep" in page
+    load_study_data(parse_study(tomllib.loads((out / "study.toml").read_text())))
+    assert not check_folder(str(out)).of("error")
+
+    (out / "study.toml").write_text("changed by hand")
+    (out / "data.html").unlink()
+    assert CliRunner().invoke(app, [*words, "--overwrite", "--no-page"]).exit_code == 0
+    assert not (out / "data.html").exists()
+    assert CliRunner().invoke(app, [*words, "--overwrite"]).exit_code == 0
+    assert (out / "data.html").exists()
+    assert (out / "study.toml").read_text() == "changed by hand"
+
+
+def test_a_folder_that_cannot_be_loaded_has_no_page(tmp_path):
+    (tmp_path / "runs.csv").write_text("file\nlost.csv\n")
+    findings = check_folder(str(tmp_path))
+    assert findings.of("error")
+    assert write_import_page(tmp_path, findings, []) is None
+    assert [path.name for path in tmp_path.iterdir()] == ["runs.csv"]

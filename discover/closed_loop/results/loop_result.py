@@ -45,6 +45,7 @@ from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
+from discover.statistics import Told
 from discover.words import percent_of
 
 if TYPE_CHECKING:
@@ -96,6 +97,9 @@ class LoopResult(PageView, HasEquation, NotebookView):
         The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
         Free functions of one variable that explain what named effects leave, the likeliest first.
+    told_by
+        How well each kind of test that was fitted determines constants and runs held out; none
+        where all are of one kind.
     folds
         The loops that left each run out in turn, where they were asked for; the held-out errors
         are then their means.
@@ -123,6 +127,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     next_tests: NextTests = field(repr=False, default_factory=NextTests)
     laws: tuple[LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
+    told_by: tuple[Told, ...] = ()
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
@@ -352,6 +357,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             "held_out_in_band": self.held_in_band,
             "laws": [one.to_json() for one in self.laws],
             "free_form": [one.to_json() for one in self.free_form],
+            "told_by": [one.to_json() for one in self.told_by],
             "folds": [asdict(fold) for fold in self.folds],
             "seconds": self.seconds,
             **self._law(),

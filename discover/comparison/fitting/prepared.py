@@ -7,7 +7,7 @@ from discover.dataset import Run
 from discover.dataset.material_functions import as_compared
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
-from discover.protocols import settled
+from discover.learners.runs import waiting
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
 
@@ -33,7 +33,7 @@ def prepared(data: StudyData) -> StudyData:
     return _with_runs(data, as_compared)
 
 
-def settled_by(data: StudyData, relaxation_time: float) -> StudyData:
+def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
     """Return data in which what starts periodic has the cycles before it that learners wait for.
 
     Parameters
@@ -42,10 +42,10 @@ def settled_by(data: StudyData, relaxation_time: float) -> StudyData:
         Of a study, split.
     relaxation_time
         The longest, in s.
+    relaxes
+        Whether the known law relaxes, so that a periodic state is solved for.
     """
-    return _with_each_run(
-        data, lambda run: replace(run, protocol=settled(run.protocol, relaxation_time))
-    )
+    return _with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
 
 
 def thinned_to(data: StudyData, most: int) -> StudyData:

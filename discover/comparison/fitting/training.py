@@ -96,7 +96,7 @@ def train(
         ).fit(list(runs))
         # while the search with all its fits is at hand; only its result is kept in files
         drawn = not _surely_unexplained(sparse, runs, expectation_of(study, model))
-        return searched(sparse, seed, drawn), sparse.fluid_
+        return searched(sparse, seed, drawn, runs), sparse.fluid_
     if learner == "tensor_dense":
         from discover.learners.tensor_dense import TensorDense
 
@@ -147,7 +147,9 @@ def _surely_unexplained(
     return left.verdict == "unexplained" and left.misfit > _SURELY * left.expected
 
 
-def searched(sparse: "TensorSINDy", seed: int = 0, drawn: bool = True) -> LearnerResult:
+def searched(
+    sparse: "TensorSINDy", seed: int = 0, drawn: bool = True, runs: Sequence[Run] = ()
+) -> LearnerResult:
     """Return what a fitted sparse learner found, with the rivals that its search left standing.
 
     Parameters
@@ -158,18 +160,25 @@ def searched(sparse: "TensorSINDy", seed: int = 0, drawn: bool = True) -> Learne
         Of draws within the uncertainty.
     drawn
         Whether to draw the constants of rivals within theirs, for bands.
+    runs
+        That were fitted, for what each kind of test tells; none leaves that out.
     """
     from discover.identify.rivals.fitted_rivals import MOST_RIVALS, find_rivals
     from discover.learners.tensor_sindy.report import uncertainty_row
+    from discover.learners.tensor_sindy.told_by_kinds import told_by_kinds
 
     result = sparse.result_
-    found = find_rivals(sparse.search_, sparse.path_[result.details["chosen"]])
+    chosen = sparse.path_[result.details["chosen"]]
+    found = find_rivals(sparse.search_, chosen)
     table = found.to_json()
     told = table["rivals"][:MOST_RIVALS] if drawn else []
     for row, rival in zip(told, found.rivals, strict=False):
         assert rival.fit is not None  # the search at hand refitted it
         row.update(uncertainty_row(sparse.search_, rival.fit, seed))
     table["rivals_text"] = table.pop("text")
+    if runs:
+        told_by = told_by_kinds(sparse.search_, chosen, runs)
+        table["told_by"] = [one.to_json() for one in told_by]
     return replace(result, details={**result.details, **table})
 
 

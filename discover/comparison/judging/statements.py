@@ -130,10 +130,12 @@ def check_band(
         Relative noise of the records.
     """
     column = QUANTITIES.index(quantity)
+    relative_to = QUANTITIES.index("N1") if quantity == "N2" else column
     half_width, missed, off = None, "", 0.0
     for flow in flows:
         band = bands.get(flow.key)
-        if band is None:
+        # of moduli there is no normal stress to have a band: that of zeros would hold them all
+        if band is None or not np.any(band.chosen[:, relative_to]):
             continue
         width = 0.5 * band.widths()[quantity]
         half_width = max(half_width or 0.0, width if np.isfinite(width) else np.inf)

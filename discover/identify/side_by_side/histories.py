@@ -93,8 +93,8 @@ def random_histories(each: int = 3, seed: int = 0, max_step: float = np.inf) -> 
     ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
     protocols += ordinary.values()
     times = np.linspace(0.0, _DURATION, _SAMPLES)
-    limits = {"strain_step": _STRAIN_STEP, "max_step": max_step}
-    grids = make_grids(protocols, [times] * len(protocols), **limits)
+    every = [times] * len(protocols)
+    grids = make_grids(protocols, every, strain_step=_STRAIN_STEP, max_step=max_step)
     return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes), tuple(ordinary))
 
 

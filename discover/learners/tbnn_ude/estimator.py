@@ -185,7 +185,7 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         del y
         check_settings(self.get_params(deep=False))
         known = known_part(self)
-        runs = as_runs(X, known.relaxation_time)
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
         return self._fitted(X, runs, known, known.linear_relaxation)
 

@@ -25,7 +25,7 @@ from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
-from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.following import Following, follow
 from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
 
@@ -171,8 +171,12 @@ def states_and_jacobian(
             return steady_run(protocol, grid)
         start = jnp.pad(fluid.rest()[..., None], ((0, 0), (0, 0), (0, n_weights)))
         solver = exponential_steps(fluid, columns=True)
-        observed = fixed_steps(field, solver, grid.times, start, protocol, observe)
-        return jax.tree.map(lambda values: values[grid.sample_index], observed)
+
+        def states_alone(t, states, protocol):
+            return fluid.state_rate(states, protocol.velocity_gradient(t))
+
+        alone = Following(states_alone, exponential_steps(fluid), fluid.rest(), protocol)
+        return follow(Following(field, solver, start, protocol), grid, observe, alone)
 
     along, jacobian = flows.over(one_run)
     return along, jnp.where(looked_at[..., None], jacobian, 0.0)

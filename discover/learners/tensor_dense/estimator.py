@@ -176,7 +176,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         check_settings(self.get_params(deep=False))
         self._check_parameters()
         known = known_part(self)
-        runs = as_runs(X, known.relaxation_time)
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
         problem = self._problem(runs)
 
@@ -248,7 +248,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self, "fluid_")
         fluid = self.fluid_
-        runs = as_runs(X, fluid.relaxation_time)
+        runs = as_runs(X, fluid.relaxation_time, fluid.law.linear_relaxation)
         flows = lay_out(
             [r.protocol for r in runs],
             [r.time for r in runs],

@@ -247,7 +247,8 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         check_settings(self.get_params(deep=False))
         self._check_parameters()
         known = known_part(self)
-        runs = as_runs(X, known.relaxation_time)  # once, for it may be read only once
+        # once, for it may be read only once
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
         shorten = self.screening == "auto" and known.linear_relaxation
         return self._fitted(X, runs, known, shorten)

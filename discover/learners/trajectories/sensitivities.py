@@ -30,7 +30,7 @@ from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
-from discover.simulate.fixed_steps import fixed_steps
+from discover.simulate.following import Following, follow
 from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
 from tensor_library.kinematics import rate_of_deformation
@@ -97,15 +97,21 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
         return _solved_run(problem, active, coefficients, inner, protocol, grid)
     columns = 1 + coefficients.shape[0] + inner.shape[0]
     start = jnp.pad(_rest(problem)[..., None], ((0, 0), (0, 0), (0, columns - 1)))
-    observed = fixed_steps(
-        _vector_field,
-        _solver(problem, columns=True),
-        grid.times,
-        start,
-        (problem, protocol, active, coefficients, inner),
-        _observe,
-    )
-    return observed[grid.sample_index]
+    args = (problem, protocol, active, coefficients, inner)
+    following = Following(_vector_field, _solver(problem, columns=True), start, args)
+    alone = _states_alone(problem, active, coefficients, inner, protocol)
+    return follow(following, grid, _observe, alone)
+
+
+def _states_alone(problem, active, coefficients, inner, protocol) -> Following:
+    """Return how the states change, without sensitivities."""
+    mode = partial(_known_less_terms, problem, active, coefficients, inner)
+
+    def field(t, stress, _):
+        rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
+        return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
+
+    return Following(field, _solver(problem), _rest(problem), None)
 
 
 def _rest(problem):
@@ -238,21 +244,11 @@ def predict_many(
         if protocol.control not in FOLLOWED:
             numbers = coefficients, inner
             return _observed_where_solved(problem, active, numbers, protocol, grid)
-        mode = partial(_known_less_terms, problem, active, coefficients, inner)
-
-        def field(t, stress, _):
-            rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
-            return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
-
-        observed = fixed_steps(
-            field,
-            _solver(problem),
-            grid.times,
-            _rest(problem),
-            None,
+        return follow(
+            _states_alone(problem, active, coefficients, inner, protocol),
+            grid,
             lambda t, stress, _: _observed(problem, protocol, t, stress),
         )
-        return observed[grid.sample_index]
 
     def law(numbers):
         coefficients, inner, modulus = numbers
@@ -260,7 +256,10 @@ def predict_many(
         predicted = problem.flows.over(partial(run, at, coefficients, inner))
         return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
 
-    return jax.lax.map(law, (coefficients, inner, modulus), batch_size=_LAWS_AT_ONCE)
+    # side by side, a law that is given up at once would cost as much as the slowest beside it
+    followed = all(protocols.control in FOLLOWED for protocols, _ in problem.flows.parts)
+    at_once = _LAWS_AT_ONCE if followed else None
+    return jax.lax.map(law, (coefficients, inner, modulus), batch_size=at_once)
 
 
 @compiled

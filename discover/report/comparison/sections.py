@@ -13,7 +13,9 @@ from discover.report.comparison import tables
 from discover.report.comparison.table_of_laws import law_rows
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
+from discover.report.told_by import told_by_table
 from discover.report.wording import readable
+from discover.statistics import Told
 
 Content = Mapping[str, Any]
 
@@ -149,6 +151,14 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         searched = f"Not searched, since the constants stand for it: {twins}." if twins else ""
         return {"constant_rows": rows, "searched": searched} if rows else None
 
+    def told_by() -> Content | None:
+        table = told_by_table([Told.from_json(row) for row in comparison.told_by])
+        return (
+            {"told_by": table, "is_unexplained": comparison.verdict == "unexplained"}
+            if table
+            else None
+        )
+
     def held_out_by_run() -> Content | None:
         found = tables.selection(comparison)
         return {"selection": found} if found and found["runs"] else None
@@ -178,6 +188,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
                 Part("The laws found", "laws", laws),
                 Part("The table of terms", "terms", terms),
                 Part("The constants fitted along", "constants", constants),
+                Part("The table of what each kind of test determined", "told_by", told_by),
                 Part(
                     "The table of the network's coefficients",
                     "coefficients",

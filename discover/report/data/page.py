@@ -23,7 +23,9 @@ from discover.report.wording import significant
 _ENOUGH_TO_HOLD_OUT = 3
 
 
-def data_page(dataset: Dataset, findings: Sequence[Finding], folder: str) -> str:
+def data_page(
+    dataset: Dataset, findings: Sequence[Finding], folder: str, imported: Sequence[str] = ()
+) -> str:
     """Return a page with every test drawn, what is doubtful, and a study to start from.
 
     Parameters
@@ -34,6 +36,8 @@ def data_page(dataset: Dataset, findings: Sequence[Finding], folder: str) -> str
         Of the check of its folder.
     folder
         As the study names it.
+    imported
+        What an import said of the files.
     """
     try:
         spectrum = None
@@ -50,7 +54,10 @@ def data_page(dataset: Dataset, findings: Sequence[Finding], folder: str) -> str
         name=dataset.name,
         conditions=material_and_temperature(dataset),
         doubts=[str(finding) for finding in findings if finding.severity != "note"],
-        notes=[str(finding) for finding in findings if finding.severity == "note"],
+        notes=[
+            *imported,
+            *(str(finding) for finding in findings if finding.severity == "note"),
+        ],
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
         lines=[*map(_line, dataset), *(_line(run, is_table=True) for run in tables)],

@@ -1,0 +1,138 @@
+"""How well tests of each kind determine constants and predictions, alone and together."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.stats import t as student
+
+from discover.statistics.covariance import least_squares_covariance
+
+
+@dataclass(frozen=True)
+class Told:
+    """Half of the 95 % interval of one number over its size, by the tests that were fitted.
+
+    Attributes
+    ----------
+    name
+        What the number is.
+    together
+        By all tests.
+    alone
+        By the tests of each kind, if there had been no others.
+    without
+        By all others than those of each kind.
+
+    From one on, a half-width is infinite: the tests do not determine the number.
+    """
+
+    name: str
+    together: float
+    alone: Mapping[str, float]
+    without: Mapping[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything as JSON-able values, None where a number is not determined."""
+        return {
+            "name": self.name,
+            "together": _plain(self.together),
+            "alone": {kind: _plain(half) for kind, half in self.alone.items()},
+            "without": {kind: _plain(half) for kind, half in self.without.items()},
+        }
+
+    @classmethod
+    def from_json(cls, row: Mapping[str, Any]) -> "Told":
+        """Return what `to_json` was made of."""
+
+        def halves(of: Mapping[str, float | None]) -> dict[str, float]:
+            return {kind: _number(half) for kind, half in of.items()}
+
+        return cls(
+            row["name"], _number(row["together"]), halves(row["alone"]), halves(row["without"])
+        )
+
+
+@dataclass(frozen=True)
+class Sized:
+    """Numbers that follow from the parameters, to first order.
+
+    Attributes
+    ----------
+    name
+        What they are.
+    slopes
+        Their derivatives in each parameter over their root-mean-square, shape (n, p).
+    """
+
+    name: str
+    slopes: Float[np.ndarray, "n p"]
+
+
+def told_by_tests(
+    columns: Float[np.ndarray, "rows p"],
+    residual: Float[np.ndarray, " rows"],
+    sequences: Sequence[Int[np.ndarray, " _"]],
+    kinds: Sequence[str],
+    numbers: Sequence[Sized],
+    shared: Float[np.ndarray, "rows k"] | None = None,
+) -> tuple[Told, ...]:
+    """Return what tests of each kind tell, at the fit to all; nothing where all are of one kind.
+
+    The law and its linearisation are those of the fit to all tests; the noise is that which the
+    records of each kind show. So a half-width says what the tests of a kind would leave of a law
+    that is known to be this one.
+
+    Parameters
+    ----------
+    columns, residual, sequences, shared
+        As `least_squares_covariance` takes them.
+    kinds
+        The kind of test of each sequence.
+    numbers
+        Constants and predictions to judge.
+    """
+    different = list(dict.fromkeys(kinds))
+    if len(different) < 2 or not columns.shape[1]:
+        return ()
+
+    def halves(wanted: Sequence[str]) -> list[float]:
+        rows = [own for own, kind in zip(sequences, kinds, strict=True) if kind in wanted]
+        at = np.concatenate(rows)
+        ends = np.cumsum([len(own) for own in rows])
+        places = np.split(np.arange(len(at)), ends[:-1])
+        own = None if shared is None else shared[at]
+        covariance, _, noise = least_squares_covariance(columns[at], residual[at], places, own)
+        free = noise.effective_samples - columns.shape[1]
+        if free < 1.0 or not np.all(np.isfinite(covariance)):
+            return [np.inf] * len(numbers)
+        quantile = float(student.ppf(0.975, free))
+        found = []
+        for one in numbers:
+            variance = np.einsum("np,pq,nq->n", one.slopes, covariance, one.slopes)
+            half = quantile * float(np.sqrt(np.mean(np.clip(variance, 0.0, None))))
+            found.append(half if half < 1.0 else np.inf)
+        return found
+
+    together = halves(different)
+    alone = {kind: halves([kind]) for kind in different}
+    without = {kind: halves([other for other in different if other != kind]) for kind in different}
+    return tuple(
+        Told(
+            one.name,
+            together[i],
+            {kind: of[i] for kind, of in alone.items()},
+            {kind: of[i] for kind, of in without.items()},
+        )
+        for i, one in enumerate(numbers)
+    )
+
+
+def _plain(half: float) -> float | None:
+    return half if np.isfinite(half) else None
+
+
+def _number(half: float | None) -> float:
+    return np.inf if half is None else half

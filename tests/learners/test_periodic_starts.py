@@ -1,0 +1,135 @@
+"""Records that start periodic, in the learners: the state is solved for, as in the loop."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset import Run
+from discover.laws import TensorBasisNetwork, UpperConvectedMaxwell
+from discover.learners.runs import as_runs
+from discover.learners.tbnn_ude.problem import make_problem as training_problem
+from discover.learners.tbnn_ude.variational import states_and_jacobian
+from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tensor_sindy import TensorSINDy
+from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.sensitivities import observe, predict_many
+from discover.protocols import after_alternation, oscillatory_shear, shear_rates, start_up
+from tensor_library.library import build_library
+
+MODULUS, TIME, MOBILITY, FREQUENCY = 100.0, 20.0, 0.3, 1.0
+PERIOD = 2.0 * np.pi / FREQUENCY
+LIBRARY = build_library(degree=0)
+
+
+def giesekus(strain, times, cycles):
+    """Return σ12 in Pa after so many cycles from rest, by scipy."""
+
+    def change(t, s):
+        rate = strain * FREQUENCY * np.cos(FREQUENCY * t)
+        a, b, c, d = s
+        squared = np.array([a * a + d * d, b * b + d * d, c * c, d * (a + b)])
+        return rate * np.array([2.0 * d, 0.0, 0.0, b + 1.0]) - (s + MOBILITY * squared) / TIME
+
+    later = cycles * PERIOD + times
+    found = solve_ivp(
+        change, (0.0, later[-1]), np.zeros(4), t_eval=later, method="DOP853", rtol=1e-9, atol=1e-11
+    )
+    return MODULUS * found.y[3]
+
+
+def swing(strain, samples=65, cycles=None, noise=0.0):
+    times = np.linspace(0.0, PERIOD, samples)
+    rate = oscillatory_shear(strain * FREQUENCY, FREQUENCY)
+    protocol = after_alternation(rate, PERIOD, times)
+    stress = giesekus(strain, times, 45 if cycles is None else cycles)
+    size = noise * np.sqrt(np.mean(stress**2))
+    stress = stress + size * np.random.default_rng(int(10 * strain)).standard_normal(samples)
+    return Run(f"strain {strain:g}", times, protocol, shear_rates(rate, times), stress)
+
+
+def up():
+    times = np.linspace(0.5, 20.0, 40)
+    return Run("up", times, start_up(1.0), np.ones(40), np.ones(40))
+
+
+def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
+    runs = [swing(2.0), up()]
+    problem = make_problem(runs, LIBRARY, MODULUS, TIME)
+    active = jnp.array([list(LIBRARY.names).index(name) for name in ("sigma", "sigma.sigma")])
+    at, inner = jnp.array([0.1, MOBILITY]), jnp.zeros(0)
+    value, slope = observe(problem, active, at, inner)
+    assert np.all(np.isfinite(value))
+    step = 1e-5
+    for i in range(2):
+        ends = [
+            observe(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0] for sign in (1, -1)
+        ]
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        # of second order in the step
+        np.testing.assert_allclose(
+            slope[..., i], difference, atol=1e-5 * np.max(np.abs(difference))
+        )
+    alone = make_problem([up()], LIBRARY, MODULUS, TIME)
+    assert alone.flows.parts[0][1].cycle is None
+    only, _ = observe(alone, active, at, inner)
+    np.testing.assert_allclose(value[1, :40], only[0, :40], rtol=1e-6)
+
+
+def test_what_a_law_predicts_is_what_scipy_finds_after_many_cycles():
+    run = swing(2.0)
+    problem = make_problem([run], LIBRARY, MODULUS, TIME)
+    active = jnp.array([list(LIBRARY.names).index("sigma.sigma")])
+    both = jnp.array([[MOBILITY], [0.5 * MOBILITY]])
+    found = np.asarray(predict_many(problem, active, both, jnp.zeros((2, 0)))).reshape(2, -1, 3)
+    weight = np.asarray(problem.weight)[0, : len(run), 0]
+    exact = weight * run.stress
+    np.testing.assert_allclose(found[0, : len(run), 0], exact, atol=5e-5 * np.max(np.abs(exact)))
+    # the control: another law is told apart
+    assert np.linalg.norm(found[1, : len(run), 0] - exact) > 0.05 * np.linalg.norm(exact)
+
+
+def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
+    problem = training_problem([swing(2.0), up()], np.array([MODULUS]), np.array([TIME]))
+    law = TensorBasisNetwork.initialise(jax.random.key(0), width=4)
+    # σ·σ is the fourth of the eight
+    numbers = jnp.zeros(8).at[3].set(MOBILITY), jnp.zeros(8)
+    law = eqx.tree_at(lambda law: (law.constants, law.network_mask), law, numbers)
+    rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
+    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
+    assert np.all(np.isfinite(along.recorded))
+    step = 1e-5
+    for i in (1, 3):
+        moved = [
+            states_and_jacobian(rebuild.start + s * step * jnp.eye(8)[i], rebuild, problem)[
+                0
+            ].recorded
+            for s in (1, -1)
+        ]
+        difference = (moved[0] - moved[1]) / (2.0 * step)
+        np.testing.assert_allclose(
+            jacobian[0, :, i], difference[0], atol=1e-5 * np.max(np.abs(difference))
+        )
+
+
+def test_only_what_does_not_relax_by_itself_waits():
+    run = swing(1.0, cycles=0)
+    assert as_runs([run], 1e4)[0].protocol.begins == run.protocol.begins
+    waits = as_runs([run], TIME, relaxes=False)[0].protocol
+    assert waits.begins < run.protocol.begins
+    unknown = UpperConvectedMaxwell(linear_relaxation=False)
+    problem = make_problem([run], LIBRARY, MODULUS, TIME, base=unknown)
+    assert problem.flows.parts[0][1].cycle is None
+
+
+@pytest.mark.slow
+def test_a_slow_mode_is_learned_from_two_cycles():
+    runs = [swing(strain, noise=0.01) for strain in (0.5, 2.0)]
+    fitted = TensorSINDy(LIBRARY, modulus=MODULUS, relaxation_time=TIME).fit(runs)
+    (term,) = fitted.result_.terms
+    assert term.term == "sigma.sigma"
+    low, high = term.ci95
+    # within three half-widths
+    assert abs(term.coefficient - MOBILITY) < 1.5 * (high - low)
