@@ -89,6 +89,5 @@ def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
         for k, step in enumerate(run.rate_steps):
             rows[i, k] = step.start, step.end, step.change, step.share
             place[i, k] = -1 if step.place is None else step.place
-    return RateSteps(
-        *(jnp.asarray(column) for column in np.moveaxis(rows, -1, 0)), jnp.asarray(place)
-    )
+    start, end, change, share = (jnp.asarray(column) for column in np.moveaxis(rows, -1, 0))
+    return RateSteps(start, end, change, share, jnp.asarray(place))
