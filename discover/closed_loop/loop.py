@@ -14,11 +14,10 @@ from discover.closed_loop.candidates import (
 )
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
-    carry,
     explain,
     next_tests,
     over_explanations,
-    turn_to_likelier,
+    search_and_carry,
     with_band,
 )
 from discover.closed_loop.explanations.limits import names_of_limits
@@ -68,9 +67,6 @@ from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import instants_found, with_own_instants, with_places
 from discover.statistics.residual import Expectation, summarise
-
-_TURNS = 2
-"""How often a search goes on from an explanation that is far likelier than its own."""
 
 
 def run_loop(
@@ -185,14 +181,7 @@ def run_loop(
         find_instrument_effects(search, fitted_runs, max_effects, say)
     carried = []
     if not silent:
-        search.run(max_effects, say)
-        carried = carry(search, max_effects, explanations, say)
-        for _ in range(_TURNS):
-            if not turn_to_likelier(search, carried):
-                break
-            say(f"going on from a likelier explanation: {', '.join(search.active)}")
-            search.run(max_effects, say)
-            carried = carry(search, max_effects, explanations, say)
+        carried = search_and_carry(search, max_effects, explanations, say)
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     if held_batch is not None:

@@ -1,16 +1,15 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
-from discover.closed_loop.explanations.beam import BEAM_WIDTH, carry, turn_to_likelier
+from discover.closed_loop.explanations.beam import BEAM_WIDTH, search_and_carry
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
 
 __all__ = [
     "BEAM_WIDTH",
-    "carry",
     "explain",
     "next_tests",
     "over_explanations",
-    "turn_to_likelier",
+    "search_and_carry",
     "with_band",
 ]

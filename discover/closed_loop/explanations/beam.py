@@ -20,6 +20,9 @@ from discover.forward.least_squares import Fit
 BEAM_WIDTH = 8
 """Explanations that are carried side by side, by default."""
 
+_TURNS = 2
+"""How often a search goes on from an explanation that is far likelier than its own."""
+
 _SLACK = 2.0  # of the criterion, for fits that only ranked
 _TWIN = 1e-3
 """Relative difference of costs up to which two sets may be twins: what a ranking fit leaves open
@@ -43,6 +46,24 @@ class Carried:
     effects: tuple[str, ...]
     fit: Fit
     criterion: float
+
+
+def search_and_carry(
+    search: Search, max_effects: int, width: int, say: Callable[[str], None]
+) -> list[Carried]:
+    """Search, carry what explains as well, and go on from what is far likelier.
+
+    Arguments and result as of `carry`.
+    """
+    search.run(max_effects, say)
+    carried = carry(search, max_effects, width, say)
+    for _ in range(_TURNS):
+        if not turn_to_likelier(search, carried):
+            break
+        say(f"going on from a likelier explanation: {', '.join(search.active)}")
+        search.run(max_effects, say)
+        carried = carry(search, max_effects, width, say)
+    return carried
 
 
 def carry(
