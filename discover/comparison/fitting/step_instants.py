@@ -23,6 +23,8 @@ _MOST_TERMS = 16
 _FEW = 3
 """Terms of the law that dates steps of runs held out, at most."""
 
+_NAMED = 3
+
 _INSIDE = 1e-3
 """Share of the interval by which an instant keeps off the samples at its ends."""
 
@@ -69,10 +71,11 @@ def with_step_instants(
         for name in ("dataset", "fit", "held_out")
         for part in [getattr(data, name)]
     }
+    runs = listed(stepped) if len(stepped) <= _NAMED else f"{len(stepped)} runs"
     told = (
-        f"The rate of {listed(stepped)} steps between two samples, which do not tell when: the "
-        "instants are fitted before, with every simple term of the library, and those of a run "
-        "held out to that run itself"
+        f"The rate of {runs} steps between two samples, which do not tell when: the instants are "
+        "fitted before, with every simple term of the library, and those of a run held out to that "
+        "run itself"
     )
     return replace(data, **parts), told
 

@@ -22,6 +22,7 @@ from discover.report.wording import (
     significant,
 )
 from discover.statistics.residual import FEWEST_TESTED
+from discover.words import listed
 
 KINDS = {
     "constitutive": "in the fluid",
@@ -156,8 +157,9 @@ def _loop_sure(result: LoopResult) -> str:
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
     if steps := result.remaining.get("step_instants"):
+        runs = listed([*steps]) if len(steps) <= _MOST_NAMES else f"{len(steps)} runs"
         sentences.append(
-            f"The rate of {_several([*steps], 'and')} steps between two samples, which do not tell "
+            f"The rate of {runs} steps between two samples, which do not tell "
             "when: the instants are fitted along, those of a run held out to that run itself."
         )
     if few := result.remaining.get("not_judging", ()):
