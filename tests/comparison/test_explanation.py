@@ -233,6 +233,18 @@ def test_a_band_that_misses_what_is_known_determines_nothing(good):
     assert "lies outside the band" in statement.text
 
 
+def test_one_run_with_none_held_out_determines_nothing(good):
+    # one run in steps of a fluid with a structure: explained by five terms, N1 wrong by 61 %
+    explanation, flows = good
+    one = [replace(flow, kind="test") for flow in flows[1:]]
+    found = make_statements(explanation, [flows[0], *one], [], STRUCTURE, bands(flows))
+    assert [s.determined for s in found] == ["no", "no"]
+    assert "no other flow tested the law" in found[0].text
+    unseen = [replace(one[0], kind="held_out"), *one[1:]]
+    found = make_statements(explanation, [flows[0], *unseen], [], STRUCTURE, bands(flows))
+    assert found[0].determined == "if_the_law_is_in_the_library"
+
+
 def test_a_structured_residual_leaves_nothing_determined(good, responses):
     _, flows = good
     wrong = {"tensor_sindy": outcome("tensor_sindy", flows, responses["near"])}

@@ -35,6 +35,10 @@ _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
+_UNTESTED = (
+    "One run was fitted and none held out, so no other flow tested the law, and {} is not "
+    "determined. Fit another run, or hold one out."
+)
 _IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -189,13 +193,17 @@ def make_statements(
     at = law_structure(structure)
     if at is None:
         return _without_structure(explanation, flows, rivals, normal_stresses_used)
+    # a law that was never asked of another flow than the one it was fitted to
+    untested = len(training) == 1 and not any(flow.kind == "held_out" for flow in flows)
     found = []
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
         determined: Determined = "no"
         text = quantity.text
-        if not quantity.open:
+        if not quantity.open and untested:
+            text = _UNTESTED.format(quantity.quantity)
+        elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
             check = check_band(quantity.quantity, flows, bands or {}, noise)
             determined = IN_LIBRARY if check.holds else "no"
