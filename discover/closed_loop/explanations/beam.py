@@ -226,8 +226,7 @@ def _fitted(search: Search, sets: Sequence[SeenSet], effective: float, width: in
     problem = search.problem
 
     def carried(effects: tuple[str, ...], fit: Fit) -> Carried:
-        own = problem.criterion(problem.cost(fit), fit.free, effects, effective)
-        return Carried(effects, fit, own)
+        return Carried(effects, fit, problem.worth(fit, effects, effective))
 
     chosen = carried(tuple(search.active), search.fit)
     others = [one for one in sets if one.effects != tuple(sorted(search.active))]

@@ -19,7 +19,7 @@ from discover.closed_loop.search.state import SearchState
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, jacobians
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior
 
 _POLISHES = 5
 
@@ -150,13 +150,7 @@ class CurrentModel(SearchState):
         fit = self.problem.fit(theta, free)
         if fit.usable:
             return fit
-        residual = self.model.residuals([theta], self.batch)
-        return Fit(
-            theta,
-            free,
-            residual[0],
-            jacobians(self.model, self.batch, [theta], residual, [free])[0],
-        )
+        return self.problem.at(theta, free)
 
     def choices_beside(
         self,

@@ -45,7 +45,7 @@ def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyD
     relaxes
         Whether the known law relaxes, so that a periodic state is solved for.
     """
-    return _with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
+    return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
 
 
 def thinned_to(data: StudyData, most: int) -> StudyData:
@@ -61,10 +61,11 @@ def thinned_to(data: StudyData, most: int) -> StudyData:
     most
         Samples of a run, at most.
     """
-    return _with_each_run(data, lambda run: thin_run(run, most))
+    return with_each_run(data, lambda run: thin_run(run, most))
 
 
-def _with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
+def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
+    """Return data with each run changed, in every part of it."""
     return _with_runs(data, lambda runs: map(change, runs))
 
 

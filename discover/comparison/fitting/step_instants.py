@@ -6,6 +6,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
+from discover.comparison.fitting.prepared import with_each_run
 from discover.dataset import Run
 from discover.effects import library_term
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
@@ -66,18 +67,13 @@ def with_step_instants(
     dated = {run.name: _dated(run, shares) for run in fitted}
     few = _few_terms(model, batch, [model.positions(term.name)[0] for term in terms])
     dated |= {run.name: _dated(run, shares) for run in with_own_instants(model, few, unseen)}
-    parts = {
-        name: replace(part, runs=tuple(dated[run.name] for run in part.runs))
-        for name in ("dataset", "fit", "held_out")
-        for part in [getattr(data, name)]
-    }
     runs = listed(stepped) if len(stepped) <= _NAMED else f"{len(stepped)} runs"
     told = (
         f"The rate of {runs} steps between two samples, which do not tell when: the instants are "
         "fitted before, with every simple term of the library, and those of a run held out to that "
         "run itself"
     )
-    return replace(data, **parts), told
+    return with_each_run(data, lambda run: dated[run.name]), told
 
 
 def _few_terms(model: AugmentedModel, batch: Batch, terms: Sequence[int]) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Effects of a model asked again, whether another serves better in the place of one."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
@@ -12,7 +10,6 @@ from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.scoring.refitting import Choice, aliases_of, refit, simplest
 from discover.effects import AbstractEffect
-from discover.forward.least_squares import Fit
 
 _COMPARED = 16
 
@@ -112,10 +109,8 @@ def exchange_for_alias(search: CurrentModel, name: str) -> bool:
     candidates = {effect.name for effect in model.effects if search.candidate(effect)}
     effective = problem.independent_samples(search.fit)
 
-    def worth(fit: Fit, active: Sequence[str]) -> float:
-        return problem.criterion(problem.cost(fit), fit.free, active, effective)
-
-    best, chosen, least = None, [], worth(search.fit, search.active) - BARE_MENTION
+    least = problem.worth(search.fit, search.active, effective) - BARE_MENTION
+    best, chosen = None, []
     for alias in search.aliases.get(name, ()):
         if alias in search.active or alias not in alone or alias not in candidates:
             continue
@@ -129,8 +124,9 @@ def exchange_for_alias(search: CurrentModel, name: str) -> bool:
         fit = problem.best_fit([values, beside], search.positions(active))
         if not fit.usable or at_an_end(model, fit.theta, active):
             continue
-        if worth(fit, active) < least and np.mean(left_out_errors(problem, fit)) < search.left_out:
-            best, chosen, least = fit, active, worth(fit, active)
+        worth = problem.worth(fit, active, effective)
+        if worth < least and np.mean(left_out_errors(problem, fit)) < search.left_out:
+            best, chosen, least = fit, active, worth
     if best is None:
         return False
     new = next(other for other in chosen if other not in search.active)

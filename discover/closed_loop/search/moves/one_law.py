@@ -4,7 +4,6 @@ import numpy as np
 
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.effects import AbstractEffect
-from discover.forward.least_squares import Fit, jacobians
 
 _AS_GOOD = 1.02
 """Error of runs left out, over that of what is replaced, with which the simpler is taken."""
@@ -23,10 +22,7 @@ def put_one_law_in_place(search: CurrentModel) -> bool:
     if len(law) < 2 or not others:
         return False
     problem = search.problem
-    theta, free = problem.without(search.fit, *law)
-    residual = search.model.residuals([theta], search.batch)
-    derivatives = jacobians(search.model, search.batch, [theta], residual, [free])[0]
-    bare = Fit(theta, free, residual[0], derivatives)
+    bare = problem.at(*problem.without(search.fit, *law))
     if not bare.usable:
         return False
 
@@ -35,16 +31,13 @@ def put_one_law_in_place(search: CurrentModel) -> bool:
 
     _, choices = search.choices_beside(bare, others, rival)
     effective = problem.independent_samples(search.fit)
-
-    def worth(fit: Fit, active: list[str]) -> float:
-        return problem.criterion(problem.cost(fit), fit.free, active, effective)
-
     able = [c for c in choices if np.mean(c.left_out) < _AS_GOOD * search.left_out]
     if not able:
         return False
-    best = min(able, key=lambda c: worth(c.fit, [*others, c.candidate.effect]))
+    best = min(able, key=lambda c: problem.worth(c.fit, [*others, c.candidate.effect], effective))
     fit, name = search.sharpened(best.fit), best.candidate.effect
-    if worth(fit, [*others, name]) >= worth(search.fit, search.active):
+    own = problem.worth(search.fit, search.active, effective)
+    if problem.worth(fit, [*others, name], effective) >= own:
         return False
     for old in law:
         search.aliases.pop(old, None)

@@ -83,8 +83,7 @@ def restore_left_open(search: CurrentModel) -> str:
     def worth(one: SeenSet) -> float:
         return problem.criterion(one.cost, one.free, one.effects, effective)
 
-    cost = problem.cost(search.fit)
-    own = problem.criterion(cost, search.fit.free, search.active, effective)
+    own = problem.worth(search.fit, search.active, effective)
     impossible = search.refused - search.left_open
     instead = [
         one

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from discover.closed_loop.search.scoring.evidence import criterion, evidence
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
 from discover.statistics.residual import judged_cost, summarise
 
 
@@ -65,6 +65,12 @@ class FitProblem:
         theta[own] = model.zero()[own]
         return theta, tuple(p for p in fit.free if p not in own)
 
+    def at(self, theta: np.ndarray, free: Sequence[int]) -> Fit:
+        """Return what parameters leave as they are, and its derivatives in the free ones."""
+        residual = self.model.residuals([theta], self.batch)
+        derivatives = jacobians(self.model, self.batch, [theta], residual, [free])[0]
+        return Fit(theta, tuple(free), residual[0], derivatives)
+
     def independent_samples(self, fit: Fit) -> float:
         """Return how many independent samples what a fit leaves is worth."""
         return summarise(fit.residual, self.weight).effective_samples
@@ -82,6 +88,10 @@ class FitProblem:
     ) -> float:
         """Return the information criterion of a fit with some effects; see `criterion`."""
         return criterion(cost, len(free), len(effects), effective, self.n_candidates)
+
+    def worth(self, fit: Fit, effects: Sequence[str], effective: float) -> float:
+        """Return the criterion of a fit by what it leaves; see `criterion`."""
+        return self.criterion(self.cost(fit), fit.free, effects, effective)
 
 
 def effect_of(model: AugmentedModel, name: str) -> AbstractEffect:
