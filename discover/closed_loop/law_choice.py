@@ -9,7 +9,6 @@ from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.search.first_starts import first_starts
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION, criterion
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import (
@@ -22,6 +21,7 @@ from discover.forward import (
 )
 from discover.forward.least_squares import Fit, fit_batch
 from discover.forward.step_instants import with_own_instants
+from discover.inference.evidence import BARE_MENTION, criterion
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise

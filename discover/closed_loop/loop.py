@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.candidates import (
     admission,
     candidates_of,
@@ -56,7 +55,6 @@ from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
-from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
@@ -66,6 +64,8 @@ from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_ba
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import instants_found, with_own_instants, with_places
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.evidence import WINDOW
 from discover.statistics.residual import Expectation, summarise
 
 

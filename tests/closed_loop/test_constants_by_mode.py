@@ -13,12 +13,12 @@ from independent.homogeneous import GiesekusFluid
 
 import discover as dc
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.by_mode import _at_upper_end, _Constant
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
+from discover.inference.by_mode import _at_upper_end, _Constant
 from discover.protocols import in_flow, start_up
 from discover.report.plots.loop.by_mode import by_mode_picture
 

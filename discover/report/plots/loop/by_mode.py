@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from discover.closed_loop import ConstantByMode, LoopResult
+from discover.closed_loop import LoopResult
+from discover.inference.constants import ConstantByMode
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,
