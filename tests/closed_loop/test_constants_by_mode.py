@@ -20,7 +20,7 @@ from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
 from discover.inference.by_mode import _at_upper_end, _Constant
 from discover.protocols import in_flow, start_up
-from discover.report.plots.loop.by_mode import by_mode_picture
+from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
