@@ -227,10 +227,10 @@ def test_an_interrupted_loop_keeps_the_degrees():
 
 @pytest.mark.slow
 def test_the_picture_says_what_is_determined_and_what_is_not():
-    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)))
+    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).by_mode, False)
     assert drawn is not None
     assert "Not determined by these data in the modes of 0.05 s" in drawn.caption
-    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=())) is None
+    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=()).by_mode, False) is None
 
 
 def test_a_law_by_mode_is_written_out_with_the_constants_of_each():

@@ -358,6 +358,12 @@ def _next(comparison: Comparison) -> str:
         )
     if _coarse(comparison) is not None:
         return MORE_SAMPLES
+    if comparison.by_mode is not None and comparison.by_mode.explains:
+        names = ", ".join(f'"{name}"' for name in comparison.by_mode.constants)
+        return (
+            "Have discover close-loop fit these constants too: [model] by_mode = "
+            f"[{names}] gives their intervals, what else the runs show, and an export."
+        )
     lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
     if lacking or explanation.verdict == "unexplained":
         return (
