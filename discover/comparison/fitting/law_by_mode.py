@@ -14,7 +14,7 @@ from discover.forward.least_squares import Fit, intervals
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees
-from discover.inference.evidence import BARE_MENTION
+from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
@@ -78,6 +78,11 @@ class LawByMode:
     def explains(self) -> bool:
         """Whether what it leaves is noise."""
         return self.left.verdict == "explained"
+
+    @property
+    def rivals_sparse(self) -> bool:
+        """Whether it is worth about as much as the law of sparse regression, or more."""
+        return self.gain > -INDISTINGUISHABLE
 
     @property
     def n_constants(self) -> int:
@@ -234,8 +239,3 @@ def _errors(model: AugmentedModel, fit: Fit, runs: Sequence[Run]) -> dict[str, f
             error = _relative_error(predicted, run)
             errors[run.name] = error if np.isfinite(error) else None
     return errors
-
-
-def is_ruled_out(law: LawByMode) -> bool:
-    """Return whether one set of constants for all modes is worth less than constants by mode."""
-    return law.gain > BARE_MENTION

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.judging.statements import Statement
-from discover.inference.evidence import INDISTINGUISHABLE
 
 
 def open_where_modes_differ(
@@ -23,7 +22,7 @@ def open_where_modes_differ(
     law
         The best law with constants by mode; None where there is none.
     """
-    if law is None or not law.explains or law.gain < -INDISTINGUISHABLE:
+    if law is None or not law.explains or not law.rivals_sparse:
         return list(statements)
     reason = (
         f"A law with {law.n_constants} constants that differ from mode to mode describes these "

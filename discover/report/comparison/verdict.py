@@ -77,7 +77,7 @@ def _found(comparison: Comparison) -> str:
             if n > 1
             else "sparse regression's term describes the data and is no finding"
         )
-    if comparison.by_mode is not None:
+    if comparison.by_mode is not None and comparison.by_mode.rivals_sparse:
         parts.append(_by_mode(comparison.by_mode))
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
