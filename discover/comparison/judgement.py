@@ -150,7 +150,7 @@ def judge(
     if chosen is not None and not silent_records and not study.compare.quick:
         say("constants that differ from mode to mode")
         by_mode = _by_mode(chosen, frame, explanation, expectation, len(library))
-        statements = open_where_modes_differ(statements, by_mode)
+        statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
     apart = disagreements(outcomes, judged, bands)

@@ -84,13 +84,18 @@ NORMAL = [Statement(name, IN_LIBRARY, "The band is narrow.") for name in ("N1", 
 
 
 def test_normal_stresses_are_open_where_constants_by_mode_describe_the_runs_as_well(law):
-    said = open_where_modes_differ(NORMAL, law)
+    said = open_where_modes_differ(NORMAL, law, in_library=True)
     assert [one.undetermined for one in said] == [True, True]
     assert "2 constants that differ from mode to mode describes these runs as well" in said[0].text
+
+
+def test_normal_stresses_of_a_law_that_explains_nothing_are_not_called_those_of_the_fluid(law):
+    said = open_where_modes_differ(NORMAL, law, in_library=False)
+    assert "N1 of the law shown is not that of the fluid" in said[0].text
 
 
 def test_control_they_stay_determined_where_such_a_law_is_worth_less_or_explains_nothing(law):
     worse = replace(law, gain=-20.0)
     unexplained = replace(law, left=replace(law.left, verdict="unexplained"))
     for other in (None, worse, unexplained):
-        assert open_where_modes_differ(NORMAL, other) == NORMAL
+        assert open_where_modes_differ(NORMAL, other, in_library=True) == NORMAL

@@ -332,8 +332,14 @@ def _determined(comparison: Comparison) -> list[str]:
     names = _open(comparison)
     parts += _room(comparison)
     if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
+        by_mode = comparison.by_mode
+        which = (
+            "with the same constants in every mode"
+            if by_mode is not None and by_mode.explains
+            else "that was tried"
+        )
         parts.append(
-            f"since no law that was tried explains the data, nothing is determined by them, "
+            f"since no law {which} explains the data, nothing is determined by them, "
             f"neither {names.replace(' and ', ' nor ')} nor any coefficient"
         )
         return parts
