@@ -147,7 +147,8 @@ def judge(
         independent = None if chosen is None else chosen.details.get("n_independent")
         classical = _classical(study, known, independent)
     by_mode = None
-    if chosen is not None and not silent_records and not study.compare.quick:
+    # of normal stresses that were fitted too a law by mode says nothing
+    if not (chosen is None or silent_records or normal or study.compare.quick):
         say("constants that differ from mode to mode")
         by_mode = _by_mode(chosen, frame, explanation, expectation, len(library))
         statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
