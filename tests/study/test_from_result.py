@@ -118,6 +118,17 @@ def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
     assert "did not explain" in declared(write(tmp_path, "loop.json", doubtful)).source
 
 
+def test_of_a_comparison_that_found_no_term_the_known_part_is_taken(tmp_path):
+    """Of a loop's law and instrument that it was given by from, and that it found nothing beside."""
+    sparse = {"law": LAW, "terms": [], "effects": [GAIN]}
+    found = declared(
+        write(tmp_path, "comparison.json", {**_NO_TERM, "learners": {"tensor_sindy": sparse}})
+    )
+    assert [(t.term, t.coefficient) for t in found.law.as_terms()] == [("sigma.sigma", 0.3)]
+    assert [known.name for known in found.effects] == ["stress_gain"]
+    assert "did not explain" in found.source
+
+
 def test_the_fingerprint_changes_with_what_is_taken(tmp_path):
     file = write(tmp_path, "loop.json", LOOP)
     before = fingerprint(read_study(file))
@@ -130,7 +141,7 @@ _NOTHING = {**LOOP, "verdict": "unexplained", "stages": []}
 _NO_TERM = {
     **COMPARISON,
     "lack_of_fit": {"tensor_sindy": {"verdict": "unexplained"}},
-    "learners": {"tensor_sindy": {"law": LAW, "terms": []}},
+    "learners": {"tensor_sindy": {"law": {**LAW, "terms": []}, "terms": []}},
 }
 
 
