@@ -6,18 +6,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from discover.closed_loop.candidates import (
-    admission,
     candidates_of,
     require_possible,
     require_present,
 )
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
-    Carried,
     explain,
     next_tests,
     over_explanations,
-    search_and_carry,
     with_band,
 )
 from discover.closed_loop.explanations.limits import names_of_limits
@@ -45,29 +42,26 @@ from discover.closed_loop.judging.judgement import Judgement, Silence, judge
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.silence import fluid_is_silent, records_are_silent
 from discover.closed_loop.judging.told_by_kinds import told_by_kinds
-from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.law_choice import choose_law, is_likelier, law_beside_effects
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.free_curve import FreeForm
-from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
-from discover.closed_loop.small_strains import find_instrument_effects
+from discover.closed_loop.search.checkpoint import Store
+from discover.closed_loop.searching import SearchTask
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
-from discover.effects import BY_MODE, AbstractEffect
+from discover.effects import AbstractEffect
 from discover.errors import InputError
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward import DeclaredModel, make_batch
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import instants_found, with_own_instants, with_places
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.evidence import WINDOW
-from discover.statistics.residual import Expectation, summarise
+from discover.statistics.residual import summarise
 
 
 def run_loop(
@@ -150,49 +144,21 @@ def run_loop(
     candidates = [effect for effect in candidates if effect.name not in known]
     require_possible(declared, [*fitted_runs, *held_runs])
     silent = records_are_silent(fitted_runs)
-    tried_laws: tuple[LawFit, ...] = ()
-    if laws and not silent:
-        declared, tried_laws = choose_law(declared, laws, fitted_runs, held_runs, say)
-    batch = make_batch(fitted_runs)
-    held_batch = make_batch(held_runs) if held_runs else None
-
-    def searched(declared: DeclaredModel, name: str) -> tuple[Search, list[Carried]]:
-        # of one mode nothing can differ from another's
-        asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
-        model = AugmentedModel(declared, asked, data_scales(fitted_runs))
-        tolerated = ToleratedMisfit(
-            Expectation(noise, declared.linear_error),
-            NumericalResolution(model, batch, fitted_runs),
-        )
-        search = Search(
-            model,
-            batch,
-            held_batch,
-            len(candidates),
-            admission(fitted_runs, held_runs),
-            tolerated,
-            SearchCheckpoint(store, name),
-        )
-        if silent:
-            say("the records are noise about a constant: there is nothing to search in")
-            search.start()
-            return search, []
-        if search.resume():
-            say(f"going on from what was kept: {', '.join(search.active)}")
-        else:
-            say(f"declared model on {len(fitted_runs)} runs")
-            search.start()
-            find_instrument_effects(search, fitted_runs, max_effects, say)
-        return search, search_and_carry(search, max_effects, explanations, say)
-
-    search, carried = searched(declared, name)
-    if tried_laws and search.active:
-        runs = fitted_runs, held_runs
-        if (other := law_beside_effects(declared, tried_laws, search, *runs, say)) is not None:
-            again, carried_again = searched(other[0], f"{name}_{other[0].law_name}")
-            if is_likelier(again, search):
-                (declared, tried_laws), search, carried = other, again, carried_again
-    model, tolerated = search.model, search.tolerated
+    ended = SearchTask(
+        candidates,
+        fitted_runs,
+        held_runs,
+        noise=noise,
+        max_effects=max_effects,
+        width=explanations,
+        silent=silent,
+        store=store,
+        name=name,
+        say=say,
+    ).search(declared, laws)
+    declared, search, carried = ended.declared, ended.search, ended.carried
+    model, batch, held_batch = search.model, search.batch, search.held_batch
+    tolerated = search.tolerated
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     if held_batch is not None:
@@ -310,7 +276,7 @@ def run_loop(
         declared_law=None if differ & {*of_law} else declared_law(declared, current),
         explanations=side_by_side,
         next_tests=following,
-        laws=tried_laws,
+        laws=ended.laws,
         free_form=forms,
         told_by=told,
         fluid=None if differ or states != () else fluid,

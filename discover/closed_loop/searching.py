@@ -1,0 +1,138 @@
+"""The search for what the runs lack, from a declared law or from one that is chosen on the way."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from discover.closed_loop.candidates import admission
+from discover.closed_loop.explanations import Carried, search_and_carry
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
+from discover.closed_loop.law_choice import choose_law, is_likelier, law_beside_effects
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.search import Search
+from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
+from discover.closed_loop.small_strains import find_instrument_effects
+from discover.dataset import Run
+from discover.effects import BY_MODE, AbstractEffect
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.statistics.residual import Expectation
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """A search that has ended.
+
+    Attributes
+    ----------
+    declared
+        The model that it started from.
+    laws
+        The laws that the declared one was chosen from, the best first.
+    search
+        The search, with what it found.
+    carried
+        The sets of effects that explain the records; none of silent ones.
+    """
+
+    declared: DeclaredModel
+    laws: tuple[LawFit, ...]
+    search: Search
+    carried: list[Carried]
+
+
+@dataclass(frozen=True)
+class SearchTask:
+    """Among which effects to search, in which runs.
+
+    Attributes
+    ----------
+    candidates
+        The effects.
+    fitted, held_out
+        Runs to fit, and runs that only judge.
+    noise
+        Relative noise, where it is known.
+    max_effects, width
+        Largest number of effects, and of explanations that are carried.
+    silent
+        Whether the records hold nothing to search in.
+    store, name
+        Where the search is kept, and as what.
+    say
+        Called with a line of text now and then.
+    """
+
+    candidates: Sequence[AbstractEffect]
+    fitted: Sequence[Run]
+    held_out: Sequence[Run]
+    noise: float | None
+    max_effects: int
+    width: int
+    silent: bool
+    store: Store | None
+    name: str
+    say: Callable[[str], None]
+
+    def search(self, declared: DeclaredModel, laws: Sequence[str] = ()) -> SearchResult:
+        """Search from a declared model, or from the law that the runs ask for.
+
+        A law chosen while effects were missing may stand for a part of them. So the laws are fitted
+        once more beside what was found, and another is searched beside and taken if that is
+        likelier.
+
+        Parameters
+        ----------
+        declared
+            The declared model.
+        laws
+            Named laws to choose its law from; none where it is as declared.
+
+        Raises
+        ------
+        InputError
+            If the declared model, or none of the laws, can be integrated through the fitted runs.
+        """
+        if not laws or self.silent:
+            return self._from(declared, (), self.name)
+        first = self._from(
+            *choose_law(declared, laws, self.fitted, self.held_out, self.say), self.name
+        )
+        if not first.search.active:
+            return first
+        other = law_beside_effects(
+            first.declared, first.laws, first.search, self.fitted, self.held_out, self.say
+        )
+        if other is None:
+            return first
+        again = self._from(*other, f"{self.name}_{other[0].law_name}")
+        return again if is_likelier(again.search, first.search) else first
+
+    def _from(self, declared: DeclaredModel, laws: tuple[LawFit, ...], name: str) -> SearchResult:
+        # of one mode nothing can differ from another's
+        asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
+        model = AugmentedModel(declared, asked, data_scales(self.fitted))
+        batch = make_batch(self.fitted)
+        search = Search(
+            model,
+            batch,
+            make_batch(self.held_out) if self.held_out else None,
+            len(self.candidates),
+            admission(self.fitted, self.held_out),
+            ToleratedMisfit(
+                Expectation(self.noise, declared.linear_error),
+                NumericalResolution(model, batch, self.fitted),
+            ),
+            SearchCheckpoint(self.store, name),
+        )
+        if self.silent:
+            self.say("the records are noise about a constant: there is nothing to search in")
+            search.start()
+            return SearchResult(declared, laws, search, [])
+        if search.resume():
+            self.say(f"going on from what was kept: {', '.join(search.active)}")
+        else:
+            self.say(f"declared model on {len(self.fitted)} runs")
+            search.start()
+            find_instrument_effects(search, self.fitted, self.max_effects, self.say)
+        carried = search_and_carry(search, self.max_effects, self.width, self.say)
+        return SearchResult(declared, laws, search, carried)
