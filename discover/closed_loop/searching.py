@@ -1,7 +1,7 @@
 """The search for what the runs lack, from a declared law or from one that is chosen on the way."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from discover.closed_loop.candidates import admission
 from discover.closed_loop.explanations import Carried, search_and_carry
@@ -15,6 +15,9 @@ from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Run
 from discover.effects import BY_MODE, AbstractEffect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward.declared import may_differ_by_mode
+from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.problem import effect_of
 from discover.statistics.residual import Expectation
 
 
@@ -78,7 +81,8 @@ class SearchTask:
 
         A law chosen while effects were missing may stand for a part of them. So the laws are fitted
         once more beside what was found, and another is searched beside and taken if that is
-        likelier.
+        likelier. Where what was found does not explain the runs, its constants may differ from mode
+        to mode: that is searched once more too, and taken on strong evidence.
 
         Parameters
         ----------
@@ -92,7 +96,12 @@ class SearchTask:
         InputError
             If the declared model, or none of the laws, can be integrated through the fitted runs.
         """
-        if not laws or self.silent:
+        if self.silent:
+            return self._from(declared, (), self.name)
+        return self._with_modes_apart(self._with_law(declared, laws))
+
+    def _with_law(self, declared: DeclaredModel, laws: Sequence[str]) -> SearchResult:
+        if not laws:
             return self._from(declared, (), self.name)
         first = self._from(
             *choose_law(declared, laws, self.fitted, self.held_out, self.say), self.name
@@ -106,6 +115,21 @@ class SearchTask:
             return first
         again = self._from(*other, f"{self.name}_{other[0].law_name}")
         return again if is_likelier(again.search, first.search) else first
+
+    def _with_modes_apart(self, first: SearchResult) -> SearchResult:
+        declared, search = first.declared, first.search
+        names = [p.name for p in declared.free_parameters]
+        names += [
+            name for name in search.active if may_differ_by_mode(effect_of(search.model, name))
+        ]
+        alike = len(declared.modulus) < 2 or declared.by_mode
+        if alike or not names or search.explained:
+            return first
+        self.say(f"constants that may differ from mode to mode: {', '.join(names)}")
+        apart = replace(declared, by_mode=tuple(names))
+        again = self._from(apart, first.laws, f"{self.name}_by_mode")
+        differ = any(one.degree for one in again.search.degrees.values())
+        return again if differ and is_likelier(again.search, search, INDISTINGUISHABLE) else first
 
     def _from(self, declared: DeclaredModel, laws: tuple[LawFit, ...], name: str) -> SearchResult:
         # of one mode nothing can differ from another's

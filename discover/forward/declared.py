@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import ConstitutiveEffect, KnownEffect, make_effect
+from discover.effects import AbstractEffect, ConstitutiveEffect, KnownEffect, make_effect
 from discover.errors import InputError
 from discover.forward.by_mode import DEGREE
 from discover.laws import LAWS, AbstractConstitutiveLaw, UpperConvectedMaxwell, make_law
@@ -115,8 +115,7 @@ class DeclaredModel:
                 f'"fit" }}, or from Python free=["{name}"], or take it out of by_mode.'
             ) from None
         amplitude = effect.parameters[0]
-        adds = isinstance(effect, ConstitutiveEffect) and effect.adds_term
-        if not adds or amplitude.range_scale != "one":
+        if not may_differ_by_mode(effect):
             raise InputError(
                 f"by_mode names the effect {name}, which adds no term to the law of each mode. "
                 "Name effects that do, such as giesekus_mobility, or parameters of the law."
@@ -224,3 +223,9 @@ class DeclaredModel:
         return [i for i, wanted in enumerate(factors) if wanted] + [
             2 + i for i in range(len(self.free_parameters))
         ]
+
+
+def may_differ_by_mode(effect: AbstractEffect) -> bool:
+    """Return whether an effect scales a term of each mode's law by a dimensionless amplitude."""
+    adds = isinstance(effect, ConstitutiveEffect) and effect.adds_term
+    return adds and effect.parameters[0].range_scale == "one"

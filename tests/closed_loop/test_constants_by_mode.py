@@ -268,3 +268,23 @@ def test_what_cannot_differ_by_mode_is_refused(options, text):
     base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI[:modes], TIMES[:modes])
     with pytest.raises(InputError, match=text):
         dc.close_loop(data((0.3, 0.3, 0.3)), base, **({"free": ["alpha"]} | options))
+
+
+def told_maxwell(mobilities):
+    base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
+    asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2}
+    return dc.close_loop(data(mobilities), base, held_out=["4.0"], **asked)
+
+
+def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_for():
+    result = told_maxwell((0.1, 0.3, 0.6))
+    assert result.verdict == "effects_added"
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    assert result.by_mode["giesekus_mobility"].degree == 1
+    assert result.error_after.held_out == pytest.approx(NOISE, rel=0.3)  # 50 samples of noise
+
+
+def test_control_one_constant_that_explains_the_runs_stays_one():
+    result = told_maxwell((0.3, 0.3, 0.3))
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    assert result.by_mode == {}
