@@ -35,6 +35,13 @@ _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
+ONLY_STEADY = (
+    "Only steady states were measured, which test no law: another one, or a structure that flow "
+    "breaks down, can give the same curve and differ in every flow that changes with time."
+)
+"""Said of a law that was fitted to nothing else."""
+
+_IN_TIME = "σ12 in flows that change with time"
 _UNTESTED = (
     "One run was fitted and none held out, so no other flow tested the law, and {} is not "
     "determined. Fit another run, or hold one out."
@@ -57,17 +64,38 @@ class Statement:
         The reason, for a reader.
     brief
         What the verdict says of it; empty where that needs no words of its own.
+    in_time
+        Whether it is of flows that change with time only, and not of steady states.
     """
 
     quantity: str
     determined: Determined
     text: str
     brief: str = ""
+    in_time: bool = False
 
     @property
     def title(self) -> str:
         """The quantity as a reader knows it."""
+        if self.in_time:
+            return _IN_TIME
         return _TITLES.get(self.quantity, self.quantity)
+
+    def leaves_open(self, quantity: str, flow: Flow) -> bool:
+        """Return whether it says that a quantity is not determined in a flow.
+
+        In extension the recorded stress is none of those that statements are about.
+
+        Parameters
+        ----------
+        quantity, flow
+            What is predicted, and where.
+        """
+        if not self.undetermined or self.quantity != quantity:
+            return False
+        recorded = quantity == "sigma12"
+        steady = flow.protocol.control == "steady"
+        return not (recorded and (not flow.in_shear or (self.in_time and steady)))
 
     @property
     def of_law(self) -> bool:
@@ -190,18 +218,21 @@ def make_statements(
     training = [flow for flow in flows if flow.kind == "training"]
     if training and not any(flow.in_shear for flow in training):
         return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
+    steady = only_steady(flows)
+    found = [Statement("sigma12", "no", ONLY_STEADY, in_time=True)] if steady else []
     at = law_structure(structure)
     if at is None:
-        return _without_structure(explanation, flows, rivals, normal_stresses_used)
+        return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
     # a law that was never asked of another flow than the one it was fitted to
     untested = len(training) == 1 and not any(flow.kind == "held_out" for flow in flows)
-    found = []
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
         determined: Determined = "no"
         text = quantity.text
-        if not quantity.open and untested:
+        if not quantity.open and steady:
+            text = ONLY_STEADY
+        elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
         elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
@@ -210,6 +241,18 @@ def make_statements(
             text = f"{text} {_of_band(quantity.quantity, check)}"
         found.append(Statement(quantity.quantity, determined, text))
     return found
+
+
+def only_steady(flows: Sequence[Flow]) -> bool:
+    """Return whether all that was measured are steady states: no run in time tested a law.
+
+    Parameters
+    ----------
+    flows
+        All flows.
+    """
+    measured = [flow for flow in flows if flow.kind in ("training", "held_out")]
+    return bool(measured) and all(flow.protocol.control == "steady" for flow in measured)
 
 
 def claimed(
@@ -224,14 +267,14 @@ def claimed(
     statements
         What the data say of each quantity.
     flows
-        The flows; in extension the recorded stress is none of those that statements are about.
+        The flows.
     """
-    undetermined = {s.quantity for s in statements if s.undetermined}
-    open_ = np.array([quantity in undetermined for quantity in QUANTITIES])
-    in_shear = {flow.key: flow.in_shear for flow in flows}
+    by_key = {flow.key: flow for flow in flows}
     found = {}
     for key, band in bands.items():
-        column = open_ & np.array([in_shear[key], True, True])
+        column = np.array(
+            [any(s.leaves_open(name, by_key[key]) for s in statements) for name in QUANTITIES]
+        )
         limits = {
             name: np.where(column, np.nan, getattr(band, name))
             for name in ("low", "high", "rivals_low", "rivals_high")

@@ -9,6 +9,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.judging.statements import only_steady
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -53,8 +54,15 @@ def _found(comparison: Comparison) -> str:
     parts = []
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
-        verb = "explains" if len(explanation.by) == 1 else "explain"
-        parts.append(f"explained: {names} {verb} the data, and {_rests(explanation)}")
+        one = len(explanation.by) == 1
+        if only_steady(comparison.flows):
+            verb = "fits" if one else "fit"
+            parts.append(
+                f"fitted, not tested: {names} {verb} the steady states, and {_rests(explanation)}"
+            )
+        else:
+            verb = "explains" if one else "explain"
+            parts.append(f"explained: {names} {verb} the data, and {_rests(explanation)}")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
@@ -345,6 +353,8 @@ def _next(comparison: Comparison) -> str:
             "allow more terms."
         )
     following = comparison.next_measurement
+    if only_steady(comparison.flows):
+        return _IN_TIME
     if following.proposals:
         return _proposal(following)
     if not any(flow.in_shear for flow in comparison.flows_of("training")):
@@ -357,6 +367,12 @@ def _next(comparison: Comparison) -> str:
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
         f"a shear rate above {significant(max(rates), 3)}{unit}."
     )
+
+
+_IN_TIME = (
+    "Measure how the stress changes with time, in a start-up, a step of the rate or a large "
+    "oscillation: steady states alone do not tell a law from another, or from a structure."
+)
 
 
 def _proposal(following: NextMeasurement) -> str:
