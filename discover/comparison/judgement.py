@@ -25,11 +25,11 @@ from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
-    ONLY_STEADY,
+    ONLY_STATES,
     Statement,
     claimed,
     make_statements,
-    only_steady,
+    only_states,
 )
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
@@ -161,7 +161,7 @@ def judge(
         if silent_records
         else (
             *_of_modes(outcomes, explanation, expectation),
-            *((ONLY_STEADY,) if explanation.by and only_steady(flows) else ()),
+            *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
             *apart,
         ),
     )

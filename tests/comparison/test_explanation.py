@@ -246,7 +246,7 @@ def test_one_run_with_none_held_out_determines_nothing(good):
     assert found[0].determined == "if_the_law_is_in_the_library"
 
 
-def test_steady_states_alone_determine_nothing_that_changes_with_time(good):
+def test_states_alone_determine_no_transient(good):
     # a flow curve of a fluid with a structure: three terms that are not there left the noise
     explanation, flows = good
     curve = [
@@ -259,13 +259,13 @@ def test_steady_states_alone_determine_nothing_that_changes_with_time(good):
         ("N1", "no"),
         ("N2", "no"),
     ]
-    assert found[0].title == "σ12 in flows that change with time"
-    # what was measured keeps its band; in time, and of N1 anywhere, no claim is made
+    assert found[0].title == "σ12 in transients"
+    # what was measured keeps its band; of transients, and of N1 anywhere, no claim is made
     for flow, kept in ((curve[0], True), (flows[0], False)):
         band = claimed(bands([flow]), found, [flow])[flow.key]
         assert np.all(np.isfinite(band.low[:, 0])) == kept
         assert np.all(np.isnan(band.low[:, 1:]))
-    # the control: a run in time beside the curve, fitted or held out, tests the law
+    # the control: a transient beside the curve, fitted or held out, tests the law
     for kind in ("training", "held_out"):
         beside = [replace(flows[0], kind=kind), *curve[1:]]
         found = make_statements(explanation, beside, [], STRUCTURE, bands(beside))

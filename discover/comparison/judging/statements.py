@@ -35,13 +35,13 @@ _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
-ONLY_STEADY = (
-    "Only steady states were measured, which test no law: another one, or a structure that flow "
-    "breaks down, can give the same curve and differ in every flow that changes with time."
+ONLY_STATES = (
+    "Only steady or periodic states were measured, which do not tell how they are reached: another "
+    "law, or a structure that flow breaks down, can give the same states and another transient."
 )
 """Said of a law that was fitted to nothing else."""
 
-_IN_TIME = "σ12 in flows that change with time"
+_IN_TRANSIENTS = "σ12 in transients"
 _UNTESTED = (
     "One run was fitted and none held out, so no other flow tested the law, and {} is not "
     "determined. Fit another run, or hold one out."
@@ -64,21 +64,21 @@ class Statement:
         The reason, for a reader.
     brief
         What the verdict says of it; empty where that needs no words of its own.
-    in_time
-        Whether it is of flows that change with time only, and not of steady states.
+    in_transients
+        Whether it is of transients only, and not of steady and periodic states.
     """
 
     quantity: str
     determined: Determined
     text: str
     brief: str = ""
-    in_time: bool = False
+    in_transients: bool = False
 
     @property
     def title(self) -> str:
         """The quantity as a reader knows it."""
-        if self.in_time:
-            return _IN_TIME
+        if self.in_transients:
+            return _IN_TRANSIENTS
         return _TITLES.get(self.quantity, self.quantity)
 
     def leaves_open(self, quantity: str, flow: Flow) -> bool:
@@ -93,9 +93,9 @@ class Statement:
         """
         if not self.undetermined or self.quantity != quantity:
             return False
-        recorded = quantity == "sigma12"
-        steady = flow.protocol.control == "steady"
-        return not (recorded and (not flow.in_shear or (self.in_time and steady)))
+        if quantity != "sigma12":
+            return True
+        return flow.in_shear and not (self.in_transients and flow.is_of_states)
 
     @property
     def of_law(self) -> bool:
@@ -218,8 +218,8 @@ def make_statements(
     training = [flow for flow in flows if flow.kind == "training"]
     if training and not any(flow.in_shear for flow in training):
         return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
-    steady = only_steady(flows)
-    found = [Statement("sigma12", "no", ONLY_STEADY, in_time=True)] if steady else []
+    states = only_states(flows)
+    found = [Statement("sigma12", "no", ONLY_STATES, in_transients=True)] if states else []
     at = law_structure(structure)
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
@@ -230,8 +230,8 @@ def make_statements(
             continue
         determined: Determined = "no"
         text = quantity.text
-        if not quantity.open and steady:
-            text = ONLY_STEADY
+        if not quantity.open and states:
+            text = ONLY_STATES
         elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
         elif not quantity.open:
@@ -243,8 +243,8 @@ def make_statements(
     return found
 
 
-def only_steady(flows: Sequence[Flow]) -> bool:
-    """Return whether all that was measured are steady states: no run in time tested a law.
+def only_states(flows: Sequence[Flow]) -> bool:
+    """Return whether all that was measured are steady or periodic states, and no transient.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def only_steady(flows: Sequence[Flow]) -> bool:
         All flows.
     """
     measured = [flow for flow in flows if flow.kind in ("training", "held_out")]
-    return bool(measured) and all(flow.protocol.control == "steady" for flow in measured)
+    return bool(measured) and all(flow.is_of_states for flow in measured)
 
 
 def claimed(

@@ -9,7 +9,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
-from discover.comparison.judging.statements import only_steady
+from discover.comparison.judging.statements import only_states
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -55,10 +55,10 @@ def _found(comparison: Comparison) -> str:
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
         one = len(explanation.by) == 1
-        if only_steady(comparison.flows):
+        if only_states(comparison.flows):
             verb = "fits" if one else "fit"
             parts.append(
-                f"fitted, not tested: {names} {verb} the steady states, and {_rests(explanation)}"
+                f"fitted, not tested: {names} {verb} what was measured, and {_rests(explanation)}"
             )
         else:
             verb = "explains" if one else "explain"
@@ -353,8 +353,8 @@ def _next(comparison: Comparison) -> str:
             "allow more terms."
         )
     following = comparison.next_measurement
-    if only_steady(comparison.flows):
-        return _IN_TIME
+    if only_states(comparison.flows):
+        return _A_TRANSIENT
     if following.proposals:
         return _proposal(following)
     if not any(flow.in_shear for flow in comparison.flows_of("training")):
@@ -369,9 +369,9 @@ def _next(comparison: Comparison) -> str:
     )
 
 
-_IN_TIME = (
-    "Measure how the stress changes with time, in a start-up, a step of the rate or a large "
-    "oscillation: steady states alone do not tell a law from another, or from a structure."
+_A_TRANSIENT = (
+    "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
+    "alone do not tell a law from another, or from a structure that flow breaks down."
 )
 
 
