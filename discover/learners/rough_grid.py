@@ -8,7 +8,6 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.run import Run
 from discover.protocols.kinematics import STATES
 from discover.simulate.flow_batch import FlowBatch
 
@@ -18,23 +17,7 @@ AFFORDABLE = 6000.0
 WORTH_IT = 0.5
 """Share of the steps that a rough grid may have at most: it has programs of its own to compile."""
 
-STATES_KEPT = 16
-"""Most states of a sweep or a flow curve on a rough grid, for each of them costs many steps."""
-
 _STRAIN_STEP, _PHASE_STEP, _GROWTH = 0.4, 0.3, 0.1
-
-
-def most_samples(run: Run, most: int) -> int:
-    """Return how many samples of a run to keep: of states fewer than of a run in time.
-
-    Parameters
-    ----------
-    run
-        The run.
-    most
-        Samples of a run in time.
-    """
-    return min(most, STATES_KEPT) if run.protocol.control in STATES else most
 
 
 def rough_limits(

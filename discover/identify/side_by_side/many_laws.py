@@ -147,6 +147,7 @@ def predict_laws(
     fluids: Fluid,
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
+    **limits: float,
 ) -> Float[np.ndarray, "laws flows n 3"]:
     """Return the recorded stress, N1 and N2 in Pa of every law in every flow.
 
@@ -158,8 +159,10 @@ def predict_laws(
         A fluid with a leading axis of laws on every array.
     protocols, times
         The flows and their sampling times.
+    **limits
+        Limits of steps, as `make_grids` takes them.
     """
-    flows = lay_out(protocols, times, relaxation_time=fluids.settling_time)
+    flows = lay_out(protocols, times, relaxation_time=fluids.settling_time, **limits)
     first = jax.tree.map(lambda leaf: leaf[0], eqx.filter(fluids, eqx.is_array))
     fluid = eqx.combine(first, eqx.filter(fluids, eqx.is_array, inverse=True))
     flows = in_enough_steps(fluid, flows)

@@ -24,7 +24,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.rough_grid import STATES_KEPT, WORTH_IT, most_samples, rough_limits
+from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
@@ -49,7 +49,6 @@ from discover.learners.tbnn_ude.spread import (
     member_predictions,
 )
 from discover.progress import Progress, by_steps
-from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out
@@ -355,23 +354,24 @@ def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> Training
     )
 
 
+_WORTH_TRAINING_ON = 1.5
+"""Times fewer steps from which a rough grid pays; a law is judged on a grid of its own."""
+
+
 def _rougher(
     problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
 ) -> tuple[TrainingProblem, str]:
     """Return a problem of fewer samples and longer steps, and what was left out in words."""
-    fewer = [run.window(evenly_chosen(len(run), most_samples(run, samples))) for run in runs]
+    fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
     said = []
-    thinned = [run for few, run in zip(fewer, runs, strict=True) if len(few) < len(run)]
-    if thinned:
+    if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
         problem = _problem(fewer, known)
-        states = any(run.protocol.control in STATES for run in thinned)
-        of_states = f" ({STATES_KEPT} of a sweep or flow curve)" if states else ""
-        said.append(f"at most {samples} samples of a run{of_states} were fitted")
+        said.append(f"at most {samples} samples of a run were fitted")
     limits = rough_limits(problem.flows, np.asarray(known.relaxation_time))
     if limits is not None and known.linear_relaxation:
         rough = _problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
-        if share * WORTH_IT >= 1.0:
+        if share >= _WORTH_TRAINING_ON:
             problem = rough
             said.append(f"it was trained in {share:.2g} times fewer steps than it is judged in")
     return problem, ", and ".join(said)

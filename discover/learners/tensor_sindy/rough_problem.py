@@ -6,18 +6,15 @@ import numpy as np
 
 from discover.dataset.run import Run
 from discover.dataset.thinning import thin_run
-from discover.learners.rough_grid import (
-    AFFORDABLE,
-    STATES_KEPT,
-    WORTH_IT,
-    most_samples,
-    rough_limits,
-)
+from discover.learners.rough_grid import AFFORDABLE, WORTH_IT, rough_limits
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.protocols.kinematics import STATES
 
 SAMPLES = 60
 """Most samples of a run on the rough grid."""
+
+_STATES_KEPT = 16
+"""The same of steady and periodic states, each of which costs many steps."""
 
 
 def rough_problem(
@@ -42,8 +39,12 @@ def rough_problem(
     limits = rough_limits(problem.flows, np.asarray(problem.relaxation_time))
     if limits is None:
         return None
-    rough = make([thin_run(run, most_samples(run, SAMPLES)) for run in runs], **limits)
+    rough = make([thin_run(run, _most_samples(run)) for run in runs], **limits)
     return rough if rough.flows.n_steps <= WORTH_IT * steps else None
+
+
+def _most_samples(run: Run) -> int:
+    return _STATES_KEPT if run.protocol.control in STATES else SAMPLES
 
 
 def ranked_in_words(fine: TrajectoryProblem, rough: TrajectoryProblem | None, fitted: int) -> str:
@@ -60,7 +61,7 @@ def ranked_in_words(fine: TrajectoryProblem, rough: TrajectoryProblem | None, fi
         return ""
     share = fine.flows.n_steps / rough.flows.n_steps
     states = any(protocols.control in STATES for protocols, _ in fine.flows.parts)
-    fewer = f" ({STATES_KEPT} of a sweep or flow curve)" if states else ""
+    fewer = f" ({_STATES_KEPT} of a sweep or flow curve)" if states else ""
     return (
         f", {fitted} of them on all samples: to save time the others were ranked on at most "
         f"{SAMPLES} samples of a run{fewer}, in {share:.2g} times fewer steps "
