@@ -234,6 +234,13 @@ def test_a_law_of_states_alone_is_fitted_and_not_tested(tmp_path, no_pictures):
     assert "structure that flow breaks down" in page_of(comparison, tmp_path)
 
 
+def test_a_law_of_one_run_is_fitted_and_not_tested():
+    flows = made_up().flows
+    found = comparison_verdict(made_up(flows=flows[:1]))[0]
+    assert found.startswith("Fitted, not tested")
+    assert comparison_verdict(made_up(flows=flows))[0].startswith("Explained")  # the control
+
+
 def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):
     comparison = made_up()
     sentences = comparison_verdict(comparison)

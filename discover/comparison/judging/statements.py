@@ -223,8 +223,7 @@ def make_statements(
     at = law_structure(structure)
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
-    # a law that was never asked of another flow than the one it was fitted to
-    untested = len(training) == 1 and not any(flow.kind == "held_out" for flow in flows)
+    untested = one_run(flows)
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
@@ -241,6 +240,17 @@ def make_statements(
             text = f"{text} {_of_band(quantity.quantity, check)}"
         found.append(Statement(quantity.quantity, determined, text))
     return found
+
+
+def one_run(flows: Sequence[Flow]) -> bool:
+    """Return whether a law was never asked of another flow than the one it was fitted to.
+
+    Parameters
+    ----------
+    flows
+        All flows.
+    """
+    return [flow.kind for flow in flows if flow.kind in ("training", "held_out")] == ["training"]
 
 
 def only_states(flows: Sequence[Flow]) -> bool:

@@ -9,7 +9,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
-from discover.comparison.judging.statements import only_states
+from discover.comparison.judging.statements import one_run, only_states
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -55,7 +55,8 @@ def _found(comparison: Comparison) -> str:
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
         one = len(explanation.by) == 1
-        if only_states(comparison.flows):
+        unasked = one_run(comparison.flows) and not comparison.judged
+        if unasked or only_states(comparison.flows):
             verb = "fits" if one else "fit"
             parts.append(
                 f"fitted, not tested: {names} {verb} what was measured, and {_rests(explanation)}"
