@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -147,7 +148,7 @@ def predict_laws(
     fluids: Fluid,
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
-    **limits: float,
+    **limits: Any,
 ) -> Float[np.ndarray, "laws flows n 3"]:
     """Return the recorded stress, N1 and N2 in Pa of every law in every flow.
 
