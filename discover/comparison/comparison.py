@@ -255,7 +255,7 @@ class Comparison(PageView, NotebookView):
         for statement in self.statements:
             open_ = "Not determined by these data"
             said = open_ if statement.undetermined else "Determined if the law is in the library"
-            yield f"{said}: {statement.quantity}. {statement.text}"
+            yield f"{said}: {statement.title}. {statement.text}"
         if self.rivals:
             yield "Laws that these data do not tell from the one found by sparse regression:"
             yield self.rivals_table()

@@ -28,7 +28,13 @@ from discover.comparison.judging.modes_apart import open_where_modes_differ
 from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
-from discover.comparison.judging.statements import Statement, claimed, make_statements
+from discover.comparison.judging.statements import (
+    ONLY_STATES,
+    Statement,
+    claimed,
+    make_statements,
+    only_states,
+)
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -165,7 +171,13 @@ def judge(
         statements,
         replace(following, bands=claimed(bands, statements, flows)),
         classical,
-        () if silent_records else (*_of_modes(outcomes, explanation, expectation), *apart),
+        ()
+        if silent_records
+        else (
+            *_of_modes(outcomes, explanation, expectation),
+            *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
+            *apart,
+        ),
         by_mode,
     )
 

@@ -21,7 +21,7 @@ _STRAIN_STEP, _PHASE_STEP, _GROWTH = 0.4, 0.3, 0.1
 
 
 def rough_limits(
-    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"], states: bool = False
+    flows: FlowBatch, relaxation_time: Float[np.ndarray, " k"]
 ) -> Mapping[str, float] | None:
     """Return limits of longer steps, as `make_grid` takes them; None where the flows have none.
 
@@ -35,11 +35,9 @@ def rough_limits(
         On the fine grid.
     relaxation_time
         Of the modes, in s.
-    states
-        Whether steady and periodic states have longer steps too; else there are none with them.
     """
     controls = {protocols.control for protocols, _ in flows.parts}
-    if not controls <= {"rate", *(STATES if states else ())}:
+    if not controls <= {"rate", *STATES}:
         return None
     if "rate" not in controls:
         return {"strain_step": _STRAIN_STEP}

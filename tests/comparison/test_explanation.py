@@ -17,6 +17,7 @@ from discover.identify import HiddenStresses, LawTerms
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
+from discover.protocols.control import steady_rates
 from discover.protocols.protocol import in_flow, measured_rate, oscillatory_shear, start_up
 from discover.statistics.residual import Expectation
 
@@ -243,6 +244,32 @@ def test_one_run_with_none_held_out_determines_nothing(good):
     unseen = [replace(one[0], kind="held_out"), *one[1:]]
     found = make_statements(explanation, [flows[0], *unseen], [], STRUCTURE, bands(flows))
     assert found[0].determined == "if_the_law_is_in_the_library"
+
+
+def test_states_alone_determine_no_transient(good):
+    # a flow curve of a fluid with a structure: three terms that are not there left the noise
+    explanation, flows = good
+    curve = [
+        replace(flow, protocol=steady_rates(np.geomspace(0.1, 10.0, len(flow.times))))
+        for flow in flows
+    ]
+    found = make_statements(explanation, curve, [], STRUCTURE, bands(curve))
+    assert [(s.quantity, s.determined) for s in found] == [
+        ("sigma12", "no"),
+        ("N1", "no"),
+        ("N2", "no"),
+    ]
+    assert found[0].title == "σ12 in transients"
+    # what was measured keeps its band; of transients, and of N1 anywhere, no claim is made
+    for flow, kept in ((curve[0], True), (flows[0], False)):
+        band = claimed(bands([flow]), found, [flow])[flow.key]
+        assert np.all(np.isfinite(band.low[:, 0])) == kept
+        assert np.all(np.isnan(band.low[:, 1:]))
+    # the control: a transient beside the curve, fitted or held out, tests the law
+    for kind in ("training", "held_out"):
+        beside = [replace(flows[0], kind=kind), *curve[1:]]
+        found = make_statements(explanation, beside, [], STRUCTURE, bands(beside))
+        assert {s.quantity: s.determined for s in found} == {"N1": IN_LIBRARY, "N2": "no"}
 
 
 def test_a_structured_residual_leaves_nothing_determined(good, responses):

@@ -1,10 +1,16 @@
 """Bands from predictions: neither a narrow one of what is left, nor a wide one of nonsense."""
 
+from dataclasses import replace
+
 import numpy as np
+from independent import Giesekus
+from independent.sweeps import modulus_of
 from scipy.stats import norm
 
 from discover.identify.rivals.bands import bands_of_predictions
-from discover.identify.side_by_side.many_laws import Contender, draws
+from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
+from discover.laws import Fluid, make_law
+from discover.protocols.control import oscillations
 
 TIMES = np.linspace(0.0, 1.0, 5)
 N_DRAWS = 40
@@ -77,3 +83,19 @@ def test_draws_have_the_covariance_of_constants_that_exchange_each_other():
     values = np.array([list(other.terms.values()) for other in others])
     # an axis is drawn evenly, so its variance is nearly exact; how axes combine is left to chance
     np.testing.assert_allclose(np.cov(values.T), covariance, atol=0.1)
+
+
+def test_laws_in_a_sweep_have_the_moduli_that_scipy_gives_each():
+    strains, alphas = np.array([0.1, 1.0, 4.0]), (0.1, 0.4)
+    sweep = oscillations(strains, np.ones(3))
+    moduli = ("storage_modulus", "loss_modulus")
+    laws = [Contender("", {"sigma.sigma": alpha}) for alpha in alphas]
+    # of a shear-thickening law that runs away there is no state at the largest strain
+    laws.append(Contender("", {"tr(gammadot.gammadot)*gammadot": -1.0, "sigma.sigma": -0.5}))
+    declared = Fluid(make_law("ucm"), 100.0, 1.0)
+    flows = [replace(sweep, modulus=modulus) for modulus in moduli]
+    found = predict_laws(fluid_of(laws, declared), flows, [np.arange(1.0, 4.0)] * 2)[..., 0]
+    for alpha, (stored, lost) in zip(alphas, found, strict=False):
+        exact = [modulus_of(Giesekus(alpha, 100.0), strain, 1.0, 5) for strain in strains]
+        np.testing.assert_allclose(stored + 1j * lost, exact, rtol=1e-4)
+    assert not np.all(np.isfinite(found[-1]))

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 from independent import Giesekus, start_up
+from independent.folders import write_table
 from independent.sweeps import modulus_of
 
 import discover as dc
 from discover.learners import rough_grid
+from discover.learners.known_part import known_part
+from discover.learners.tbnn_ude import estimator as of_network
 from discover.learners.tensor_sindy import rough_problem as of_search
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.trajectories.problem import make_problem
@@ -137,3 +140,17 @@ def test_where_the_fine_grid_follows_the_fastest_relaxation_so_does_the_rough_on
 def test_a_screening_that_does_not_exist_is_refused():
     with pytest.raises(dc.InputError, match="screening must be one of auto, exact"):
         dc.TensorSINDy(screening="none").fit(records())
+
+
+def test_the_network_sees_every_state_of_a_sweep_in_fewer_steps(tmp_path):
+    strains = np.geomspace(0.1, 10.0, 24)
+    columns = {"strain": strains, "omega_rad_s": np.ones(24), "Gp_Pa": strains, "Gpp_Pa": strains}
+    write_table(tmp_path / "amplitude_sweep.csv", columns)
+    runs = list(dc.load_dataset(tmp_path).with_material_functions())
+    known = known_part(dc.TBNNUDE(base=BASE))
+    fine = of_network._problem(runs, known)
+    rough, said = of_network._rougher(fine, runs, known, 100)
+    assert np.array_equal(rough.target, fine.target)
+    assert rough.flows.n_steps <= fine.flows.n_steps / 1.5
+    assert "fewer steps than it is judged in" in said
+    assert "samples" not in said

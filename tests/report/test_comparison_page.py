@@ -11,9 +11,10 @@ import pytest
 from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.statements import IN_LIBRARY, ONLY_STATES, Statement
 from discover.dataset.repeats import Repeats
 from discover.learners import RecoveredTerm
+from discover.protocols.control import steady_rates
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows
@@ -219,6 +220,25 @@ def test_an_unexplained_verdict_leads_and_claims_nothing(tmp_path, no_pictures):
     assert content["undetermined"] == ["N1", "N2"]
     assert {s["determined"] for s in content["statements"]} == {"no"}
     assert content["learners"]["tensor_sindy"]["intervals_hold"] == "no"
+
+
+def test_a_law_of_states_alone_is_fitted_and_not_tested(tmp_path, no_pictures):
+    curve = steady_rates(np.linspace(0.1, 10.0, len(TIMES)))
+    flows = [replace(one, protocol=curve) for one in made_up().flows]
+    open_ = Statement("sigma12", "no", "No.", in_transients=True)
+    comparison = made_up(flows=flows, statements=[open_, *UNEXPLAINED], warnings=(ONLY_STATES,))
+    found, sure, following = comparison_verdict(comparison)
+    assert found.startswith("Fitted, not tested: sparse regression's law and")
+    assert "σ12 in transients and N1 and N2" in sure
+    assert following.startswith("Measure a transient")
+    assert "structure that flow breaks down" in page_of(comparison, tmp_path)
+
+
+def test_a_law_of_one_run_is_fitted_and_not_tested():
+    flows = made_up().flows
+    found = comparison_verdict(made_up(flows=flows[:1]))[0]
+    assert found.startswith("Fitted, not tested")
+    assert comparison_verdict(made_up(flows=flows))[0].startswith("Explained")  # the control
 
 
 def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):

@@ -35,6 +35,13 @@ _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
+ONLY_STATES = (
+    "Only steady or periodic states were measured, which do not tell how they are reached: another "
+    "law, or a structure that flow breaks down, can give the same states and another transient."
+)
+"""Said of a law that was fitted to nothing else."""
+
+_IN_TRANSIENTS = "σ12 in transients"
 _UNTESTED = (
     "One run was fitted and none held out, so no other flow tested the law, and {} is not "
     "determined. Fit another run, or hold one out."
@@ -57,17 +64,38 @@ class Statement:
         The reason, for a reader.
     brief
         What the verdict says of it; empty where that needs no words of its own.
+    in_transients
+        Whether it is of transients only, and not of steady and periodic states.
     """
 
     quantity: str
     determined: Determined
     text: str
     brief: str = ""
+    in_transients: bool = False
 
     @property
     def title(self) -> str:
         """The quantity as a reader knows it."""
+        if self.in_transients:
+            return _IN_TRANSIENTS
         return _TITLES.get(self.quantity, self.quantity)
+
+    def leaves_open(self, quantity: str, flow: Flow) -> bool:
+        """Return whether it says that a quantity is not determined in a flow.
+
+        In extension the recorded stress is none of those that statements are about.
+
+        Parameters
+        ----------
+        quantity, flow
+            What is predicted, and where.
+        """
+        if not self.undetermined or self.quantity != quantity:
+            return False
+        if quantity != "sigma12":
+            return True
+        return flow.in_shear and not (self.in_transients and flow.is_of_states)
 
     @property
     def of_law(self) -> bool:
@@ -190,18 +218,20 @@ def make_statements(
     training = [flow for flow in flows if flow.kind == "training"]
     if training and not any(flow.in_shear for flow in training):
         return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
+    states = only_states(flows)
+    found = [Statement("sigma12", "no", ONLY_STATES, in_transients=True)] if states else []
     at = law_structure(structure)
     if at is None:
-        return _without_structure(explanation, flows, rivals, normal_stresses_used)
-    # a law that was never asked of another flow than the one it was fitted to
-    untested = len(training) == 1 and not any(flow.kind == "held_out" for flow in flows)
-    found = []
+        return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
+    untested = one_run(flows)
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
         determined: Determined = "no"
         text = quantity.text
-        if not quantity.open and untested:
+        if not quantity.open and states:
+            text = ONLY_STATES
+        elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
         elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
@@ -210,6 +240,29 @@ def make_statements(
             text = f"{text} {_of_band(quantity.quantity, check)}"
         found.append(Statement(quantity.quantity, determined, text))
     return found
+
+
+def one_run(flows: Sequence[Flow]) -> bool:
+    """Return whether a law was never asked of another flow than the one it was fitted to.
+
+    Parameters
+    ----------
+    flows
+        All flows.
+    """
+    return [flow.kind for flow in flows if flow.kind in ("training", "held_out")] == ["training"]
+
+
+def only_states(flows: Sequence[Flow]) -> bool:
+    """Return whether all that was measured are steady or periodic states, and no transient.
+
+    Parameters
+    ----------
+    flows
+        All flows.
+    """
+    measured = [flow for flow in flows if flow.kind in ("training", "held_out")]
+    return bool(measured) and all(flow.is_of_states for flow in measured)
 
 
 def claimed(
@@ -224,14 +277,14 @@ def claimed(
     statements
         What the data say of each quantity.
     flows
-        The flows; in extension the recorded stress is none of those that statements are about.
+        The flows.
     """
-    undetermined = {s.quantity for s in statements if s.undetermined}
-    open_ = np.array([quantity in undetermined for quantity in QUANTITIES])
-    in_shear = {flow.key: flow.in_shear for flow in flows}
+    by_key = {flow.key: flow for flow in flows}
     found = {}
     for key, band in bands.items():
-        column = open_ & np.array([in_shear[key], True, True])
+        column = np.array(
+            [any(s.leaves_open(name, by_key[key]) for s in statements) for name in QUANTITIES]
+        )
         limits = {
             name: np.where(column, np.nan, getattr(band, name))
             for name in ("low", "high", "rivals_low", "rivals_high")

@@ -30,6 +30,9 @@ OVERWHELMING = 50.0
 
 MOST_EVIDENCE = 1e6
 
+# an error of 1e-5 is nothing beside the noise that a measurement is given here
+_LIMITS = {"strain_step": 0.2, "phase_step": 0.3}
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -116,7 +119,10 @@ def propose_experiments(
     flat = [law for group in groups for law in group]
     starts = np.cumsum([0, *(len(group) for group in groups)])
     predicted = predict_laws(
-        fluid_of(flat, declared), [e.protocol for e in experiments], [e.times for e in experiments]
+        fluid_of(flat, declared),
+        [e.protocol for e in experiments],
+        [e.times for e in experiments],
+        **_LIMITS,
     )
     proposals = []
     for place, experiment in enumerate(experiments):

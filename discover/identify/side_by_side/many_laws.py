@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -18,6 +19,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.programs import compiled
+from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
@@ -146,6 +148,7 @@ def predict_laws(
     fluids: Fluid,
     protocols: Sequence[FlowProtocol],
     times: Sequence[Float[np.ndarray, " _"]],
+    **limits: Any,
 ) -> Float[np.ndarray, "laws flows n 3"]:
     """Return the recorded stress, N1 and N2 in Pa of every law in every flow.
 
@@ -157,8 +160,10 @@ def predict_laws(
         A fluid with a leading axis of laws on every array.
     protocols, times
         The flows and their sampling times.
+    **limits
+        Limits of steps, as `make_grids` takes them.
     """
-    flows = lay_out(protocols, times, relaxation_time=fluids.settling_time)
+    flows = lay_out(protocols, times, relaxation_time=fluids.settling_time, **limits)
     first = jax.tree.map(lambda leaf: leaf[0], eqx.filter(fluids, eqx.is_array))
     fluid = eqx.combine(first, eqx.filter(fluids, eqx.is_array, inverse=True))
     flows = in_enough_steps(fluid, flows)
@@ -167,7 +172,12 @@ def predict_laws(
 
 @compiled
 def _predict(fluids: Fluid, flows: FlowBatch) -> Float[Array, "laws flows n 3"]:
-    def of_law(fluid):
-        return flows.over(partial(observed_on_grid, fluid))
+    arrays, rest = eqx.partition(fluids, eqx.is_array)
 
-    return eqx.filter_vmap(of_law)(fluids)
+    def of_law(own):
+        return flows.over(partial(observed_on_grid, eqx.combine(own, rest)))
+
+    if all(protocols.control in FOLLOWED for protocols, _ in flows.parts):
+        return jax.vmap(of_law)(arrays)
+    # where a rate is solved for, side by side all laws would take as many steps as the slowest
+    return jax.lax.map(of_law, arrays)

@@ -24,7 +24,7 @@ from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.provenance import Provenance, provenance_of
-from discover.learners.rough_grid import WORTH_IT, rough_limits
+from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import as_runs
 from discover.learners.settings import PerMode, check_settings
@@ -354,6 +354,10 @@ def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> Training
     )
 
 
+_WORTH_TRAINING_ON = 1.5
+"""Times fewer steps from which a rough grid pays; a law is judged on a grid of its own."""
+
+
 def _rougher(
     problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
 ) -> tuple[TrainingProblem, str]:
@@ -367,7 +371,7 @@ def _rougher(
     if limits is not None and known.linear_relaxation:
         rough = _problem(fewer, known, **limits)
         share = problem.flows.n_steps / rough.flows.n_steps
-        if share * WORTH_IT >= 1.0:
+        if share >= _WORTH_TRAINING_ON:
             problem = rough
             said.append(f"it was trained in {share:.2g} times fewer steps than it is judged in")
     return problem, ", and ".join(said)

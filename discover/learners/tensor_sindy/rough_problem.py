@@ -36,7 +36,7 @@ def rough_problem(
     steps = problem.flows.n_steps
     if problem.modulus.size * steps <= AFFORDABLE:
         return None
-    limits = rough_limits(problem.flows, np.asarray(problem.relaxation_time), states=True)
+    limits = rough_limits(problem.flows, np.asarray(problem.relaxation_time))
     if limits is None:
         return None
     rough = make([thin_run(run, _most_samples(run)) for run in runs], **limits)

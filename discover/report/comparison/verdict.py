@@ -10,6 +10,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
+from discover.comparison.judging.statements import one_run, only_states
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -55,8 +56,16 @@ def _found(comparison: Comparison) -> str:
     parts = []
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
-        verb = "explains" if len(explanation.by) == 1 else "explain"
-        parts.append(f"explained: {names} {verb} the data, and {_rests(explanation)}")
+        one = len(explanation.by) == 1
+        unasked = one_run(comparison.flows) and not comparison.judged
+        if unasked or only_states(comparison.flows):
+            verb = "fits" if one else "fit"
+            parts.append(
+                f"fitted, not tested: {names} {verb} what was measured, and {_rests(explanation)}"
+            )
+        else:
+            verb = "explains" if one else "explain"
+            parts.append(f"explained: {names} {verb} the data, and {_rests(explanation)}")
     else:
         several = "neither law explains" if len(left) > 1 else "the law does not explain"
         parts.append(f"unexplained: {several} the data")
@@ -378,6 +387,8 @@ def _next(comparison: Comparison) -> str:
             "allow more terms."
         )
     following = comparison.next_measurement
+    if only_states(comparison.flows):
+        return _A_TRANSIENT
     if following.proposals:
         return _proposal(following)
     if not any(flow.in_shear for flow in comparison.flows_of("training")):
@@ -390,6 +401,12 @@ def _next(comparison: Comparison) -> str:
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
         f"a shear rate above {significant(max(rates), 3)}{unit}."
     )
+
+
+_A_TRANSIENT = (
+    "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
+    "alone do not tell a law from another, or from a structure that flow breaks down."
+)
 
 
 def _proposal(following: NextMeasurement) -> str:

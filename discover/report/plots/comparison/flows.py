@@ -81,7 +81,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
                         panel.plot(along, stresses[quantity][last], **style)
             _draw_band(row[0], comparison, flow, quantity, flow.times >= 0)
             _mark_training(row[0], flow)
-            _mark_open(row[0], comparison, quantity)
+            _mark_open(row[0], comparison, flow, quantity)
             _frame(row[0], comparison, flow, quantity, flow.times >= 0)
             for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
                 _draw_band(panel, comparison, flow, quantity, last, along)
@@ -120,7 +120,7 @@ def start_up_picture(
                 if quantity in stresses:
                     panel.plot(flow.along[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)
-            _mark_open(panel, comparison, quantity)
+            _mark_open(panel, comparison, flow, quantity)
             _frame(panel, comparison, flow, quantity, shown)
             drawn = quantity if flow.records_shear_stress else flow.protocol.quantity
             panel.set_ylabel(FIGURE_SYMBOLS[drawn] + ("" if flow.records_strain else stress_unit))
@@ -260,9 +260,9 @@ def _mark_training(panel, flow: Flow) -> None:
         )
 
 
-def _mark_open(panel, comparison: Comparison, quantity: str) -> None:
+def _mark_open(panel, comparison: Comparison, flow: Flow, quantity: str) -> None:
     """Say in a panel that these data leave the quantity open, so that no missing band is narrow."""
-    if quantity in comparison.undetermined:
+    if any(statement.leaves_open(quantity, flow) for statement in comparison.statements):
         panel.annotate(
             "not determined by these data", (0.98, 0.97), xycoords="axes fraction",
             ha="right", va="top", fontsize=7, color=INK,
