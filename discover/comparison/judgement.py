@@ -13,7 +13,10 @@ from discover.comparison.judging.declared_constants import (
     with_other_constants,
     with_other_gain,
 )
-from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.dense_library import (
+    open_where_dense_is_wide,
+    with_gain_in_dense,
+)
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import (
@@ -127,7 +130,7 @@ def judge(
     if not explanation.in_library:
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
-    outcomes = with_small_strain_told(outcomes, explanation, others)
+    outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()

@@ -5,7 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.declared_constants import OtherConstant
+from discover.comparison.judging.dense_library import open_where_dense_is_wide, with_gain_in_dense
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -37,7 +38,34 @@ def test_a_narrow_dense_band_leaves_a_statement_and_says_its_width():
     first, second = open_where_dense_is_wide(SAID, outcomes, [FLOW])
     assert first.determined == IN_LIBRARY
     assert "± 20 % of its size" in first.text
-    assert second == SAID[1]
+    # an open quantity has the band all the same, with what it takes for granted
+    assert second.undetermined
+    assert "± 20 % of N1 at the widest" in second.text
+    assert "no claim about a fluid unlike all of them" in second.text
+
+
+def test_dense_bands_hold_the_fluid_behind_a_transducer_of_the_gain_that_the_sparse_law_shows():
+    gain = 1.1
+    outcomes = {"tensor_dense": outcome("tensor_dense", 0.02)}
+    shown = OtherConstant("gammadot", 1.0 - gain, 100.0, gain, None)
+    wide = with_gain_in_dense(outcomes, [shown])["tensor_dense"].bands[FLOW.key]
+    for quantity in ("N1", "N2"):
+        low, high = wide[quantity]
+        truth = CURVES[quantity] / gain  # what was fitted is gain times the fluid's
+        assert np.all((low <= truth) & (truth <= high))
+        assert np.all((low <= CURVES[quantity]) & (CURVES[quantity] <= high))
+    own = outcomes["tensor_dense"].bands[FLOW.key]
+    np.testing.assert_array_equal(wide["sigma12"], own["sigma12"])
+    # another time moves no stress, and without a dense library there is nothing to widen
+    time = OtherConstant("sigma", 0.2, 1.0, 1.0 / 1.2, None)
+    assert with_gain_in_dense(outcomes, [time]) == outcomes
+    sparse = {"tensor_sindy": outcome("tensor_sindy")}
+    assert with_gain_in_dense(sparse, [shown]) == sparse
+
+
+def test_an_open_statement_stays_where_the_dense_library_has_no_band():
+    outcomes = {"tensor_dense": outcome("tensor_dense", None)}
+    assert open_where_dense_is_wide(SAID[1:], outcomes, [FLOW]) == SAID[1:]
 
 
 @pytest.mark.parametrize("half_width", [1.2, None])

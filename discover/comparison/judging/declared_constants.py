@@ -38,6 +38,9 @@ class OtherConstant:
         What was declared, in s or Pa; None where there are several modes.
     factor, ci95
         On what was declared, and its 95 % interval; None where the term has none.
+    slip
+        Of the wall, in 1/(Pa s), with which a Maxwell fluid of the declared time has the same σ12;
+        None where there is no such.
     """
 
     term: str
@@ -45,6 +48,7 @@ class OtherConstant:
     declared: float | None
     factor: float
     ci95: tuple[float, float] | None
+    slip: float | None = None
 
     @property
     def name(self) -> str:
@@ -67,6 +71,9 @@ class OtherConstant:
             same = f"a {noun} of {value} {unit}{span} in place of {self.declared:.4g} {unit}"
         if self.term == _MODULUS:
             same += f", or as a transducer that shows {self.factor:.4g} times the stress"
+        elif self.slip is not None:
+            slip = f"{self.slip:.4g} 1/(Pa s)"
+            same += f", or, as far as σ12 of a Maxwell fluid tells, as wall slip of {slip}"
         coefficient = f"{self.coefficient:.4g}".replace("-", "−")
         return f"{coefficient} {self.term} is the same as {same}: these data cannot tell"
 
@@ -104,8 +111,19 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
             limits = low, high
         if abs(factor - 1.0) > SEPARATED:
             alone = float(declared[0]) if len(declared) == 1 else None
-            found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits))
+            slip = _slip(term, model) if term.term == _TIME and alone is not None else None
+            found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits, slip))
     return found
+
+
+def _slip(term: RecoveredTerm, model: DeclaredModel) -> float | None:
+    """Return the slip s that a term c σ amounts to in σ12 of a Maxwell fluid, c = s G λ.
+
+    The fluid feels γ̇ − s σ12, so that σ12' = G (γ̇ − s σ12) − σ12/λ.
+    """
+    if term.coefficient <= 0.0 or model.solvent_viscosity or not model.law.linear_relaxation:
+        return None
+    return float(term.coefficient / (model.modulus[0] * model.relaxation_time[0]))
 
 
 def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> dict[str, float]:
@@ -128,6 +146,17 @@ def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> d
     return left
 
 
+def other_gain(others: Iterable[OtherConstant]) -> float | None:
+    """Return the gain of the transducer that the linear terms may stand for; None: there is none.
+
+    Parameters
+    ----------
+    others
+        From `other_constants`.
+    """
+    return next((other.factor for other in others if other.term == _MODULUS), None)
+
+
 def with_other_gain(
     bands: Mapping[str, PredictionBand], others: Sequence[OtherConstant]
 ) -> dict[str, PredictionBand]:
@@ -140,7 +169,7 @@ def with_other_gain(
     others
         From `other_constants`.
     """
-    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    gain = other_gain(others)
     if gain is None:
         return dict(bands)
     scale = np.array([1.0, 1.0 / gain, 1.0 / gain])  # σ12 is what is recorded
@@ -190,7 +219,7 @@ def with_other_constants(
         )
         for other in others
     ]
-    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    gain = other_gain(others)
     if gain is not None:
         text = (
             f"The band holds {{0}} as shown and, should it be the transducer, {{0}} / {gain:.4g}."

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.comparison.judging.declared_constants import OtherConstant, other_gain
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.statements import WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.words import percent_of
 
 DENSE = "tensor_dense"
@@ -37,7 +38,53 @@ def open_where_dense_is_wide(
     dense = outcomes.get(DENSE)
     if dense is None:
         return list(statements)
-    return [s if s.undetermined else _held(s, dense, outcomes, flows) for s in statements]
+    return [
+        _beside_open(s, dense, flows) if s.undetermined else _held(s, dense, outcomes, flows)
+        for s in statements
+    ]
+
+
+def with_gain_in_dense(
+    outcomes: Mapping[str, LearnerOutcome], others: Sequence[OtherConstant]
+) -> dict[str, LearnerOutcome]:
+    """Return the outcomes, the dense bands of N1 and N2 holding behind a transducer's gain as well.
+
+    The dense library has the term γ̇ too, and its laws take a wrong gain for another modulus.
+
+    Parameters
+    ----------
+    outcomes
+        By learner; without ``"tensor_dense"`` they stay as they are.
+    others
+        Declared constants that the sparse law's linear terms amount to.
+    """
+    dense, gain = outcomes.get(DENSE), other_gain(others)
+    if dense is None or gain is None:
+        return dict(outcomes)
+    bands: dict[str, Limits | None] = {}
+    for key, limits in dense.bands.items():
+        bands[key] = limits and {
+            quantity: (low, high)
+            if quantity == "sigma12"
+            else (np.minimum(low, low / gain), np.maximum(high, high / gain))
+            for quantity, (low, high) in limits.items()
+        }
+    return {**outcomes, DENSE: replace(dense, bands=bands)}
+
+
+def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Flow]) -> Statement:
+    """Return an open statement with what the dense band, which is drawn all the same, holds."""
+    quantity = statement.quantity
+    widths = [w for f in flows if (w := dense.half_widths(f).get(quantity)) is not None]
+    if not widths:
+        return statement
+    of = "N1" if quantity == "N2" else "its size"
+    told = (
+        f"The dense library's band (± {percent_of(max(widths))} of {of} at the widest) holds 95 % "
+        "of its laws that fit σ12. It is no claim about a fluid unlike all of them, nor about one "
+        "behind an instrument with a flaw."
+    )
+    return replace(statement, text=f"{statement.text} {told}")
 
 
 def _held(
