@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calibration import run_case
 from calibration_tables import calibration_error, comparison_table, is_right, loop_table, share
 from independent import SoftGlass, UpperConvectedMaxwell, start_up
 from independent.instruments import Instrument
@@ -169,3 +170,15 @@ def test_a_world_without_noise_holds_the_law_of_the_library_that_it_names():
         np.testing.assert_array_equal(run.stress, run.true.sigma12)
         off = np.linalg.norm(noisy[name].stress - run.stress) / np.linalg.norm(run.stress)
         assert 0.0 < off < 0.2
+
+
+@pytest.mark.slow
+def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold():
+    found = run_case("compare", 7, 0)
+    assert (found["law"], found["flaw"], found["verdict"]) == ("Maxwell", "sound", "explained")
+    assert found["terms"] == []
+    assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "tensor_dense"}
+    held = [b["inside"] for b in found["bands"] if "inside" in b]
+    assert held
+    assert min(held) > 0.9
+    assert "found alone: 1 of 1" in comparison_table([found])
