@@ -201,6 +201,10 @@ def test_without_a_band_nothing_is_determined(good):
     for none in ({}, bands(flows, width=2.0), bands(flows, width=np.inf)):
         statements = make_statements(explanation, flows, [], STRUCTURE, none)
         assert [s.determined for s in statements] == ["no", "no"]
+    # a band of no width is no wide band
+    assert "run away" in statements[0].text
+    wide = make_statements(explanation, flows, [], STRUCTURE, bands(flows, width=2.0))[0]
+    assert "wider than N1 itself" in wide.text
 
 
 def test_flows_without_a_normal_stress_determine_none(good):
