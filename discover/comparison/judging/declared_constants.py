@@ -208,12 +208,16 @@ def with_other_constants(
             f"{value:.4g} {name}".replace("-", "−") for name, value in beside(terms, others).items()
         ]
         rest = f" Beside it the law is {' + '.join(named)}." if named else ""
+
+    def same(other: OtherConstant) -> str:
+        return "law" if other.slip is None else "law, or the same σ12"
+
     said = [
         Statement(
             other.name,
             "no",
-            f"{other.text}, for it is one and the same law.{rest} A constant that was measured on "
-            f"another sample or at another temperature does that; [model] {other.name} = "
+            f"{other.text}, for it is one and the same {same(other)}.{rest} A constant that was "
+            f"measured on another sample or at another temperature does that; [model] {other.name} = "
             '"fit" fits it along.',
             other.text,
         )
