@@ -217,7 +217,8 @@ def with_other_constants(
             other.name,
             "no",
             f"{other.text}, for it is one and the same {same(other)}.{rest} A constant that was "
-            f"measured on another sample or at another temperature does that; [model] {other.name} = "
+            "measured on another sample or at another temperature does that; [model] "
+            f"{other.name} = "
             '"fit" fits it along.',
             other.text,
         )
