@@ -16,6 +16,7 @@ from discover.comparison.judging.declared_constants import (
 from discover.comparison.judging.dense_library import (
     open_where_dense_is_wide,
     with_gain_in_dense,
+    without_refuted_bands,
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
@@ -131,6 +132,7 @@ def judge(
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
+    outcomes, refuted = without_refuted_bands(outcomes, flows)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()
@@ -143,7 +145,7 @@ def judge(
         classical = _classical(study, known, independent)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
-    apart = disagreements(outcomes, judged, bands)
+    apart = [*refuted, *disagreements(outcomes, judged, bands)]
     if known.along is not None and known.along.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     return Judgement(

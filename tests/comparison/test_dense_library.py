@@ -1,12 +1,21 @@
 """The dense library opens what only sparsity decides; the curves are written by hand."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import UpperConvectedMaxwell
+from independent import start_up as start_up_of_scipy
+from independent.instruments import Instrument
 
 from discover.comparison.judging.declared_constants import OtherConstant
-from discover.comparison.judging.dense_library import open_where_dense_is_wide, with_gain_in_dense
+from discover.comparison.judging.dense_library import (
+    open_where_dense_is_wide,
+    with_gain_in_dense,
+    without_refuted_bands,
+)
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -87,6 +96,38 @@ def test_a_sparse_law_outside_the_dense_band_determines_nothing():
 
 def test_without_a_dense_library_every_statement_stays():
     assert open_where_dense_is_wide(SAID, {"tensor_sindy": outcome("tensor_sindy")}, [FLOW]) == SAID
+
+
+def held_out(record):
+    rate = np.full(len(record), 2.0)
+    times = np.linspace(0.0, 4.0, len(record))
+    return Flow("e.csv", "held_out", start_up(2.0), times, rate, {"sigma12": record})
+
+
+@pytest.mark.parametrize(("lag", "refuted"), [(0.0, False), (0.5, True)])
+def test_a_record_outside_the_dense_band_of_its_stress_leaves_no_band_of_n1(lag, refuted):
+    # scipy's Maxwell fluid, read through a transducer with a lag that the laws know nothing of
+    times, fluid = np.linspace(0.0, 4.0, 81), UpperConvectedMaxwell(1.0, 1.0)
+    exact = fluid.respond(start_up_of_scipy(2.0), times)
+    read = Instrument(lag=lag).record(fluid, start_up_of_scipy(2.0), times).stress
+    record = read + 0.01 * np.random.default_rng(0).standard_normal(81)
+    record[40] += 1.0  # one knock refutes no band
+    flow = held_out(record)
+    edge = 0.02 * np.max(exact.sigma12)
+    band = {
+        name: (curve - edge, curve + edge)
+        for name, curve in (("sigma12", exact.sigma12), ("N1", exact.N1), ("N2", exact.N2))
+    }
+    dense = replace(
+        outcome("tensor_dense"), bands={flow.key: band}, details={"noise": {"relative": 0.01}}
+    )
+    found, said = without_refuted_bands({"tensor_dense": dense}, [flow])
+    assert (found["tensor_dense"].bands[flow.key] is None) == refuted
+    assert len(said) == refuted
+    # a run that was fitted judges no prediction
+    fitted = replace(flow, kind="training")
+    assert without_refuted_bands({"tensor_dense": dense}, [fitted])[1] == []
+    assert without_refuted_bands({"tensor_sindy": dense}, [flow]) == ({"tensor_sindy": dense}, [])
 
 
 @pytest.fixture(scope="module")

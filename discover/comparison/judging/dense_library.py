@@ -14,6 +14,12 @@ from discover.words import percent_of
 
 DENSE = "tensor_dense"
 
+_OUTSIDE = 0.1
+"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
+
+_IN_NOISE = 2.0
+"""A sample is outside that is so many times the noise off a band of the curve."""
+
 
 def open_where_dense_is_wide(
     statements: Sequence[Statement],
@@ -70,6 +76,42 @@ def with_gain_in_dense(
             for quantity, (low, high) in limits.items()
         }
     return {**outcomes, DENSE: replace(dense, bands=bands)}
+
+
+def without_refuted_bands(
+    outcomes: Mapping[str, LearnerOutcome], flows: Sequence[Flow]
+) -> tuple[dict[str, LearnerOutcome], list[str]]:
+    """Return the outcomes without dense bands that a record refutes, and a sentence on each.
+
+    Where σ12 of a run held out lies outside the band, the laws that fit are not the fluid's in that
+    flow, and their N1 and N2 say nothing either.
+
+    Parameters
+    ----------
+    outcomes
+        By learner; without ``"tensor_dense"`` they stay as they are.
+    flows
+        All flows; measured runs held out are looked at.
+    """
+    dense = outcomes.get(DENSE)
+    if dense is None:
+        return dict(outcomes), []
+    noise = float((dense.details.get("noise") or {}).get("relative") or 0.0)
+    bands, said = dict(dense.bands), []
+    for flow in flows:
+        limits, record = bands.get(flow.key), flow.reference.get("sigma12")
+        if flow.kind != "held_out" or flow.is_truth or limits is None or record is None:
+            continue
+        low, high = limits["sigma12"]
+        allowed = _IN_NOISE * noise * np.sqrt(np.mean(np.asarray(record) ** 2))
+        share = float(np.mean(np.abs(record - np.clip(record, low, high)) > allowed))
+        if share > _OUTSIDE:
+            bands[flow.key] = None
+            said.append(
+                f"In {flow.title}, a run held out, {percent_of(share)} of the samples lie outside "
+                "the dense library's band of σ12, so it has no band there."
+            )
+    return {**outcomes, DENSE: replace(dense, bands=bands)}, said
 
 
 def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Flow]) -> Statement:
