@@ -37,7 +37,7 @@ class OtherConstant:
     declared
         What was declared, in s or Pa; None where there are several modes.
     factor, ci95
-        On what was declared, and its 95 % interval; None where the term has none.
+        On what was declared, and its 95 % interval; None where it has no positive end.
     slip
         Of the wall, in 1/(Pa s), with which a Maxwell fluid of the declared time has the same σ12;
         None where there is no such.
@@ -82,7 +82,7 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
     """Return which declared constants the linear terms of a law amount to.
 
     What differs by less than an experiment can be expected to see is none; nor is a term that
-    leaves no positive time or modulus.
+    leaves no positive time or modulus, or one without an interval, which other terms may replace.
 
     Parameters
     ----------
@@ -93,9 +93,9 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
     """
     found = []
     for term in terms:
-        if term.term not in LINEAR_TERMS:
+        if term.term not in LINEAR_TERMS or term.ci95 is None:
             continue
-        values = (term.coefficient, *(term.ci95 or ()))
+        values = (term.coefficient, *term.ci95)
         if term.term == _TIME:
             totals = [float(model.law.linear_relaxation) + value for value in values]
             declared = model.relaxation_time
@@ -106,7 +106,7 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
             continue
         factor = 1.0 / totals[0] if term.term == _TIME else totals[0]
         limits = None
-        if term.ci95 is not None and min(totals) > 0.0:
+        if min(totals) > 0.0:
             low, high = sorted(1.0 / t if term.term == _TIME else t for t in totals[1:])
             limits = low, high
         if abs(factor - 1.0) > SEPARATED:
