@@ -120,9 +120,11 @@ def comparison_table(cases: Cases) -> str:
     lines.append(f"  and explained: {share(explained, len(in_library))}")
     held = [_holds(t["ci95"], (_law_found(c) or {})[t["term"]]) for c in found for t in c["terms"]]
     lines.append(f"  95 % intervals that hold the coefficient: {share(sum(held), len(held))}")
+    others = [c for c in cases if not c.get("library_laws")]
     for name, some in (
-        ("all has a name", [c for c in cases if c["effects"] is not None]),
-        ("something has none", [c for c in cases if c["effects"] is None]),
+        ("a law of the library, sound instrument", in_library),
+        ("another law or a flaw, all with a name", [c for c in others if c["effects"] is not None]),
+        ("something has none", [c for c in others if c["effects"] is None]),
     ):
         explained = sum(c["verdict"] == "explained" for c in some)
         lines.append(f"{name}: explained in {share(explained, len(some))}")
