@@ -40,7 +40,7 @@ _END_TO_END = {
     "test_no_signal.py", "test_other_times.py", "test_known_effects_in_the_loop.py",
     "test_search_checkpoint.py", "test_mode_dependence.py", "test_held_out_pattern.py",
     "test_aliases.py", "test_known_laws_of_chains.py", "test_reports.py", "test_export.py",
-    "test_kills_and_clusters.py",
+    "test_kills_and_clusters.py", "test_law_by_mode.py",
 }  # fmt: skip
 
 

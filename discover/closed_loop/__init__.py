@@ -8,14 +8,12 @@ from discover.closed_loop.results.free_curve import FreeForm
 from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
 from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.closed_loop.results.stages import (
-    ConstantByMode,
     Fold,
-    ModeConstant,
     Stage,
-    StageParameter,
 )
 from discover.closed_loop.search.scoring.attribution import Attribution
 from discover.forward import DeclaredModel
+from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
 
 __all__ = [
     "Attribution",

@@ -8,11 +8,9 @@ import numpy as np
 from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.stages import (
-    ConstantByMode,
     DeclaredEffect,
     KnownParameter,
     Stage,
-    StageParameter,
 )
 from discover.closed_loop.search import Search
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
@@ -20,6 +18,7 @@ from discover.equations import Equation, StatePart, law_parts
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.forward.least_squares import Fit
+from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws import Fluid
 
 Bounds = Mapping[int, tuple[float, float]]

@@ -17,10 +17,10 @@ from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE, WINDOW, criterion
 from discover.dataset import Run
 from discover.forward import Batch
 from discover.forward.least_squares import covariance_and_noise, gauss_newton_step, jacobians
+from discover.inference.evidence import INDISTINGUISHABLE, WINDOW, criterion
 from discover.statistics.residual import judged_cost, summarise
 
 KNOTS = (6, 14)

@@ -16,7 +16,6 @@ from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE, criterion
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.effects.free_function import (
@@ -30,6 +29,7 @@ from discover.effects.free_function import (
 )
 from discover.forward import AugmentedModel, Batch, data_scales
 from discover.forward.least_squares import Fit, covariance_and_noise, fit_batch
+from discover.inference.evidence import INDISTINGUISHABLE, criterion
 from discover.statistics.residual import judged_cost, summarise
 
 _VALUES = 2 * (INTERVALS + 1)

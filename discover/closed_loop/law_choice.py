@@ -8,9 +8,10 @@ import numpy as np
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.search import Search
 from discover.closed_loop.search.first_starts import first_starts
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION, criterion
 from discover.dataset import Run
+from discover.effects import AbstractEffect, KnownEffect
 from discover.errors import InputError
 from discover.forward import (
     MODULUS,
@@ -22,6 +23,8 @@ from discover.forward import (
 )
 from discover.forward.least_squares import Fit, fit_batch
 from discover.forward.step_instants import with_own_instants
+from discover.inference.evidence import BARE_MENTION, criterion
+from discover.inference.problem import effect_of
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise
@@ -36,6 +39,7 @@ def choose_law(
     fitted: Sequence[Run],
     held_out: Sequence[Run],
     say: Callable[[str], None],
+    beside: Sequence[tuple[AbstractEffect, np.ndarray]] = (),
 ) -> tuple[DeclaredModel, tuple[LawFit, ...]]:
     """Return the declared model with the law that the fitted runs ask for, and all that were tried.
 
@@ -52,6 +56,9 @@ def choose_law(
         The runs.
     say
         Called with a line of text for each law.
+    beside
+        Effects that were found, with their values, from which they are fitted along with every law;
+        they are no part of the model that is returned.
 
     Raises
     ------
@@ -66,11 +73,17 @@ def choose_law(
             else f"No law is named to choose from; write some of {', '.join(LAWS)}."
         )
     batch, scales = make_batch(fitted), data_scales(fitted)
+    along = tuple(KnownEffect(effect, (None,) * len(values)) for effect, values in beside)
+    with_effects = replace(declared, effects=(*declared.effects, *along))
     found: dict[str, tuple[AugmentedModel, Fit]] = {}
     for name in _contained_first(names):
         say(f"law {len(found) + 1} of {len(names)}: {LAWS[name].title}")
-        model = AugmentedModel(with_law(declared, name), [], scales)
-        starts = first_starts(model, nothing_known=True) + _starts_at_contained(model, found)
+        model = AugmentedModel(with_law(with_effects, name), [], scales)
+        starts = first_starts(model, nothing_known=True)
+        for effect, values in beside:
+            for start in starts:
+                start[model.positions(effect.name)] = values
+        starts += _starts_at_contained(model, found)
         free = [model.free_positions] * len(starts)
         fits = fit_batch(model, batch, starts, free)
         usable = [fit for fit in fits if fit.usable]
@@ -105,6 +118,48 @@ def choose_law(
         lines.append(line)
     say(f"of {len(lines)} laws the runs ask for {lines[0].title}")
     return with_law(declared, lines[0].law, lines[0].parameters), tuple(lines)
+
+
+def law_beside_effects(
+    declared: DeclaredModel,
+    tried: Sequence[LawFit],
+    search: Search,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    say: Callable[[str], None],
+) -> tuple[DeclaredModel, tuple[LawFit, ...]] | None:
+    """Return the law that the runs ask for beside the effects that were found; None for the same.
+
+    The first law was chosen while these effects were missing, and may have stood for a part of
+    them: White–Metzner for a structure that flow breaks.
+
+    Parameters
+    ----------
+    declared, tried
+        As `choose_law` returned them.
+    search
+        The search that found the effects.
+    fitted, held_out, say
+        As in `choose_law`.
+    """
+    model = search.model
+    found = [
+        (effect_of(model, name), search.fit.theta[model.positions(name)]) for name in search.active
+    ]
+    say("the laws once more, beside the effects that were found")
+    names = [one.law for one in tried]
+    chosen, lines = choose_law(declared, names, fitted, held_out, say, found)
+    before = next(one for one in lines if one.law == declared.law_name)
+    if before.behind is not None and before.behind <= BARE_MENTION:
+        return None
+    return chosen, lines
+
+
+def is_likelier(search: Search, other: Search) -> bool:
+    """Return whether what one search found explains the runs better than what another did."""
+    effective = min(one.problem.independent_samples(one.fit) for one in (search, other))
+    own, theirs = (one.problem.worth(one.fit, one.active, effective) for one in (search, other))
+    return own < theirs - BARE_MENTION
 
 
 def _contained_first(names: Sequence[str]) -> list[str]:

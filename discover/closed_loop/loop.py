@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from discover.closed_loop.by_mode import constants_by_mode
 from discover.closed_loop.candidates import (
     admission,
     candidates_of,
@@ -14,6 +13,7 @@ from discover.closed_loop.candidates import (
 )
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
+    Carried,
     explain,
     next_tests,
     over_explanations,
@@ -46,7 +46,7 @@ from discover.closed_loop.judging.numerical_resolution import NumericalResolutio
 from discover.closed_loop.judging.silence import fluid_is_silent, records_are_silent
 from discover.closed_loop.judging.told_by_kinds import told_by_kinds
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.law_choice import choose_law
+from discover.closed_loop.law_choice import choose_law, is_likelier, law_beside_effects
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.free_curve import FreeForm
@@ -56,7 +56,6 @@ from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
-from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Dataset
 from discover.dataset.checking.start import doubts_of_start
@@ -66,6 +65,8 @@ from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_ba
 from discover.forward.least_squares import intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import instants_found, with_own_instants, with_places
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.evidence import WINDOW
 from discover.statistics.residual import Expectation, summarise
 
 
@@ -148,40 +149,50 @@ def run_loop(
     require_present(declared, {*known, *(effect.name for effect in candidates)})
     candidates = [effect for effect in candidates if effect.name not in known]
     require_possible(declared, [*fitted_runs, *held_runs])
+    silent = records_are_silent(fitted_runs)
     tried_laws: tuple[LawFit, ...] = ()
-    if laws and not records_are_silent(fitted_runs):
+    if laws and not silent:
         declared, tried_laws = choose_law(declared, laws, fitted_runs, held_runs, say)
-    # of one mode nothing can differ from another's
-    asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
-    model = AugmentedModel(declared, asked, data_scales(fitted_runs))
     batch = make_batch(fitted_runs)
     held_batch = make_batch(held_runs) if held_runs else None
 
-    tolerated = ToleratedMisfit(
-        Expectation(noise, declared.linear_error), NumericalResolution(model, batch, fitted_runs)
-    )
-    search = Search(
-        model,
-        batch,
-        held_batch,
-        len(candidates),
-        admission(fitted_runs, held_runs),
-        tolerated,
-        SearchCheckpoint(store, name),
-    )
-    silent = records_are_silent(fitted_runs)
-    if silent:
-        say("the records are noise about a constant: there is nothing to search in")
-        search.start()
-    elif search.resume():
-        say(f"going on from what was kept: {', '.join(search.active)}")
-    else:
-        say(f"declared model on {len(fitted_runs)} runs")
-        search.start()
-        find_instrument_effects(search, fitted_runs, max_effects, say)
-    carried = []
-    if not silent:
-        carried = search_and_carry(search, max_effects, explanations, say)
+    def searched(declared: DeclaredModel, name: str) -> tuple[Search, list[Carried]]:
+        # of one mode nothing can differ from another's
+        asked = [*candidates, BY_MODE] if len(declared.modulus) > 1 else candidates
+        model = AugmentedModel(declared, asked, data_scales(fitted_runs))
+        tolerated = ToleratedMisfit(
+            Expectation(noise, declared.linear_error),
+            NumericalResolution(model, batch, fitted_runs),
+        )
+        search = Search(
+            model,
+            batch,
+            held_batch,
+            len(candidates),
+            admission(fitted_runs, held_runs),
+            tolerated,
+            SearchCheckpoint(store, name),
+        )
+        if silent:
+            say("the records are noise about a constant: there is nothing to search in")
+            search.start()
+            return search, []
+        if search.resume():
+            say(f"going on from what was kept: {', '.join(search.active)}")
+        else:
+            say(f"declared model on {len(fitted_runs)} runs")
+            search.start()
+            find_instrument_effects(search, fitted_runs, max_effects, say)
+        return search, search_and_carry(search, max_effects, explanations, say)
+
+    search, carried = searched(declared, name)
+    if tried_laws and search.active:
+        runs = fitted_runs, held_runs
+        if (other := law_beside_effects(declared, tried_laws, search, *runs, say)) is not None:
+            again, carried_again = searched(other[0], f"{name}_{other[0].law_name}")
+            if is_likelier(again, search):
+                (declared, tried_laws), search, carried = other, again, carried_again
+    model, tolerated = search.model, search.tolerated
     active, thetas = search.active, search.path
     search.fit = current = on_finer_steps(model, batch, fitted_runs, search.fit, active)
     if held_batch is not None:

@@ -9,6 +9,7 @@ import pandas as pd
 
 from discover.comparison.equations import outcome_equation
 from discover.comparison.fitting.classical import ClassicalFit
+from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.next_measurement import NextMeasurement
@@ -93,6 +94,9 @@ class Comparison(PageView, NotebookView):
         Whether any law explains the training runs.
     conditions
         Material and temperature, where runs.csv names them.
+    by_mode
+        The best law whose constants differ from mode to mode; None where none was asked for, or
+        one constant for all modes does as well.
     known_of
         The same for a learner, with the constants that were fitted along with it.
     known_effects
@@ -129,6 +133,7 @@ class Comparison(PageView, NotebookView):
     known_effects: Sequence[KnownEffect] = ()
     stood_for: tuple[str, ...] = ()
     conditions: str = ""
+    by_mode: LawByMode | None = None
 
     _page = "discover.report.in_memory:comparison_page"
 
@@ -333,6 +338,7 @@ class Comparison(PageView, NotebookView):
             ],
             "stood_for_by_constants": list(self.stood_for),
             "classical": {fit.law: fit.to_json() for fit in self.classical},
+            "by_mode": None if self.by_mode is None else self.by_mode.to_json(),
             "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,

@@ -3,8 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
 from discover.comparison.fitting.further_laws import fit_further_laws
+from discover.comparison.fitting.law_by_mode import LawByMode, SparseLaw, fit_law_by_mode
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.declared_constants import (
@@ -25,6 +28,7 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
+from discover.comparison.judging.modes_apart import open_where_modes_differ
 from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
@@ -60,6 +64,9 @@ class Judgement:
         The classical laws fitted to the same runs.
     warnings
         Where predictions of laws that fit disagree.
+    by_mode
+        The best law whose constants differ from mode to mode; None where none was asked for, or
+        one constant for all modes does as well.
     """
 
     explanation: Explanation
@@ -70,6 +77,7 @@ class Judgement:
     next_measurement: NextMeasurement
     classical: Sequence[ClassicalFit]
     warnings: tuple[str, ...]
+    by_mode: LawByMode | None = None
 
 
 def judge(
@@ -143,6 +151,12 @@ def judge(
         # the criterion of the sparse law counts these, and both stand in one column
         independent = None if chosen is None else chosen.details.get("n_independent")
         classical = _classical(study, known, independent)
+    by_mode = None
+    # of normal stresses that were fitted too a law by mode says nothing
+    if not (chosen is None or silent_records or normal or study.compare.quick):
+        say("constants that differ from mode to mode")
+        by_mode = _by_mode(chosen, frame, explanation, expectation, len(library))
+        statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
     apart = [*refuted, *disagreements(outcomes, judged, bands)]
@@ -157,7 +171,37 @@ def judge(
         replace(following, bands=claimed(bands, statements, flows)),
         classical,
         () if silent_records else (*_of_modes(outcomes, explanation, expectation), *apart),
+        by_mode,
     )
+
+
+def _by_mode(
+    chosen: LearnerOutcome,
+    frame: Frame,
+    explanation: Explanation,
+    expectation: Expectation,
+    n_candidates: int,
+) -> LawByMode | None:
+    """Return the best law with constants by mode, where one for all modes is in doubt.
+
+    It is where the law found explains nothing, or needs several terms: what differs from mode to
+    mode looks like a little of many terms.
+    """
+    doubtful = not explanation.in_library or len(chosen.terms) > 1
+    model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
+    predicted = [chosen.predictions[flow.key] for flow in training]
+    if not doubtful or len(model.modulus) < 2 or not model.law.linear_relaxation:
+        return None
+    if any(one is None for one in predicted):
+        return None
+    sparse = SparseLaw(
+        [term.term for term in chosen.terms],
+        sum(1 + len(term.inner) for term in chosen.terms),
+        [np.asarray(one["sigma12"]) for one in predicted if one is not None],
+    )
+    runs = frame.data.fit.runs, frame.data.held_out.runs
+    path = chosen.details.get("path", ())
+    return fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates)
 
 
 def _of_modes(

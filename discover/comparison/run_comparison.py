@@ -150,6 +150,7 @@ def compare(
         explanation=found.explanation,
         classical=found.classical,
         warnings=found.warnings,
+        by_mode=found.by_mode,
     )
 
 

@@ -103,7 +103,8 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     model = study.model
     effects = known_effects(model.effects, "[model] effects")
     if model.from_ is not None:
-        return _from_earlier(read_earlier(model.from_, study.path), effects)
+        earlier = read_earlier(model.from_, study.path)
+        return _from_earlier(earlier, effects, _spectrum_of(earlier, dataset, model.sweep_rad_s))
     name = model.law if isinstance(model.law, str) and model.law in LAWS else "ucm"
     free = [key for key, value in model.parameters.items() if value == "fit"]
     parameters = {
@@ -180,7 +181,9 @@ FOUND_LAW = "a law found before"
 """Name of a law that was taken from a result."""
 
 
-def _from_earlier(found: EarlierResult, own: Sequence[KnownEffect]) -> DeclaredModel:
+def _from_earlier(
+    found: EarlierResult, own: Sequence[KnownEffect], spectrum: RelaxationSpectrum | None
+) -> DeclaredModel:
     """Return what a result found as declared; effects of the study stand in place of its own."""
     equation = found.equation
     names = {known.name for known in own}
@@ -197,11 +200,36 @@ def _from_earlier(found: EarlierResult, own: Sequence[KnownEffect]) -> DeclaredM
         np.array(equation.modulus),
         np.array(equation.relaxation_time),
         (),
-        None,
+        spectrum,
         equation.solvent_viscosity,
         (*kept, *own),
         found.text,
     )
+
+
+_SAME_MODES = 1e-6
+"""Relative difference of relaxation times that were written to a file and read again."""
+
+
+def _spectrum_of(
+    found: EarlierResult, dataset: Dataset, window: tuple[float, float] | None
+) -> RelaxationSpectrum | None:
+    """Return the spectrum that the modes of a result come from; None if they are not the sweep's.
+
+    A result holds modes without their errors, which intervals and verdicts have to allow for. One
+    factor on all times, or on all moduli, may have been fitted.
+    """
+    times = np.array(found.equation.relaxation_time)
+    if dataset.linear_sweep is None:
+        return None
+    try:
+        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window))
+    except InputError:
+        return None  # a sweep too short for modes, which were given as numbers then
+    if spectrum.relaxation_time.shape != times.shape:
+        return None
+    factor = times / spectrum.relaxation_time
+    return spectrum if np.ptp(factor) <= _SAME_MODES * np.max(factor) else None
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:

@@ -149,13 +149,15 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     left = content.get("lack_of_fit")
     of_sparse = left.get(_SPARSE) if isinstance(left, dict) else None
     verdict = of_sparse.get("verdict") if isinstance(of_sparse, dict) else None
-    if verdict != "explained" and not sparse.get("terms"):
+    equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
+    effects = _effects(sparse.get("effects", ()), file)
+    # without a term the known part is the law, and may be more than Maxwell's
+    bare = not (sparse.get("terms") or equation.terms or equation.named or effects)
+    if verdict != "explained" and bare:
         raise InputError(
             f"[model] from: sparse regression found no term in {file} and its law does not explain "
             "the data, so there is nothing to take. Declare the law with law and its constants."
         )
-    equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
-    effects = _effects(sparse.get("effects", ()), file)
     text = _text(file, "the law of sparse regression", equation, effects)
     doubt = "" if verdict == "explained" else " It did not explain the data that it was found in."
     return EarlierResult(file, equation, effects, text + doubt)

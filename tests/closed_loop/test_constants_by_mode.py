@@ -13,14 +13,14 @@ from independent.homogeneous import GiesekusFluid
 
 import discover as dc
 from discover.closed_loop import DeclaredModel, run_loop
-from discover.closed_loop.by_mode import _at_upper_end, _Constant
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
+from discover.inference.by_mode import _at_upper_end, _Constant
 from discover.protocols import in_flow, start_up
-from discover.report.plots.loop.by_mode import by_mode_picture
+from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
@@ -227,10 +227,10 @@ def test_an_interrupted_loop_keeps_the_degrees():
 
 @pytest.mark.slow
 def test_the_picture_says_what_is_determined_and_what_is_not():
-    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)))
+    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).by_mode, False)
     assert drawn is not None
     assert "Not determined by these data in the modes of 0.05 s" in drawn.caption
-    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=())) is None
+    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=()).by_mode, False) is None
 
 
 def test_a_law_by_mode_is_written_out_with_the_constants_of_each():

@@ -8,12 +8,12 @@ from discover.closed_loop import DeclaredModel
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.search.scoring.attribution import attribute
 from discover.closed_loop.search.scoring.left_out import FEWEST_FOLDS, left_out_errors
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.effects.base import EffectParameter, SignalEffect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import fit_batch
+from discover.inference.problem import FitProblem
 from discover.laws import Fluid, Giesekus
 from discover.protocols import oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate

@@ -11,14 +11,9 @@ from standing_alone import stands_alone
 from discover.closed_loop import CandidateScore
 from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
-from discover.closed_loop.results.stages import (
-    ConstantByMode,
-    Fold,
-    ModeConstant,
-    Stage,
-    StageParameter,
-)
+from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
+from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.report.loop.report import write_loop
 from discover.report.loop.tables import noise_range
 from discover.report.loop.verdict import loop_verdict

@@ -1,11 +1,13 @@
 """[model] from: what an earlier result found becomes what is declared, or one clear error."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from discover.dataset import Dataset, Run
+from discover.dataset import Dataset, LinearSweep, Run
+from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.errors import InputError
 from discover.protocols import start_up
 from discover.study import fingerprint, read_study
@@ -118,6 +120,17 @@ def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
     assert "did not explain" in declared(write(tmp_path, "loop.json", doubtful)).source
 
 
+def test_of_a_comparison_that_found_no_term_the_known_part_is_taken(tmp_path):
+    """Of the law and the instrument of a loop, beside which it found nothing."""
+    sparse = {"law": LAW, "terms": [], "effects": [GAIN]}
+    found = declared(
+        write(tmp_path, "comparison.json", {**_NO_TERM, "learners": {"tensor_sindy": sparse}})
+    )
+    assert [(t.term, t.coefficient) for t in found.law.as_terms()] == [("sigma.sigma", 0.3)]
+    assert [known.name for known in found.effects] == ["stress_gain"]
+    assert "did not explain" in found.source
+
+
 def test_the_fingerprint_changes_with_what_is_taken(tmp_path):
     file = write(tmp_path, "loop.json", LOOP)
     before = fingerprint(read_study(file))
@@ -130,7 +143,7 @@ _NOTHING = {**LOOP, "verdict": "unexplained", "stages": []}
 _NO_TERM = {
     **COMPARISON,
     "lack_of_fit": {"tensor_sindy": {"verdict": "unexplained"}},
-    "learners": {"tensor_sindy": {"law": LAW, "terms": []}},
+    "learners": {"tensor_sindy": {"law": {**LAW, "terms": []}, "terms": []}},
 }
 
 
@@ -178,3 +191,33 @@ def test_a_law_beside_from_is_refused(tmp_path):
     file = write(tmp_path, "loop.json", LOOP, 'from = "earlier"\nlaw = "giesekus"')
     with pytest.raises(InputError, match="law is given too"):
         read_study(file)
+
+
+def sweep_of(moduli, times):
+    """A sweep of these modes with an error of a tenth of a per cent that no modes have."""
+    omega = np.geomspace(0.01, 100.0, 30)
+    x = np.multiply.outer(omega, times)
+    wrong = 1.0 + 1e-3 * np.sin(7.0 * np.arange(30))
+    storage = wrong * ((x**2 / (1 + x**2)) @ np.array(moduli))
+    return LinearSweep(omega, storage, (x / (1 + x**2)) @ np.array(moduli))
+
+
+def test_modes_of_the_sweep_keep_its_error(tmp_path):
+    """A result holds modes alone, and intervals that ignore their errors would be too narrow."""
+    sweep = sweep_of([90.0, 40.0], [1.0, 0.1])
+    spectrum = relaxation_spectrum(sweep)
+    rows = [
+        {"modulus_Pa": 0.9 * g, "relaxation_time_s": t}
+        for g, t in zip(spectrum.modulus, spectrum.relaxation_time, strict=True)
+    ]
+    loop = {**LOOP, "declared": {"law": {**LAW, "modes": rows}, "effects": []}}
+    file = write(tmp_path, "loop.json", loop)
+    found = declared_model(read_study(file), replace(DATA, linear_sweep=sweep))
+    assert forward_model(found).linear_error == spectrum.relative_error > 0.0
+    assert found.modulus_covariance == pytest.approx(0.81 * spectrum.modulus_covariance)
+
+
+def test_control_other_modes_have_no_error_of_the_sweep(tmp_path):
+    data = replace(DATA, linear_sweep=sweep_of([90.0, 40.0], [1.0, 0.1]))
+    found = declared_model(read_study(write(tmp_path, "loop.json", LOOP)), data)
+    assert found.spectrum is None

@@ -1,12 +1,13 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
-from discover.closed_loop.explanations.beam import BEAM_WIDTH, search_and_carry
+from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
 
 __all__ = [
     "BEAM_WIDTH",
+    "Carried",
     "explain",
     "next_tests",
     "over_explanations",

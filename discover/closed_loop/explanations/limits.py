@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
+from discover.inference.problem import FitProblem
 
 DAMPING = "strain_damping"
 """Among the aliases of an effect, that a damping function of the strain does as well."""

@@ -16,8 +16,8 @@ import numpy as np
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.forward.least_squares import Fit
+from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.words import percent_of
 
 FACTOR = "relaxation_time_factor"

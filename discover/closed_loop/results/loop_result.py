@@ -21,11 +21,9 @@ from discover.closed_loop.results.next_test import NextTests
 from discover.closed_loop.results.reading import Reading, read_residual
 from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.results.stages import (
-    ConstantByMode,
     DeclaredEffect,
     Fold,
     Stage,
-    StageParameter,
     Verdict,
 )
 from discover.equations import (
@@ -41,6 +39,7 @@ from discover.equations import (
 from discover.equations.box import box_of, flow_numbers
 from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
+from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of

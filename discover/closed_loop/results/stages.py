@@ -1,78 +1,12 @@
 """What a closed loop added or found declared, stage by stage, and without each run."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from discover.closed_loop.results.error_pair import ErrorPair
+from discover.inference.constants import ConstantByMode, StageParameter
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
-
-
-@dataclass(frozen=True)
-class StageParameter:
-    """A parameter of an effect as finally fitted.
-
-    Attributes
-    ----------
-    value
-        That of the effects that were found.
-    ci95
-        95 % interval over all explanations that have the parameter.
-    unit
-        Of both.
-    ci95_given_effects
-        95 % interval if these effects are the right ones; None where only this one is known.
-    """
-
-    value: float
-    ci95: tuple[float, float]
-    unit: str
-    ci95_given_effects: tuple[float, float] | None = field(default=None, kw_only=True)
-
-
-@dataclass(frozen=True)
-class ModeConstant:
-    """The constant of one mode.
-
-    Attributes
-    ----------
-    relaxation_time_s
-        Of the mode.
-    value, ci95
-        The constant with its 95 % interval, given that it is a smooth function of the time (see
-        `discover.closed_loop.by_mode`); without one where it is left open.
-    left_open
-        Whether these data leave it open: the interval leaves hardly a value out, the runs are as
-        well described whatever this mode's constant, or it stands at the upper end of its range.
-        What stands here then comes from the other modes and the smooth function alone.
-    """
-
-    relaxation_time_s: float
-    value: float
-    ci95: tuple[float, float] | None
-    left_open: bool
-
-
-@dataclass(frozen=True)
-class ConstantByMode(StageParameter):
-    """A constant by mode; `value` and `ci95` are those at the mean time.
-
-    Attributes
-    ----------
-    mean_time_s
-        Mean relaxation time by viscosity.
-    degree
-        Of the polynomial in log λ; 0 for one constant of all modes.
-    evidence
-        For each degree over one constant.
-    modes
-        In the order of the declared modes.
-    """
-
-    mean_time_s: float
-    degree: int
-    evidence: tuple[float, ...]
-    modes: tuple[ModeConstant, ...]
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.degrees import Degree
 from discover.closed_loop.search.seen_sets import SeenSets
 from discover.closed_loop.search.state import SearchState
 from discover.forward.least_squares import Fit
+from discover.inference.degrees import Degree
 
 
 @runtime_checkable

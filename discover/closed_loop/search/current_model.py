@@ -7,19 +7,19 @@ import numpy as np
 
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.search.checkpoint import SearchCheckpoint
-from discover.closed_loop.search.degrees import choose_degrees, positions_of
 from discover.closed_loop.search.first_starts import first_starts
 from discover.closed_loop.search.scoring.attribution import Attribution, attribute
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION
 from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.physical_range import at_an_end
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.closed_loop.search.scoring.refitting import Choice, refit
 from discover.closed_loop.search.state import SearchState
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior
+from discover.inference.degrees import choose_degrees, positions_of
+from discover.inference.evidence import BARE_MENTION
+from discover.inference.problem import FitProblem
 
 _POLISHES = 5
 

@@ -17,12 +17,12 @@ from discover.closed_loop.search.moves.taking_out import (
     refuse,
     restore_left_open,
 )
-from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
 from discover.closed_loop.search.scoring.refitting import Choice, choose, prune
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import make_batch
 from discover.forward.least_squares import intervals
+from discover.inference.evidence import INDISTINGUISHABLE
 from discover.statistics.residual import STRUCTURE
 
 _ROUNDS = 3

@@ -3,10 +3,10 @@
 import numpy as np
 
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.search.degrees import Degree
 from discover.closed_loop.search.seen_sets import SeenSets
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
+from discover.inference.degrees import Degree
 
 
 class SearchState:

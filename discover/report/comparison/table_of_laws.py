@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.outcomes.constant import in_words as constant_in_words
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
-from discover.report.wording import readable, significant
+from discover.report.plots.by_mode import by_mode_in_brief
+from discover.report.wording import effects_title, readable, significant
 
 
 def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
@@ -41,6 +43,8 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
                 **_mean_errors(fit.errors, placed),
             }
         )
+    if comparison.by_mode is not None:
+        rows.append(_row_by_mode(comparison.by_mode, placed))
     for name, outcome in comparison.outcomes.items():
         errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
         path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
@@ -66,6 +70,20 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
         if row["criterion"] is not None:
             row["criterion"] -= least
     return rows
+
+
+def _row_by_mode(law: LawByMode, placed: Mapping[str, bool]) -> dict[str, Any]:
+    errors = {name: {"recorded": law.errors.get(name)} for name in placed}
+    return {
+        "law": f"constants by mode: {effects_title([*law.constants])}",
+        "constants": "; ".join(
+            by_mode_in_brief(name, constant) for name, constant in law.constants.items()
+        ),
+        "number": law.n_constants,
+        "misfit": law.left.misfit,
+        "criterion": None,  # it counts the samples that this law leaves independent
+        **_mean_errors(errors, placed),
+    }
 
 
 def _number_of_constants(outcome: LearnerOutcome) -> int | None:

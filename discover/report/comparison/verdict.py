@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
@@ -15,6 +16,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates
 from discover.identify.exact.relations import spell_briefly
 from discover.protocols.kinematics import in_words as quantities_in_words
+from discover.report.plots.by_mode import by_mode_in_brief
 from discover.report.wording import (
     SYMBOLS,
     estimate,
@@ -75,6 +77,8 @@ def _found(comparison: Comparison) -> str:
             if n > 1
             else "sparse regression's term describes the data and is no finding"
         )
+    if comparison.by_mode is not None and comparison.by_mode.rivals_sparse:
+        parts.append(_by_mode(comparison.by_mode))
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         parts.append(
@@ -84,6 +88,23 @@ def _found(comparison: Comparison) -> str:
     elif network is not None and "tbnn_ude" in explanation.by:
         parts.append("projected onto the library, the neural network has no term")
     return sentence([*parts, *_where_usable(comparison)])
+
+
+def _by_mode(law: LawByMode) -> str:
+    """Return what constants that differ from mode to mode make of the data."""
+    constants = ", ".join(by_mode_in_brief(name, one) for name, one in law.constants.items())
+    left = f"{percent(law.left.misfit)}, which {'is noise' if law.explains else 'is not noise'}"
+    missed = [error for error in law.errors.values() if error is not None]
+    if len(missed) < len(law.errors):
+        unseen = ", and runs away in a run held out"
+    else:
+        unseen = (
+            f", and misses runs held out by {percent(float(np.mean(missed)))}" if missed else ""
+        )
+    return (
+        f"a law whose constants differ from mode to mode ({constants}; {law.n_constants} "
+        f"constants) leaves {left}{unseen}"
+    )
 
 
 def _rests(explanation: Explanation) -> str:
@@ -311,8 +332,14 @@ def _determined(comparison: Comparison) -> list[str]:
     names = _open(comparison)
     parts += _room(comparison)
     if "tensor_sindy" in comparison.outcomes and not comparison.explanation.in_library:
+        by_mode = comparison.by_mode
+        which = (
+            "with the same constants in every mode"
+            if by_mode is not None and by_mode.explains
+            else "that was tried"
+        )
         parts.append(
-            f"since no law that was tried explains the data, nothing is determined by them, "
+            f"since no law {which} explains the data, nothing is determined by them, "
             f"neither {names.replace(' and ', ' nor ')} nor any coefficient"
         )
         return parts
@@ -337,6 +364,12 @@ def _next(comparison: Comparison) -> str:
         )
     if _coarse(comparison) is not None:
         return MORE_SAMPLES
+    if comparison.by_mode is not None and comparison.by_mode.explains:
+        names = ", ".join(f'"{name}"' for name in comparison.by_mode.constants)
+        return (
+            "Have discover close-loop fit these constants too: [model] by_mode = "
+            f"[{names}] gives their intervals, what else the runs show, and an export."
+        )
     lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
     if lacking or explanation.verdict == "unexplained":
         return (

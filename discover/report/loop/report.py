@@ -10,7 +10,7 @@ from discover.report.loop import tables
 from discover.report.loop.verdict import loop_verdict
 from discover.report.overlay import Overlay
 from discover.report.page import made_by, render, safe_name
-from discover.report.plots.loop.by_mode import by_mode_picture
+from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop.errors import ranking_picture, run_error_picture, waterfall_picture
 from discover.report.plots.loop.free_form import free_form_picture
 from discover.report.plots.loop.lissajous import lissajous_picture
@@ -69,7 +69,7 @@ def write_loop(
         reading_picture(result),
         run_error_picture(result),
         ranking_picture(result),
-        by_mode_picture(result),
+        by_mode_picture(result.by_mode, result.verdict == "unexplained"),
         next_test_picture(result),
     ]
     drawn = [p for p in pictures if p is not None]

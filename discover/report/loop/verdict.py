@@ -6,8 +6,9 @@ import numpy as np
 
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.results.stages import ConstantByMode, Stage, StageParameter
+from discover.closed_loop.results.stages import Stage
 from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates, of_json
+from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (

@@ -5,11 +5,11 @@ import numpy as np
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.current_model import LEADERS, CurrentModel
 from discover.closed_loop.search.scoring.attribution import attribute
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION
 from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.scoring.refitting import Choice, aliases_of, refit, simplest
 from discover.effects import AbstractEffect
+from discover.inference.evidence import BARE_MENTION
 
 _COMPARED = 16
 

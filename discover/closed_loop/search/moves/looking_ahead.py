@@ -4,9 +4,9 @@ import numpy as np
 
 from discover.closed_loop.search.current_model import CurrentModel
 from discover.closed_loop.search.moves.exchanging import exchange
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION
 from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.refitting import IMPROVEMENT, prune
+from discover.inference.evidence import BARE_MENTION
 
 
 def look_ahead(search: CurrentModel, max_effects: int) -> str | None:

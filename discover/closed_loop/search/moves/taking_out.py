@@ -5,12 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from discover.closed_loop.search.current_model import CurrentModel
-from discover.closed_loop.search.scoring.evidence import WINDOW
 from discover.closed_loop.search.scoring.mode_dependence import names_not_needed
 from discover.closed_loop.search.scoring.physical_range import at_an_end, undetermined
 from discover.closed_loop.search.scoring.refitting import drop_undecided
 from discover.closed_loop.search.seen_sets import SeenSet
 from discover.forward.least_squares import intervals
+from discover.inference.evidence import WINDOW
 
 
 def drop_what_modes_explain(search: CurrentModel, say: Callable[[str], None]) -> None:

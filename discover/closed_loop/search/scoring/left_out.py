@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward.least_squares import Fit, gauss_newton_step
+from discover.inference.problem import FitProblem
 
 _MISSED = 10.0
 _WORSE = 2.0

@@ -8,10 +8,10 @@ name that is not needed once it is allowed is no finding.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from discover.closed_loop.search.scoring.evidence import INDISTINGUISHABLE
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import ModeDependence
 from discover.forward.least_squares import Fit
+from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.problem import FitProblem
 
 _STARTS = (-0.5, 0.5)
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.closed_loop.search.scoring.problem import effect_of
 from discover.effects import EffectParameter
 from discover.forward import AugmentedModel
+from discover.inference.problem import effect_of
 
 _TOLERANCE = 1e-3
 """Relative distance from an end at which a fit has stopped there: what a fit leaves of its last

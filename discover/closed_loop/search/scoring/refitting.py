@@ -11,17 +11,17 @@ from discover.closed_loop.search.scoring.attribution import (
     CandidateScore,
     with_other_inner,
 )
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.closed_loop.search.scoring.left_out import (
     FEWEST_FOLDS,
     left_out_parts,
     part_errors,
     run_errors,
 )
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit, intervals
+from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.inference.problem import FitProblem
 
 IMPROVEMENT = 0.98
 """An effect must lower the error of the runs left out at least to this fraction."""

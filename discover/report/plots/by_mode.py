@@ -1,8 +1,10 @@
 """Constants that may differ from mode to mode, against the relaxation time."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from discover.closed_loop import ConstantByMode, LoopResult
+from discover.inference.constants import ConstantByMode
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,
@@ -19,9 +21,18 @@ from discover.report.wording import effect_title, readable, significant
 _DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
 
 
-def by_mode_picture(result: LoopResult) -> Picture | None:
-    """Return each constant by mode with its band; None where there is none."""
-    constants = result.by_mode
+def by_mode_picture(
+    constants: Mapping[str, ConstantByMode], is_unexplained: bool
+) -> Picture | None:
+    """Return each constant by mode with its band; None where there is none.
+
+    Parameters
+    ----------
+    constants
+        By name of the parameter, the effect or the term.
+    is_unexplained
+        Whether a law with these constants leaves more than noise.
+    """
     if not constants:
         return None
     with figure(1, len(constants), width=min(9.0, 5.0 * len(constants)), height=3.0) as (
@@ -47,7 +58,7 @@ def by_mode_picture(result: LoopResult) -> Picture | None:
         legend_above(drawing, axes)
         said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
         doubt = ""
-        if result.verdict == "unexplained":
+        if is_unexplained:
             doubt = (
                 " The data are not explained, so these are the values that come nearest, and no "
                 "constants of the fluid."
@@ -59,6 +70,24 @@ def by_mode_picture(result: LoopResult) -> Picture | None:
             "smooth function of the relaxation time; they hold one degree more than was chosen, "
             "where one was tried.",
         )
+
+
+def by_mode_in_brief(name: str, constant: ConstantByMode) -> str:
+    """Return the range over which a constant is known to go, in few words."""
+    symbol = readable(effect_title(name))
+    if not constant.degree:
+        return f"{symbol} {significant(constant.value, 2)} in all modes"
+    known = sorted(
+        (mode for mode in constant.modes if not mode.left_open),
+        key=lambda mode: mode.relaxation_time_s,
+    )
+    if not known:
+        return f"{symbol} open in every mode"
+    first, last = (
+        f"{significant(mode.value, 2)} at {significant(mode.relaxation_time_s, 2)} s"
+        for mode in (known[0], known[-1])
+    )
+    return f"{symbol} {first}" if len(known) == 1 else f"{symbol} from {first} to {last}"
 
 
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.closed_loop.search.scoring.evidence import BARE_MENTION
-from discover.closed_loop.search.scoring.problem import FitProblem
 from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import Fit
+from discover.inference.evidence import BARE_MENTION
+from discover.inference.problem import FitProblem
 
 _STEPS = (0.0, -1.0, 1.0)
 """From where a new coefficient starts, as a change of the constant by itself for each power of a
@@ -28,7 +28,7 @@ class Degree:
     degree
         0 for one constant of all modes.
     evidence
-        For each degree over one constant, see `discover.closed_loop.search.scoring.evidence`.
+        For each degree over one constant, see `discover.inference.evidence`.
     """
 
     degree: int = 0

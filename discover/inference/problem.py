@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.search.scoring.evidence import criterion, evidence
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
+from discover.inference.evidence import criterion, evidence
 from discover.statistics.residual import judged_cost, summarise
 
 

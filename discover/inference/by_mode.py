@@ -7,11 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.results.stages import ConstantByMode, ModeConstant
-from discover.closed_loop.search.degrees import Degree
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians, uncertainty
+from discover.inference.constants import ConstantByMode, ModeConstant
+from discover.inference.degrees import Degree
 
 _OPEN = float(np.log(0.95 / 0.05))
 """Half width of an interval, on the link's scale, from which on nothing is determined: about the

@@ -1,0 +1,241 @@
+"""A law whose constants differ from mode to mode, beside the one law for all modes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from discover.dataset import Run
+from discover.effects import ConstitutiveEffect, make_effect
+from discover.forward import AugmentedModel, Batch, data_scales, make_batch
+from discover.forward import DeclaredModel as ForwardDeclared
+from discover.forward.least_squares import Fit, intervals
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.constants import ConstantByMode
+from discover.inference.degrees import Degree, choose_degrees
+from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.problem import FitProblem
+from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics.residual import Expectation
+from discover.study.declared_model import DeclaredModel
+
+_WITH_A_NAME = {"sigma.sigma": "giesekus_mobility", "tr(sigma)*sigma": "ptt_linear"}
+"""Terms that a named effect adds, whose range is the one that its law has."""
+
+_NAMED = ("giesekus_mobility", "ptt_linear", "ptt_exponential")
+"""What a rheologist lets differ from mode to mode: the constants of the classical laws in which
+modes of a spectrum are independent."""
+
+_OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
+"""Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
+
+_MOST_TERMS = 3
+
+
+@dataclass(frozen=True)
+class SparseLaw:
+    """The law of sparse regression, as the one law for all modes to compare with.
+
+    Attributes
+    ----------
+    terms
+        Its terms.
+    n_constants
+        Coefficients and inner constants.
+    predicted
+        What it predicts of each fitted run.
+    """
+
+    terms: Sequence[str]
+    n_constants: int
+    predicted: Sequence[np.ndarray]
+
+
+@dataclass(frozen=True)
+class LawByMode:
+    """A law whose constants are smooth functions of the relaxation time.
+
+    Attributes
+    ----------
+    constants
+        By name of the effect, or by spelling of the term.
+    left
+        What it leaves of the fitted runs.
+    gain
+        By how much the information criterion is below that of the law of sparse regression; both
+        pay for the choice of their terms.
+    errors
+        Relative errors of σ12 in runs that no fit saw, by name; None where it runs away.
+    """
+
+    constants: Mapping[str, ConstantByMode]
+    left: LackOfFit
+    gain: float
+    errors: Mapping[str, float | None]
+
+    @property
+    def explains(self) -> bool:
+        """Whether what it leaves is noise."""
+        return self.left.verdict == "explained"
+
+    @property
+    def rivals_sparse(self) -> bool:
+        """Whether it is worth about as much as the law of sparse regression, or more."""
+        return self.gain > -INDISTINGUISHABLE
+
+    @property
+    def n_constants(self) -> int:
+        """Number of constants fitted."""
+        return sum(1 + one.degree for one in self.constants.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the law as ``comparison.json`` holds it."""
+        return {
+            "constants": {name: asdict(one) for name, one in self.constants.items()},
+            "misfit": self.left.misfit,
+            "verdict": self.left.verdict,
+            "reason": self.left.reason,
+            "criterion_below_sparse": self.gain,
+            "errors": dict(self.errors),
+        }
+
+
+def fit_law_by_mode(
+    model: DeclaredModel,
+    path: Sequence[Mapping[str, Any]],
+    sparse: SparseLaw,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    expectation: Expectation,
+    n_candidates: int,
+) -> LawByMode | None:
+    """Return the best law with constants by mode; None where none differs from mode to mode.
+
+    The terms are those of the path of sparse regression up to three, and those of Giesekus and of
+    both laws of Phan-Thien and Tanner. Each constant has the degree in log λ that evidence asks
+    for, so that one constant for all modes stays where nothing speaks against it.
+
+    Parameters
+    ----------
+    model
+        The known part: two modes or more.
+    path
+        Rows of the path of sparse regression: ``support``, ``coefficients``, ``inner``.
+    sparse
+        The law that it chose, to compare with.
+    fitted, held_out
+        Runs without what a known instrument did.
+    expectation
+        What a complete law may leave.
+    n_candidates
+        Number of terms in the library, the choice among which every term pays for.
+    """
+    sets = _candidate_sets(path)
+    effects = {name: make_effect(name) for of_set in sets for name in of_set}
+    declared = ForwardDeclared(
+        model.law,
+        model.modulus,
+        model.relaxation_time,
+        model.solvent_viscosity,
+        law_name=model.law_name,
+        parameters=tuple(model.parameters.items()),
+        by_mode=tuple(effects),
+    )
+    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
+    problem = FitProblem(forward, make_batch(fitted), n_candidates)
+    found = [_fitted(problem, of_set) for of_set in sets]
+    usable = [(fit, degrees) for fit, degrees in found if fit.usable]
+    if not usable:
+        return None
+    effective = problem.independent_samples(min((fit for fit, _ in usable), key=problem.cost))
+    fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
+    if not any(one.degree for one in degrees.values()):
+        return None
+    constants = constants_by_mode(
+        forward, problem.batch, fit, intervals(forward, problem.batch, fit), degrees
+    )
+    return LawByMode(
+        constants,
+        _what_is_left(forward, fit, problem.batch, fitted, expectation),
+        _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
+        _errors(forward, fit, held_out),
+    )
+
+
+def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
+    """Return the sets of effects to try: the named ones alone, and those of the path."""
+    sets: list[tuple[str, ...]] = [(name,) for name in _NAMED]
+    for row in path:
+        terms = row["support"]
+        if not 0 < len(terms) <= _MOST_TERMS or set(terms) & {*_OF_THE_SPECTRUM} or row["inner"]:
+            continue
+        names = tuple(map(_effect_of, terms, row["coefficients"]))
+        effects = [make_effect(name) for name in names]
+        if all(isinstance(e, ConstitutiveEffect) and e.adds_term for e in effects):
+            sets.append(names)
+    return list(dict.fromkeys(sets))
+
+
+def _effect_of(term: str, coefficient: float) -> str:
+    """Return the effect that adds a term with this coefficient."""
+    named = _WITH_A_NAME.get(term)
+    if named is None:
+        return term
+    amplitude = make_effect(named).parameters[0]
+    return named if amplitude.low <= coefficient <= amplitude.high else term
+
+
+def _fitted(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, Degree]]:
+    """Return the fit of these effects, each with the degree that evidence asks for."""
+    model = problem.model
+    free = [position for name in names for position in model.positions(name)]
+    starts = []
+    for factor in _STARTS:
+        start = model.zero()
+        for name in names:
+            parameter = make_effect(name).parameters[0]
+            start[model.positions(name)[0]] = factor * parameter.first_trial
+        starts.append(start)
+    fit = problem.best_fit(starts, free)
+    degrees = {name: Degree() for name in names}
+    return choose_degrees(problem, fit, degrees) if fit.usable else (fit, degrees)
+
+
+_STARTS = (1.0, 10.0)
+"""Multiples of an effect's first trial, which is the size from which it shows."""
+
+
+def _worth_of(law: SparseLaw, problem: FitProblem, runs: Sequence[Run], effective: float) -> float:
+    """Return the criterion of a law by what it leaves of the fitted runs."""
+    cost = sum(
+        _relative_error(predicted, run) ** 2
+        for predicted, run in zip(law.predicted, runs, strict=True)
+    )
+    return problem.criterion(cost, range(law.n_constants), law.terms, effective)
+
+
+def _relative_error(predicted: np.ndarray, run: Run) -> float:
+    off = (predicted[: len(run)] - run.recorded) / run.sizes(run.recorded)
+    return float(np.sqrt(np.mean(off**2)))
+
+
+def _what_is_left(
+    model: AugmentedModel, fit: Fit, batch: Batch, runs: Sequence[Run], expectation: Expectation
+) -> LackOfFit:
+    predicted = model.predict(fit.theta, batch)
+    residuals = [p[: len(r)] - r.recorded for p, r in zip(predicted, runs, strict=True)]
+    even = [1.0 / run.sizes(run.recorded) for run in runs]
+    return lack_of_fit(residuals, [run.recorded for run in runs], expectation, None, even)
+
+
+def _errors(model: AugmentedModel, fit: Fit, runs: Sequence[Run]) -> dict[str, float | None]:
+    errors: dict[str, float | None] = {}
+    if not runs:
+        return errors
+    with np.errstate(over="ignore", invalid="ignore"):
+        # a law may run away in a held-out flow
+        for run, predicted in zip(runs, model.predict(fit.theta, make_batch(runs)), strict=True):
+            error = _relative_error(predicted, run)
+            errors[run.name] = error if np.isfinite(error) else None
+    return errors
