@@ -140,7 +140,7 @@ def judge(
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
-    outcomes, refuted = without_refuted_bands(outcomes, flows)
+    outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()

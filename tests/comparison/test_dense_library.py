@@ -9,6 +9,7 @@ import pytest
 from independent import UpperConvectedMaxwell
 from independent import start_up as start_up_of_scipy
 from independent.instruments import Instrument
+from independent.thixotropic import Thixotropic
 
 from discover.comparison.judging.declared_constants import OtherConstant
 from discover.comparison.judging.dense_library import (
@@ -24,6 +25,7 @@ from discover.laws.giesekus import Giesekus
 from discover.learners import LearnerResult
 from discover.learners.weighted_laws import WeightedLaws
 from discover.protocols import start_up
+from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.0, 4.0, 9)
 FLOW = Flow("startup", "test", start_up(2.0), TIMES, np.full(9, 2.0), {})
@@ -121,13 +123,29 @@ def test_a_record_outside_the_dense_band_of_its_stress_leaves_no_band_of_n1(lag,
     dense = replace(
         outcome("tensor_dense"), bands={flow.key: band}, details={"noise": {"relative": 0.01}}
     )
-    found, said = without_refuted_bands({"tensor_dense": dense}, [flow])
+    found, said = without_refuted_bands({"tensor_dense": dense}, [flow], Expectation())
     assert (found["tensor_dense"].bands[flow.key] is None) == refuted
     assert len(said) == refuted
-    # a run that was fitted judges no prediction
-    fitted = replace(flow, kind="training")
-    assert without_refuted_bands({"tensor_dense": dense}, [fitted])[1] == []
-    assert without_refuted_bands({"tensor_sindy": dense}, [flow]) == ({"tensor_sindy": dense}, [])
+    assert without_refuted_bands({"tensor_sindy": dense}, [flow], Expectation())[1] == []
+
+
+@pytest.mark.parametrize(("build_up", "refuted"), [(None, False), (2.0, True)])
+def test_laws_that_miss_the_runs_they_were_fitted_to_have_no_band(build_up, refuted):
+    # laws that all are nearly Maxwell, of a Maxwell fluid by scipy, or of one with a structure
+    times, fluid = np.linspace(0.0, 4.0, 81), UpperConvectedMaxwell(1.0, 1.0)
+    known = fluid.respond(start_up_of_scipy(2.0), times)
+    truth = fluid if build_up is None else Thixotropic(fluid, 0.3, build_up)
+    exact = truth.respond(start_up_of_scipy(2.0), times).sigma12
+    size = np.sqrt(np.mean(exact**2))
+    record = exact + 0.01 * size * np.random.default_rng(0).standard_normal(81)
+    flow = replace(held_out(record), kind="training", measured=record)
+    curves = {"sigma12": known.sigma12, "N1": known.N1, "N2": known.N2}
+    band = {name: (curve - 0.5, curve + 0.5) for name, curve in curves.items()}
+    dense = outcome("tensor_dense")
+    dense = replace(dense, predictions={flow.key: curves}, bands={flow.key: band})
+    found, said = without_refuted_bands({"tensor_dense": dense}, [flow], Expectation())
+    assert (found["tensor_dense"].bands[flow.key] is None) == refuted
+    assert len(said) == refuted
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.judging.declared_constants import OtherConstant, other_gain
+from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.statements import WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
+from discover.learners.tensor_dense.mixture import FITS
+from discover.statistics.residual import Expectation
 from discover.words import percent_of
 
 DENSE = "tensor_dense"
+
+_FLOOR = 1e-3
+"""Relative misfit that the dense library takes no data to go below."""
 
 _OUTSIDE = 0.1
 """Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
@@ -79,23 +85,39 @@ def with_gain_in_dense(
 
 
 def without_refuted_bands(
-    outcomes: Mapping[str, LearnerOutcome], flows: Sequence[Flow]
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Sequence[Flow],
+    expectation: Expectation,
+    normal_stresses_used: bool = False,
 ) -> tuple[dict[str, LearnerOutcome], list[str]]:
     """Return the outcomes without dense bands that a record refutes, and a sentence on each.
 
-    Where σ12 of a run held out lies outside the band, the laws that fit are not the fluid's in that
-    flow, and their N1 and N2 say nothing either.
+    Laws that miss the runs that they were fitted to are not the fluid's, nor are they in a flow
+    where σ12 of a run held out lies outside their band: their N1 and N2 say nothing either.
 
     Parameters
     ----------
     outcomes
         By learner; without ``"tensor_dense"`` they stay as they are.
     flows
-        All flows; measured runs held out are looked at.
+        All flows; those of training and measured runs held out are looked at.
+    expectation
+        What a complete law may leave.
+    normal_stresses_used
+        Whether measured normal stresses were part of the fit.
     """
     dense = outcomes.get(DENSE)
-    if dense is None:
+    if dense is None or not dense.bands:
         return dict(outcomes), []
+    training = [flow for flow in flows if flow.kind == "training"]
+    left = training and what_it_leaves(dense, training, expectation, normal_stresses_used)
+    if left and not left.misfit <= FITS * max(left.expected, _FLOOR):
+        text = (
+            f"The dense library leaves {percent_of(left.misfit)} of the fitted runs where noise is "
+            f"{percent_of(left.expected)}, so none of its laws is the fluid's, and it has no band."
+        )
+        none = dict.fromkeys(dense.bands)
+        return {**outcomes, DENSE: replace(dense, bands=none)}, [text]
     noise = float((dense.details.get("noise") or {}).get("relative") or 0.0)
     bands, said = dict(dense.bands), []
     for flow in flows:

@@ -126,7 +126,7 @@ def explain(
     training = [flow for flow in flows if flow.kind == "training"]
     return Explanation(
         {
-            name: _left(outcome, training, expectation, normal_stresses_used)
+            name: what_it_leaves(outcome, training, expectation, normal_stresses_used)
             for name, outcome in outcomes.items()
             if name not in BANDS_ONLY or len(outcomes) == 1
         },
@@ -135,12 +135,13 @@ def explain(
     )
 
 
-def _left(
+def what_it_leaves(
     outcome: LearnerOutcome,
     training: Sequence[Flow],
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
+    """Return what one learner's law leaves of the training runs; parameters as in `explain`."""
     residuals, records, rates, even = [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
