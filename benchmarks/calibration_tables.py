@@ -9,6 +9,9 @@ Cases = Sequence[dict]
 WHOLE = 0.9
 """A run counts as held with so many of its samples in the band."""
 
+TENTH = 0.1
+"""A quantity that is said to be determined may be off by so much of N1."""
+
 
 def share(hits: int, of: int) -> str:
     """Return a count with its 95 % interval   [Clopper & Pearson 1934, Biometrika 26, 404]."""
@@ -110,15 +113,30 @@ def loop_table(cases: Cases) -> str:
 def comparison_table(cases: Cases) -> str:
     """Return the table of what comparisons claimed and what was so."""
     lines = [f"{len(cases)} comparisons"]
+    in_library = [c for c in cases if c.get("library_laws")]
+    found = [c for c in in_library if _law_found(c) is not None]
+    lines.append(f"a law of the library, found alone: {share(len(found), len(in_library))}")
+    explained = sum(c["verdict"] == "explained" for c in in_library)
+    lines.append(f"  and explained: {share(explained, len(in_library))}")
+    held = [_holds(t["ci95"], (_law_found(c) or {})[t["term"]]) for c in found for t in c["terms"]]
+    lines.append(f"  95 % intervals that hold the coefficient: {share(sum(held), len(held))}")
+    others = [c for c in cases if not c.get("library_laws")]
     for name, some in (
-        ("all has a name", [c for c in cases if c["effects"] is not None]),
-        ("something has none", [c for c in cases if c["effects"] is None]),
+        ("a law of the library, sound instrument", in_library),
+        ("another law or a flaw, all with a name", [c for c in others if c["effects"] is not None]),
+        ("something has none", [c for c in others if c["effects"] is None]),
     ):
         explained = sum(c["verdict"] == "explained" for c in some)
         lines.append(f"{name}: explained in {share(explained, len(some))}")
+        said = [(c, q) for c in some for q in ("N1", "N2") if q not in c.get("undetermined", ())]
+        wrong = [(c, q) for c, q in said if _worst(c, q) > TENTH]
+        lines.append(
+            f"  N1 or N2 said to be determined, and off by a tenth: {share(len(wrong), len(said))}"
+        )
+        lines += [f"    {_case(c)}: {q} by {100 * _worst(c, q):.0f} %" for c, q in wrong]
         for source in sorted({b["source"] for c in some for b in c["bands"]}):
             for quantity in ("sigma12", "N1", "N2"):
-                bands = [b for b in _bands(some) if b["quantity"] == quantity]
+                bands = [b for b in _bands(some) if b["quantity"] == quantity and "inside" in b]
                 bands = [b for b in bands if b["source"] == source]
                 lines.append(_coverage(f"  {source}, {quantity}", bands))
     return "\n".join([*lines, _seconds(cases)])
@@ -138,6 +156,22 @@ def _beside(case: dict) -> list[str]:
 
 def _bands(cases: Cases) -> list[dict]:
     return [band for case in cases for band in case["bands"]]
+
+
+def _law_found(case: dict) -> dict[str, float] | None:
+    """Return the right law of just the terms that were found; None if there is none."""
+    names = {term["term"] for term in case["terms"]}
+    return next((law for law in case["library_laws"] if {*law} == names), None)
+
+
+def _holds(interval: Sequence[float] | None, truth: float) -> bool:
+    return interval is not None and interval[0] <= truth <= interval[1]
+
+
+def _worst(case: dict, quantity: str) -> float:
+    """Return how far the sparse law's curve is off in a run held out, N2's over N1."""
+    sparse = [b for b in case["bands"] if b["source"] == "tensor_sindy"]
+    return max((b.get("off", 0.0) for b in sparse if b["quantity"] == quantity), default=0.0)
 
 
 def _coverage(what: str, bands: list[dict]) -> str:

@@ -116,6 +116,28 @@ def known_laws(draw: Draw) -> dict[str, tuple[Material, Named]]:
     }  # fmt: skip
 
 
+def library_laws(law: str, constants: Constants) -> tuple[Mapping[str, float], ...]:
+    """Return the sums of the terms of the default library that a known law is, twins included.
+
+    Coefficients by term, beside −σ. None where the law is no such sum: the exponential is a closed
+    form, which is searched on request.
+    """
+    if law == "Maxwell":
+        return ({},)
+    if law == "Giesekus":
+        return ({"sigma.sigma": constants["giesekus_mobility"]["alpha"]},)
+    if law == "Johnson-Segalman":
+        xi = constants["non_affine_motion"]["xi"]
+        # one σ12 and one N1 in any simple shear   [docs/identifiability.md]
+        return (
+            {"sigma.gammadot+gammadot.sigma": xi / 2},
+            {"tr(sigma)*gammadot": xi * (1 - xi / 2)},
+        )
+    if law == "linear PTT":
+        return ({"tr(sigma)*sigma": constants["ptt_linear"]["epsilon"]},)
+    return ()
+
+
 def unknown_laws(draw: Draw) -> dict[str, Material]:
     """Return laws that it has no name for among its effects and terms."""
     return {
@@ -204,8 +226,13 @@ class World:
         """Whether everything that is there has a name."""
         return self.effects is not None
 
-    def make(self, lot: np.random.Generator) -> dict[str, Recording]:
-        """Return the runs by file name, with noise."""
+    @property
+    def library_laws(self) -> tuple[Mapping[str, float], ...]:
+        """Laws of the library that are what the records hold; none behind an instrument's flaw."""
+        return library_laws(self.law, self.constants) if self.flaw == "sound" else ()
+
+    def make(self, lot: np.random.Generator | None) -> dict[str, Recording]:
+        """Return the runs by file name, with noise; without it where there is no lot."""
         flows, instrument = FLOWS[self.protocol], self.instrument
         if self.flaw == "saturated":
             largest = max(
@@ -217,7 +244,9 @@ class World:
         runs = {}
         for name, (flow, end) in flows.items():
             run = instrument.record(self.material, flow, np.linspace(0.02, end, SAMPLES))
-            runs[name] = replace(run, stress=NOISES[self.noise](run.stress, lot))
+            if lot is not None:
+                run = replace(run, stress=NOISES[self.noise](run.stress, lot))
+            runs[name] = run
         return runs
 
 

@@ -16,7 +16,11 @@ from discover.comparison.judging.declared_constants import (
     with_other_constants,
     with_other_gain,
 )
-from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.dense_library import (
+    open_where_dense_is_wide,
+    with_gain_in_dense,
+    without_refuted_bands,
+)
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import (
@@ -141,7 +145,8 @@ def judge(
     if not explanation.in_library:
         following, own_bands, others = NextMeasurement(), {}, []
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
-    outcomes = with_small_strain_told(outcomes, explanation, others)
+    outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
+    outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     classical: Sequence[ClassicalFit] = ()
@@ -160,7 +165,7 @@ def judge(
         statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
-    apart = disagreements(outcomes, judged, bands)
+    apart = [*refuted, *disagreements(outcomes, judged, bands)]
     if known.along is not None and known.along.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     return Judgement(

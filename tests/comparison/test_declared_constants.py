@@ -5,7 +5,8 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import Giesekus, start_up
+from independent import Giesekus, UpperConvectedMaxwell, oscillation, start_up
+from independent.instruments import Instrument
 
 from discover.comparison.judging.declared_constants import (
     beside,
@@ -71,6 +72,27 @@ def test_statements_name_the_other_constant_and_say_that_data_cannot_tell():
     assert "transducer that shows 1.1 times the stress" in statements[1].brief
 
 
+@pytest.mark.parametrize("flow", [start_up(3.0), oscillation(2.0, 1.0)])
+def test_a_shorter_time_is_told_as_the_wall_slip_that_leaves_the_same_stress(flow):
+    slip = 2e-3
+    c = slip * DECLARED_MODULUS * DECLARED_TIME
+    behind = UpperConvectedMaxwell(DECLARED_MODULUS, DECLARED_TIME)
+    shorter = UpperConvectedMaxwell(DECLARED_MODULUS, DECLARED_TIME / (1.0 + c))
+    records = [
+        instrument.record(fluid, flow, TIMES)
+        for instrument, fluid in ((Instrument(slip=slip), behind), (Instrument(), shorter))
+    ]
+    # both integrated to 1e-8; N1 would tell the two apart
+    np.testing.assert_allclose(records[0].stress, records[1].stress, rtol=1e-5, atol=1e-5)
+    assert np.max(np.abs(records[0].N1 - records[1].N1)) > 1.0
+    (one,) = other_constants(found(("sigma", c)), declared())
+    assert f"wall slip of {slip:.4g} 1/(Pa s)" in one.text
+    # a longer time is that of no wall, and of several modes each would have its own
+    assert "slip" not in other_constants(found(("sigma", -c)), declared())[0].text
+    several = declared((50.0, 20.0), (0.7, 7.0))
+    assert "slip" not in other_constants(found(("sigma", c)), several)[0].text
+
+
 def test_of_several_modes_it_is_a_factor_on_all():
     (one,) = other_constants(TERMS[:1], declared((50.0, 20.0), (0.7, 7.0)))
     assert "relaxation times that are all 1.429 times the declared ones" in one.text
@@ -82,6 +104,7 @@ def test_of_several_modes_it_is_a_factor_on_all():
         found(("sigma.sigma", 0.3), ("tr(sigma)*sigma", -0.2)),
         found(("sigma", 0.005)),  # less than an experiment sees
         found(("sigma", -1.2)),  # no time is left
+        [RecoveredTerm("gammadot", -0.43)],  # without an interval: other terms may replace it
     ],
 )
 def test_other_terms_are_no_other_constant(terms):

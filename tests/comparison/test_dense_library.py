@@ -1,11 +1,22 @@
 """The dense library opens what only sparsity decides; the curves are written by hand."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import UpperConvectedMaxwell
+from independent import start_up as start_up_of_scipy
+from independent.instruments import Instrument
+from independent.thixotropic import Thixotropic
 
-from discover.comparison.judging.dense_library import open_where_dense_is_wide
+from discover.comparison.judging.declared_constants import OtherConstant
+from discover.comparison.judging.dense_library import (
+    open_where_dense_is_wide,
+    with_gain_in_dense,
+    without_refuted_bands,
+)
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -14,6 +25,7 @@ from discover.laws.giesekus import Giesekus
 from discover.learners import LearnerResult
 from discover.learners.weighted_laws import WeightedLaws
 from discover.protocols import start_up
+from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.0, 4.0, 9)
 FLOW = Flow("startup", "test", start_up(2.0), TIMES, np.full(9, 2.0), {})
@@ -37,7 +49,34 @@ def test_a_narrow_dense_band_leaves_a_statement_and_says_its_width():
     first, second = open_where_dense_is_wide(SAID, outcomes, [FLOW])
     assert first.determined == IN_LIBRARY
     assert "± 20 % of its size" in first.text
-    assert second == SAID[1]
+    # an open quantity has the band all the same, with what it takes for granted
+    assert second.undetermined
+    assert "± 20 % of N1 at the widest" in second.text
+    assert "no claim about a fluid unlike all of them" in second.text
+
+
+def test_dense_bands_hold_the_fluid_behind_a_transducer_of_the_gain_that_the_sparse_law_shows():
+    gain = 1.1
+    outcomes = {"tensor_dense": outcome("tensor_dense", 0.02)}
+    shown = OtherConstant("gammadot", 1.0 - gain, 100.0, gain, None)
+    wide = with_gain_in_dense(outcomes, [shown])["tensor_dense"].bands[FLOW.key]
+    for quantity in ("N1", "N2"):
+        low, high = wide[quantity]
+        truth = CURVES[quantity] / gain  # what was fitted is gain times the fluid's
+        assert np.all((low <= truth) & (truth <= high))
+        assert np.all((low <= CURVES[quantity]) & (CURVES[quantity] <= high))
+    own = outcomes["tensor_dense"].bands[FLOW.key]
+    np.testing.assert_array_equal(wide["sigma12"], own["sigma12"])
+    # another time moves no stress, and without a dense library there is nothing to widen
+    time = OtherConstant("sigma", 0.2, 1.0, 1.0 / 1.2, None)
+    assert with_gain_in_dense(outcomes, [time]) == outcomes
+    sparse = {"tensor_sindy": outcome("tensor_sindy")}
+    assert with_gain_in_dense(sparse, [shown]) == sparse
+
+
+def test_an_open_statement_stays_where_the_dense_library_has_no_band():
+    outcomes = {"tensor_dense": outcome("tensor_dense", None)}
+    assert open_where_dense_is_wide(SAID[1:], outcomes, [FLOW]) == SAID[1:]
 
 
 @pytest.mark.parametrize("half_width", [1.2, None])
@@ -59,6 +98,54 @@ def test_a_sparse_law_outside_the_dense_band_determines_nothing():
 
 def test_without_a_dense_library_every_statement_stays():
     assert open_where_dense_is_wide(SAID, {"tensor_sindy": outcome("tensor_sindy")}, [FLOW]) == SAID
+
+
+def held_out(record):
+    rate = np.full(len(record), 2.0)
+    times = np.linspace(0.0, 4.0, len(record))
+    return Flow("e.csv", "held_out", start_up(2.0), times, rate, {"sigma12": record})
+
+
+@pytest.mark.parametrize(("lag", "refuted"), [(0.0, False), (0.5, True)])
+def test_a_record_outside_the_dense_band_of_its_stress_leaves_no_band_of_n1(lag, refuted):
+    # scipy's Maxwell fluid, read through a transducer with a lag that the laws know nothing of
+    times, fluid = np.linspace(0.0, 4.0, 81), UpperConvectedMaxwell(1.0, 1.0)
+    exact = fluid.respond(start_up_of_scipy(2.0), times)
+    read = Instrument(lag=lag).record(fluid, start_up_of_scipy(2.0), times).stress
+    record = read + 0.01 * np.random.default_rng(0).standard_normal(81)
+    record[40] += 1.0  # one knock refutes no band
+    flow = held_out(record)
+    edge = 0.02 * np.max(exact.sigma12)
+    band = {
+        name: (curve - edge, curve + edge)
+        for name, curve in (("sigma12", exact.sigma12), ("N1", exact.N1), ("N2", exact.N2))
+    }
+    dense = replace(
+        outcome("tensor_dense"), bands={flow.key: band}, details={"noise": {"relative": 0.01}}
+    )
+    found, said = without_refuted_bands({"tensor_dense": dense}, [flow], Expectation())
+    assert (found["tensor_dense"].bands[flow.key] is None) == refuted
+    assert len(said) == refuted
+    assert without_refuted_bands({"tensor_sindy": dense}, [flow], Expectation())[1] == []
+
+
+@pytest.mark.parametrize(("build_up", "refuted"), [(None, False), (2.0, True)])
+def test_laws_that_miss_the_runs_they_were_fitted_to_have_no_band(build_up, refuted):
+    # laws that all are nearly Maxwell, of a Maxwell fluid by scipy, or of one with a structure
+    times, fluid = np.linspace(0.0, 4.0, 81), UpperConvectedMaxwell(1.0, 1.0)
+    known = fluid.respond(start_up_of_scipy(2.0), times)
+    truth = fluid if build_up is None else Thixotropic(fluid, 0.3, build_up)
+    exact = truth.respond(start_up_of_scipy(2.0), times).sigma12
+    size = np.sqrt(np.mean(exact**2))
+    record = exact + 0.01 * size * np.random.default_rng(0).standard_normal(81)
+    flow = replace(held_out(record), kind="training", measured=record)
+    curves = {"sigma12": known.sigma12, "N1": known.N1, "N2": known.N2}
+    band = {name: (curve - 0.5, curve + 0.5) for name, curve in curves.items()}
+    dense = outcome("tensor_dense")
+    dense = replace(dense, predictions={flow.key: curves}, bands={flow.key: band})
+    found, said = without_refuted_bands({"tensor_dense": dense}, [flow], Expectation())
+    assert (found["tensor_dense"].bands[flow.key] is None) == refuted
+    assert len(said) == refuted
 
 
 @pytest.fixture(scope="module")

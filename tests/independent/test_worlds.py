@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from calibration import run_case
 from calibration_tables import calibration_error, comparison_table, is_right, loop_table, share
 from independent import SoftGlass, UpperConvectedMaxwell, start_up
 from independent.instruments import Instrument
@@ -107,7 +108,8 @@ def case(effects, verdict, members, probability, **more):
         "index": 0, "law": "a law", "flaw": "sound", "protocol": "steps", "noise": "white",
         "effects": effects, "verdict": verdict, "inclusion": {}, "constants": [], "bands": [],
         "explanations": [{"members": members, "probability": probability}],
-        "unexplained_probability": 1.0 - probability, "processor_seconds": 1.0, **more,
+        "unexplained_probability": 1.0 - probability, "processor_seconds": 1.0,
+        "library_laws": [], "terms": [], **more,
     }  # fmt: skip
 
 
@@ -142,3 +144,41 @@ def test_the_table_of_comparisons_keeps_learners_and_quantities_apart():
     assert "tensor_sindy, N1: 72.5 % of the samples, runs held to 90 % 1 of 2" in table
     assert "tensor_sindy, N2: 100.0 %" in table
     assert "something has none: explained in 0 of 1" in table
+
+
+def test_the_table_of_comparisons_counts_what_was_said_to_be_determined_and_is_not():
+    def curve(quantity, off):
+        return {"source": "tensor_sindy", "run": "e", "quantity": quantity, "off": off}
+
+    right = [{"term": "sigma.sigma", "ci95": [0.18, 0.22]}]
+    table = comparison_table([
+        case([], "explained", [[]], 1.0, terms=right, library_laws=[{"sigma.sigma": 0.2}],
+             undetermined=["N2"], bands=[curve("N1", 0.01), curve("N2", 0.5)]),
+        case([], "explained", [[]], 1.0, library_laws=[{"sigma.sigma": 0.2}],
+             undetermined=[], bands=[curve("N1", 0.2), curve("N2", 0.05)]),
+    ])  # fmt: skip
+    assert "found alone: 1 of 2" in table
+    assert "hold the coefficient: 1 of 1" in table
+    assert "off by a tenth: 1 of 3" in table
+    assert "N1 by 20 %" in table
+
+
+def test_a_world_without_noise_holds_the_law_of_the_library_that_it_names():
+    world = next(w for i in range(0, 200, 2) if (w := draw_world(1, i)).library_laws)
+    exact, noisy = world.make(None), world.make(np.random.default_rng(0))
+    for name, run in exact.items():
+        np.testing.assert_array_equal(run.stress, run.true.sigma12)
+        off = np.linalg.norm(noisy[name].stress - run.stress) / np.linalg.norm(run.stress)
+        assert 0.0 < off < 0.2
+
+
+@pytest.mark.slow
+def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold():
+    found = run_case("compare", 7, 0)
+    assert (found["law"], found["flaw"], found["verdict"]) == ("Maxwell", "sound", "explained")
+    assert found["terms"] == []
+    assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "tensor_dense"}
+    held = [b["inside"] for b in found["bands"] if "inside" in b]
+    assert held
+    assert min(held) > 0.9
+    assert "found alone: 1 of 1" in comparison_table([found])

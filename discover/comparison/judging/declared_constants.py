@@ -37,7 +37,10 @@ class OtherConstant:
     declared
         What was declared, in s or Pa; None where there are several modes.
     factor, ci95
-        On what was declared, and its 95 % interval; None where the term has none.
+        On what was declared, and its 95 % interval; None where it has no positive end.
+    slip
+        Of the wall, in 1/(Pa s), with which a Maxwell fluid of the declared time has the same σ12;
+        None where there is no such.
     """
 
     term: str
@@ -45,6 +48,7 @@ class OtherConstant:
     declared: float | None
     factor: float
     ci95: tuple[float, float] | None
+    slip: float | None = None
 
     @property
     def name(self) -> str:
@@ -67,6 +71,9 @@ class OtherConstant:
             same = f"a {noun} of {value} {unit}{span} in place of {self.declared:.4g} {unit}"
         if self.term == _MODULUS:
             same += f", or as a transducer that shows {self.factor:.4g} times the stress"
+        elif self.slip is not None:
+            slip = f"{self.slip:.4g} 1/(Pa s)"
+            same += f", or, as far as σ12 of a Maxwell fluid tells, as wall slip of {slip}"
         coefficient = f"{self.coefficient:.4g}".replace("-", "−")
         return f"{coefficient} {self.term} is the same as {same}: these data cannot tell"
 
@@ -75,7 +82,7 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
     """Return which declared constants the linear terms of a law amount to.
 
     What differs by less than an experiment can be expected to see is none; nor is a term that
-    leaves no positive time or modulus.
+    leaves no positive time or modulus, or one without an interval, which other terms may replace.
 
     Parameters
     ----------
@@ -86,9 +93,9 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
     """
     found = []
     for term in terms:
-        if term.term not in LINEAR_TERMS:
+        if term.term not in LINEAR_TERMS or term.ci95 is None:
             continue
-        values = (term.coefficient, *(term.ci95 or ()))
+        values = (term.coefficient, *term.ci95)
         if term.term == _TIME:
             totals = [float(model.law.linear_relaxation) + value for value in values]
             declared = model.relaxation_time
@@ -99,13 +106,24 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
             continue
         factor = 1.0 / totals[0] if term.term == _TIME else totals[0]
         limits = None
-        if term.ci95 is not None and min(totals) > 0.0:
+        if min(totals) > 0.0:
             low, high = sorted(1.0 / t if term.term == _TIME else t for t in totals[1:])
             limits = low, high
         if abs(factor - 1.0) > SEPARATED:
             alone = float(declared[0]) if len(declared) == 1 else None
-            found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits))
+            slip = _slip(term, model) if term.term == _TIME and alone is not None else None
+            found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits, slip))
     return found
+
+
+def _slip(term: RecoveredTerm, model: DeclaredModel) -> float | None:
+    """Return the slip s that a term c σ amounts to in σ12 of a Maxwell fluid, c = s G λ.
+
+    The fluid feels γ̇ − s σ12, so that σ12' = G (γ̇ − s σ12) − σ12/λ.
+    """
+    if term.coefficient <= 0.0 or model.solvent_viscosity or not model.law.linear_relaxation:
+        return None
+    return float(term.coefficient / (model.modulus[0] * model.relaxation_time[0]))
 
 
 def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> dict[str, float]:
@@ -128,6 +146,17 @@ def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> d
     return left
 
 
+def other_gain(others: Iterable[OtherConstant]) -> float | None:
+    """Return the gain of the transducer that the linear terms may stand for; None: there is none.
+
+    Parameters
+    ----------
+    others
+        From `other_constants`.
+    """
+    return next((other.factor for other in others if other.term == _MODULUS), None)
+
+
 def with_other_gain(
     bands: Mapping[str, PredictionBand], others: Sequence[OtherConstant]
 ) -> dict[str, PredictionBand]:
@@ -140,7 +169,7 @@ def with_other_gain(
     others
         From `other_constants`.
     """
-    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    gain = other_gain(others)
     if gain is None:
         return dict(bands)
     scale = np.array([1.0, 1.0 / gain, 1.0 / gain])  # σ12 is what is recorded
@@ -179,18 +208,23 @@ def with_other_constants(
             f"{value:.4g} {name}".replace("-", "−") for name, value in beside(terms, others).items()
         ]
         rest = f" Beside it the law is {' + '.join(named)}." if named else ""
+
+    def same(other: OtherConstant) -> str:
+        return "law" if other.slip is None else "law, or the same σ12"
+
     said = [
         Statement(
             other.name,
             "no",
-            f"{other.text}, for it is one and the same law.{rest} A constant that was measured on "
-            f"another sample or at another temperature does that; [model] {other.name} = "
+            f"{other.text}, for it is one and the same {same(other)}.{rest} A constant that was "
+            "measured on another sample or at another temperature does that; [model] "
+            f"{other.name} = "
             '"fit" fits it along.',
             other.text,
         )
         for other in others
     ]
-    gain = next((other.factor for other in others if other.term == _MODULUS), None)
+    gain = other_gain(others)
     if gain is not None:
         text = (
             f"The band holds {{0}} as shown and, should it be the transducer, {{0}} / {gain:.4g}."

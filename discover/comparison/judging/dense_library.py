@@ -5,13 +5,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.comparison.judging.declared_constants import OtherConstant, other_gain
+from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.statements import WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
+from discover.learners.tensor_dense.mixture import FITS
+from discover.statistics.residual import Expectation
 from discover.words import percent_of
 
 DENSE = "tensor_dense"
+
+_FLOOR = 1e-3
+"""Relative misfit that the dense library takes no data to go below."""
+
+_OUTSIDE = 0.1
+"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
+
+_IN_NOISE = 2.0
+"""A sample is outside that is so many times the noise off a band of the curve."""
 
 
 def open_where_dense_is_wide(
@@ -37,7 +50,105 @@ def open_where_dense_is_wide(
     dense = outcomes.get(DENSE)
     if dense is None:
         return list(statements)
-    return [s if s.undetermined else _held(s, dense, outcomes, flows) for s in statements]
+    return [
+        _beside_open(s, dense, flows) if s.undetermined else _held(s, dense, outcomes, flows)
+        for s in statements
+    ]
+
+
+def with_gain_in_dense(
+    outcomes: Mapping[str, LearnerOutcome], others: Sequence[OtherConstant]
+) -> dict[str, LearnerOutcome]:
+    """Return the outcomes, the dense bands of N1 and N2 holding behind a transducer's gain as well.
+
+    The dense library has the term γ̇ too, and its laws take a wrong gain for another modulus.
+
+    Parameters
+    ----------
+    outcomes
+        By learner; without ``"tensor_dense"`` they stay as they are.
+    others
+        Declared constants that the sparse law's linear terms amount to.
+    """
+    dense, gain = outcomes.get(DENSE), other_gain(others)
+    if dense is None or gain is None:
+        return dict(outcomes)
+    bands: dict[str, Limits | None] = {}
+    for key, limits in dense.bands.items():
+        bands[key] = limits and {
+            quantity: (low, high)
+            if quantity == "sigma12"
+            else (np.minimum(low, low / gain), np.maximum(high, high / gain))
+            for quantity, (low, high) in limits.items()
+        }
+    return {**outcomes, DENSE: replace(dense, bands=bands)}
+
+
+def without_refuted_bands(
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Sequence[Flow],
+    expectation: Expectation,
+    normal_stresses_used: bool = False,
+) -> tuple[dict[str, LearnerOutcome], list[str]]:
+    """Return the outcomes without dense bands that a record refutes, and a sentence on each.
+
+    Laws that miss the runs that they were fitted to are not the fluid's, nor are they in a flow
+    where σ12 of a run held out lies outside their band: their N1 and N2 say nothing either.
+
+    Parameters
+    ----------
+    outcomes
+        By learner; without ``"tensor_dense"`` they stay as they are.
+    flows
+        All flows; those of training and measured runs held out are looked at.
+    expectation
+        What a complete law may leave.
+    normal_stresses_used
+        Whether measured normal stresses were part of the fit.
+    """
+    dense = outcomes.get(DENSE)
+    if dense is None or not dense.bands:
+        return dict(outcomes), []
+    training = [flow for flow in flows if flow.kind == "training"]
+    left = training and what_it_leaves(dense, training, expectation, normal_stresses_used)
+    if left and not left.misfit <= FITS * max(left.expected, _FLOOR):
+        text = (
+            f"The dense library leaves {percent_of(left.misfit)} of the fitted runs where noise is "
+            f"{percent_of(left.expected)}, so none of its laws is the fluid's, and it has no band."
+        )
+        none = dict.fromkeys(dense.bands)
+        return {**outcomes, DENSE: replace(dense, bands=none)}, [text]
+    noise = float((dense.details.get("noise") or {}).get("relative") or 0.0)
+    bands, said = dict(dense.bands), []
+    for flow in flows:
+        limits, record = bands.get(flow.key), flow.reference.get("sigma12")
+        if flow.kind != "held_out" or flow.is_truth or limits is None or record is None:
+            continue
+        low, high = limits["sigma12"]
+        allowed = _IN_NOISE * noise * np.sqrt(np.mean(np.asarray(record) ** 2))
+        share = float(np.mean(np.abs(record - np.clip(record, low, high)) > allowed))
+        if share > _OUTSIDE:
+            bands[flow.key] = None
+            said.append(
+                f"In {flow.title}, a run held out, {percent_of(share)} of the samples lie outside "
+                "the dense library's band of σ12, so it has no band there."
+            )
+    return {**outcomes, DENSE: replace(dense, bands=bands)}, said
+
+
+def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Flow]) -> Statement:
+    """Return an open statement with what the dense band, which is drawn all the same, holds."""
+    quantity = statement.quantity
+    widths = [w for f in flows if (w := dense.half_widths(f).get(quantity)) is not None]
+    if not widths:
+        return statement
+    of = "N1" if quantity == "N2" else "its size"
+    told = (
+        f"The dense library's band (± {percent_of(max(widths))} of {of} at the widest) holds 95 % "
+        "of its laws that fit σ12. It is no claim about a fluid unlike all of them, nor about one "
+        "behind an instrument with a flaw."
+    )
+    return replace(statement, text=f"{statement.text} {told}")
 
 
 def _held(

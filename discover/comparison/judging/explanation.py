@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
+from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import Repeats
@@ -17,6 +18,11 @@ from discover.statistics.residual import STRUCTURE, Expectation
 
 ARITHMETIC = 1e-5
 """Relative misfit that both integrations together may leave: the floor of the sparse search."""
+
+_RESTLESS = (
+    "the law builds up stress without any flow, which no fluid does that these runs, from rest, "
+    "were measured on"
+)
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,7 @@ def explain(
     training = [flow for flow in flows if flow.kind == "training"]
     return Explanation(
         {
-            name: _left(outcome, training, expectation, normal_stresses_used)
+            name: what_it_leaves(outcome, training, expectation, normal_stresses_used)
             for name, outcome in outcomes.items()
             if name not in BANDS_ONLY or len(outcomes) == 1
         },
@@ -129,12 +135,13 @@ def explain(
     )
 
 
-def _left(
+def what_it_leaves(
     outcome: LearnerOutcome,
     training: Sequence[Flow],
     expectation: Expectation,
     normal_stresses_used: bool,
 ) -> LackOfFit:
+    """Return what one learner's law leaves of the training runs; parameters as in `explain`."""
     residuals, records, rates, even = [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
@@ -162,4 +169,22 @@ def _left(
     if found.verdict == "explained" and coarse is not None and coarse.hides:
         reason = "what the rate did between its samples hides as much"
         return replace(found, verdict="unexplained", reason=reason)
+    if found.verdict == "explained" and not _rests(outcome) and any(map(_from_rest, training)):
+        return found.refuted(_RESTLESS)
     return found
+
+
+def _rests(outcome: LearnerOutcome) -> bool:
+    """Return whether a law leaves a fluid without flow and stress as it is.
+
+    Of all terms only I alone is there at rest. With it σ + c I is the stress of a law of another
+    modulus, so that it takes the start from rest for one from a strained state.
+    """
+    return not any(t.term == "I" and abs(t.coefficient) > SEPARATED for t in outcome.terms)
+
+
+def _from_rest(flow: Flow) -> bool:
+    """Return whether a run starts from rest, and not from a state that it has long been in."""
+    protocol = flow.protocol
+    went_on = float(protocol.begins) < 0.0 or float(protocol.cycle[0]) != float(protocol.cycle[1])
+    return not (flow.is_of_states or went_on)

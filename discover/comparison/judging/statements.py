@@ -315,6 +315,11 @@ def _of_band(quantity: str, check: BandCheck) -> str:
             f"But in {check.missed} the {quantity} known lies outside the band, by "
             f"{percent_of(check.off)}, so the band is not to be believed. {beyond}"
         )
+    if not np.isfinite(check.half_width):
+        return (
+            "But in some flow too many laws within the parameters' intervals run away, so no band "
+            f"says how far it could lie from the {quantity} shown. {beyond}"
+        )
     if not check.holds:
         return f"But the parameters' intervals leave a band that is wider than {quantity} itself."
     width = f"± {percent_of(max(check.half_width, 1e-5))}"
