@@ -110,8 +110,10 @@ def without_refuted_bands(
     if dense is None or not dense.bands:
         return dict(outcomes), []
     training = [flow for flow in flows if flow.kind == "training"]
-    left = training and what_it_leaves(dense, training, expectation, normal_stresses_used)
-    if left and not left.misfit <= FITS * max(left.expected, _FLOOR):
+    left = None
+    if training:
+        left = what_it_leaves(dense, training, expectation, normal_stresses_used)
+    if left is not None and not left.misfit <= FITS * max(left.expected, _FLOOR):
         text = (
             f"The dense library leaves {percent_of(left.misfit)} of the fitted runs where noise is "
             f"{percent_of(left.expected)}, so none of its laws is the fluid's, and it has no band."
