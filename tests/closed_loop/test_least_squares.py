@@ -1,5 +1,7 @@
 """Fits of many small problems: what they cost, what is left out of them, where they start again."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from discover.closed_loop import DeclaredModel
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.search.scoring.attribution import attribute
 from discover.closed_loop.search.scoring.left_out import FEWEST_FOLDS, left_out_errors
+from discover.closed_loop.search.scoring.refitting import simplest
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.effects.base import EffectParameter, SignalEffect
@@ -157,3 +160,17 @@ def test_a_trial_that_runs_away_scores_nothing_and_spoils_no_other():
     )
     assert alone["giesekus_mobility"] > 0.1
     assert beside == {**alone, "runaway": 0.0}
+
+
+def test_of_effects_that_meet_the_records_exactly_the_simplest_is_taken(as_users_run_it):
+    """Their evidence is infinite, and none is farther from the strongest than another."""
+
+    def choice(name, evidence):
+        return SimpleNamespace(candidate=SimpleNamespace(effect=name, evidence=evidence))
+
+    effects = [SimpleNamespace(name="a", complexity=2), SimpleNamespace(name="b", complexity=1)]
+    exact = [choice("a", float("inf")), choice("b", float("inf"))]
+    model = SimpleNamespace(effects=effects)
+    assert simplest(exact, model).candidate.effect == "b"  # pyright: ignore
+    weaker = [choice("a", float("inf")), choice("b", 50.0)]
+    assert simplest(weaker, model).candidate.effect == "a"  # pyright: ignore

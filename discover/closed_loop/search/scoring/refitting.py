@@ -172,7 +172,8 @@ def simplest(choices: Sequence[Choice], model: AugmentedModel) -> Choice:
     """Return the choice with the strongest evidence, or a simpler one about as strong."""
     strongest = max(choice.candidate.evidence or 0.0 for choice in choices)
     complexity = {effect.name: effect.complexity for effect in model.effects}
-    near = [c for c in choices if (c.candidate.evidence or 0.0) > strongest - BARE_MENTION]
+    # of records that are met exactly, as of three numbers written by hand, evidence is infinite
+    near = [c for c in choices if (c.candidate.evidence or 0.0) >= strongest - BARE_MENTION]
     return min(near, key=lambda c: (complexity[c.candidate.effect], -(c.candidate.evidence or 0.0)))
 
 
