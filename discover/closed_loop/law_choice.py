@@ -155,21 +155,6 @@ def law_beside_effects(
     return chosen, lines
 
 
-def is_likelier(search: Search, other: Search, by: float = BARE_MENTION) -> bool:
-    """Return whether what one search found explains the runs better than what another did.
-
-    Parameters
-    ----------
-    search, other
-        Searches in the same runs.
-    by
-        Difference of the criterion that counts.
-    """
-    effective = min(one.problem.independent_samples(one.fit) for one in (search, other))
-    own, theirs = (one.problem.worth(one.fit, one.active, effective) for one in (search, other))
-    return own < theirs - by
-
-
 def _contained_first(names: Sequence[str]) -> list[str]:
     """Return each name once, a law after those of them that it contains."""
     left, order = list(dict.fromkeys(names)), []

@@ -2,21 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from discover.closed_loop.candidates import admission
 from discover.closed_loop.explanations import Carried, search_and_carry
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.law_choice import choose_law, is_likelier, law_beside_effects
+from discover.closed_loop.law_choice import choose_law, law_beside_effects
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Run
 from discover.effects import BY_MODE, AbstractEffect
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.forward.declared import may_differ_by_mode
-from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.problem import effect_of
 from discover.statistics.residual import Expectation
 
@@ -114,7 +115,7 @@ class SearchTask:
         if other is None:
             return first
         again = self._from(*other, f"{self.name}_{other[0].law_name}")
-        return again if is_likelier(again.search, first.search) else first
+        return again if _is_likelier(again.search, first.search) else first
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:
         declared, search = first.declared, first.search
@@ -129,22 +130,29 @@ class SearchTask:
         apart = replace(declared, by_mode=tuple(names))
         again = self._from(apart, first.laws, f"{self.name}_by_mode")
         differ = any(one.degree for one in again.search.degrees.values())
-        return again if differ and is_likelier(again.search, search, INDISTINGUISHABLE) else first
+        return again if differ and _is_likelier(again.search, search, INDISTINGUISHABLE) else first
+
+    @cached_property
+    def _batch(self) -> Batch:
+        return make_batch(self.fitted)
+
+    @cached_property
+    def _held_batch(self) -> Batch | None:
+        return make_batch(self.held_out) if self.held_out else None
 
     def _from(self, declared: DeclaredModel, laws: tuple[LawFit, ...], name: str) -> SearchResult:
         # of one mode nothing can differ from another's
         asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
         model = AugmentedModel(declared, asked, data_scales(self.fitted))
-        batch = make_batch(self.fitted)
         search = Search(
             model,
-            batch,
-            make_batch(self.held_out) if self.held_out else None,
+            self._batch,
+            self._held_batch,
             len(self.candidates),
             admission(self.fitted, self.held_out),
             ToleratedMisfit(
                 Expectation(self.noise, declared.linear_error),
-                NumericalResolution(model, batch, self.fitted),
+                NumericalResolution(model, self._batch, self.fitted),
             ),
             SearchCheckpoint(self.store, name),
         )
@@ -160,3 +168,18 @@ class SearchTask:
             find_instrument_effects(search, self.fitted, self.max_effects, self.say)
         carried = search_and_carry(search, self.max_effects, self.width, self.say)
         return SearchResult(declared, laws, search, carried)
+
+
+def _is_likelier(search: Search, other: Search, by: float = BARE_MENTION) -> bool:
+    """Return whether what one search found explains the runs better than what another did.
+
+    Parameters
+    ----------
+    search, other
+        Searches in the same runs.
+    by
+        Difference of the criterion that counts.
+    """
+    effective = min(one.problem.independent_samples(one.fit) for one in (search, other))
+    own, theirs = (one.problem.worth(one.fit, one.active, effective) for one in (search, other))
+    return own < theirs - by

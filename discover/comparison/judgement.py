@@ -204,12 +204,13 @@ def _by_mode(
     predicted = [chosen.predictions[flow.key] for flow in training]
     if not doubtful or len(model.modulus) < 2 or not model.law.linear_relaxation:
         return None
-    if any(one is None for one in predicted):
-        return None
+    seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
+    if len(seen) < len(predicted):
+        return None  # it runs away in a run that it was learned from
     sparse = SparseLaw(
         [term.term for term in chosen.terms],
         sum(1 + len(term.inner) for term in chosen.terms),
-        [np.asarray(one["sigma12"]) for one in predicted if one is not None],
+        seen,
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())

@@ -128,24 +128,14 @@ def test_control_without_the_other_law_it_has_no_start(no_start_of_its_own):
         chosen(runs(Giesekus(0.3), (0.5, 5.0)), names=["giesekus_non_affine"])
 
 
-def structured_runs(material):
-    """Start-ups of a material of 100 Pa and 1 s, by scipy."""
-    generator, times, out = np.random.default_rng(2), np.linspace(0.1, 10.0, 50), []
-    for rate in (0.5, 2.0, 4.0):
-        stress = white(material.respond(flow_at(rate), times).sigma12, NOISE, generator)
-        given = np.full(50, rate)
-        out.append(dc.Run(f"at_{rate:g}", times, dc.start_up(rate), given, stress))
-    return dc.Dataset("planted", tuple(out))
-
-
 def found_beside(material, names, effects):
     base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
-    data = structured_runs(material)
+    data = runs(material, (0.5, 2.0, 4.0), seed=2, end=10.0)
     return dc.close_loop(data, base, held_out=["at_4"], laws=names, effects=effects, max_effects=1)
 
 
 def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
-    material = Thixotropic(UpperConvectedMaxwell(100.0, 1.0), 0.3, 5.0)
+    material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
     found = found_beside(material, ("ucm", "white_metzner"), ["thixotropy"])
     assert [stage.effect for stage in found.stages] == ["thixotropy"]
     assert found.laws[0].law == "ucm"
@@ -154,7 +144,7 @@ def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
 
 
 def test_control_a_law_that_is_there_stays_beside_an_effect():
-    material = Thixotropic(Giesekus(0.3, 100.0, 1.0), 0.3, 5.0)
+    material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
     found = found_beside(material, ("ucm", "giesekus"), ["thixotropy"])
     assert [stage.effect for stage in found.stages] == ["thixotropy"]
     assert found.laws[0].law == "giesekus"

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from discover.dataset import Run
-from discover.effects import ConstitutiveEffect, make_effect
-from discover.forward import AugmentedModel, Batch, data_scales, make_batch
+from discover.effects import make_effect
+from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, intervals
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees
 from discover.inference.evidence import INDISTINGUISHABLE
-from discover.inference.problem import FitProblem
+from discover.inference.problem import FitProblem, effect_of
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
@@ -31,6 +31,9 @@ _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 """Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
 
 _MOST_TERMS = 3
+
+_STARTS = (1.0, 10.0)
+"""Multiples of an effect's first trial, which is the size from which it shows."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,7 @@ def fit_law_by_mode(
     )
     return LawByMode(
         constants,
-        _what_is_left(forward, fit, problem.batch, fitted, expectation),
+        _what_is_left(problem, fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
     )
@@ -170,10 +173,7 @@ def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
         terms = row["support"]
         if not 0 < len(terms) <= _MOST_TERMS or set(terms) & {*_OF_THE_SPECTRUM} or row["inner"]:
             continue
-        names = tuple(map(_effect_of, terms, row["coefficients"]))
-        effects = [make_effect(name) for name in names]
-        if all(isinstance(e, ConstitutiveEffect) and e.adds_term for e in effects):
-            sets.append(names)
+        sets.append(tuple(map(_effect_of, terms, row["coefficients"])))
     return list(dict.fromkeys(sets))
 
 
@@ -194,48 +194,41 @@ def _fitted(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, D
     for factor in _STARTS:
         start = model.zero()
         for name in names:
-            parameter = make_effect(name).parameters[0]
-            start[model.positions(name)[0]] = factor * parameter.first_trial
+            amplitude = effect_of(model, name).parameters[0]
+            start[model.positions(name)[0]] = factor * amplitude.first_trial
         starts.append(start)
     fit = problem.best_fit(starts, free)
     degrees = {name: Degree() for name in names}
     return choose_degrees(problem, fit, degrees) if fit.usable else (fit, degrees)
 
 
-_STARTS = (1.0, 10.0)
-"""Multiples of an effect's first trial, which is the size from which it shows."""
-
-
 def _worth_of(law: SparseLaw, problem: FitProblem, runs: Sequence[Run], effective: float) -> float:
     """Return the criterion of a law by what it leaves of the fitted runs."""
-    cost = sum(
-        _relative_error(predicted, run) ** 2
+    off = (
+        (predicted - run.recorded) / run.sizes(run.recorded)
         for predicted, run in zip(law.predicted, runs, strict=True)
     )
+    cost = sum(float(np.mean(one**2)) for one in off)
     return problem.criterion(cost, range(law.n_constants), law.terms, effective)
 
 
-def _relative_error(predicted: np.ndarray, run: Run) -> float:
-    off = (predicted[: len(run)] - run.recorded) / run.sizes(run.recorded)
-    return float(np.sqrt(np.mean(off**2)))
-
-
 def _what_is_left(
-    model: AugmentedModel, fit: Fit, batch: Batch, runs: Sequence[Run], expectation: Expectation
+    problem: FitProblem, fit: Fit, runs: Sequence[Run], expectation: Expectation
 ) -> LackOfFit:
-    predicted = model.predict(fit.theta, batch)
-    residuals = [p[: len(r)] - r.recorded for p, r in zip(predicted, runs, strict=True)]
+    rows = zip(fit.residual, problem.weight, strict=True)
+    residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
     even = [1.0 / run.sizes(run.recorded) for run in runs]
     return lack_of_fit(residuals, [run.recorded for run in runs], expectation, None, even)
 
 
 def _errors(model: AugmentedModel, fit: Fit, runs: Sequence[Run]) -> dict[str, float | None]:
-    errors: dict[str, float | None] = {}
     if not runs:
-        return errors
+        return {}
     with np.errstate(over="ignore", invalid="ignore"):
         # a law may run away in a held-out flow
-        for run, predicted in zip(runs, model.predict(fit.theta, make_batch(runs)), strict=True):
-            error = _relative_error(predicted, run)
-            errors[run.name] = error if np.isfinite(error) else None
-    return errors
+        residual = model.residuals([fit.theta], make_batch(runs))[0]
+        errors = np.sqrt(np.sum(residual**2, axis=1))
+    return {
+        run.name: float(error) if np.isfinite(error) else None
+        for run, error in zip(runs, errors, strict=True)
+    }

@@ -8,7 +8,7 @@ import numpy as np
 from discover.comparison.judging.declared_constants import OtherConstant, other_gain
 from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.judging.identifiability import SEPARATED
-from discover.comparison.judging.statements import WIDEST, Statement
+from discover.comparison.judging.statements import IN_NOISE, WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.learners.tensor_dense.mixture import FITS
@@ -22,9 +22,6 @@ _FLOOR = 1e-3
 
 _OUTSIDE = 0.1
 """Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
-
-_IN_NOISE = 2.0
-"""A sample is outside that is so many times the noise off a band of the curve."""
 
 
 def open_where_dense_is_wide(
@@ -127,7 +124,7 @@ def without_refuted_bands(
         if flow.kind != "held_out" or flow.is_truth or limits is None or record is None:
             continue
         low, high = limits["sigma12"]
-        allowed = _IN_NOISE * noise * np.sqrt(np.mean(np.asarray(record) ** 2))
+        allowed = IN_NOISE * noise * np.sqrt(np.mean(np.asarray(record) ** 2))
         share = float(np.mean(np.abs(record - np.clip(record, low, high)) > allowed))
         if share > _OUTSIDE:
             bands[flow.key] = None
@@ -144,13 +141,18 @@ def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Fl
     widths = [w for f in flows if (w := dense.half_widths(f).get(quantity)) is not None]
     if not widths:
         return statement
-    of = "N1" if quantity == "N2" else "its size"
+    of = _size_of(quantity)
     told = (
         f"The dense library's band (± {percent_of(max(widths))} of {of} at the widest) holds 95 % "
         "of its laws that fit σ12. It is no claim about a fluid unlike all of them, nor about one "
         "behind an instrument with a flaw."
     )
     return replace(statement, text=f"{statement.text} {told}")
+
+
+def _size_of(quantity: str) -> str:
+    """Return in words in units of what a half-width is told."""
+    return "N1" if quantity == "N2" else "its size"
 
 
 def _held(
@@ -160,7 +162,7 @@ def _held(
     flows: Sequence[Flow],
 ) -> Statement:
     quantity = statement.quantity
-    of = "N1" if quantity == "N2" else "its size"
+    of = _size_of(quantity)
     widest = 0.0
     for flow in flows:
         width = dense.half_widths(flow).get(quantity)

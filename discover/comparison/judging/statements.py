@@ -46,7 +46,7 @@ _UNTESTED = (
     "One run was fitted and none held out, so no other flow tested the law, and {} is not "
     "determined. Fit another run, or hold one out."
 )
-_IN_NOISE = 2.0
+IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
 
@@ -178,7 +178,7 @@ def check_band(
             continue
         low, high = band.rivals_low[:, column], band.rivals_high[:, column]
         outside = float(np.linalg.norm(reference - np.clip(reference, low, high))) / size
-        allowed = SEPARATED if flow.is_truth else max(SEPARATED, _IN_NOISE * noise)
+        allowed = SEPARATED if flow.is_truth else max(SEPARATED, IN_NOISE * noise)
         if not outside <= allowed and outside > off:
             missed, off = flow.title, outside
     return BandCheck(half_width, missed, off)
@@ -250,7 +250,7 @@ def one_run(flows: Sequence[Flow]) -> bool:
     flows
         All flows.
     """
-    return [flow.kind for flow in flows if flow.kind in ("training", "held_out")] == ["training"]
+    return [flow.kind for flow in _measured(flows)] == ["training"]
 
 
 def only_states(flows: Sequence[Flow]) -> bool:
@@ -261,8 +261,12 @@ def only_states(flows: Sequence[Flow]) -> bool:
     flows
         All flows.
     """
-    measured = [flow for flow in flows if flow.kind in ("training", "held_out")]
+    measured = _measured(flows)
     return bool(measured) and all(flow.is_of_states for flow in measured)
+
+
+def _measured(flows: Sequence[Flow]) -> list[Flow]:
+    return [flow for flow in flows if flow.kind in ("training", "held_out")]
 
 
 def claimed(
