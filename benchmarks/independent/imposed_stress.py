@@ -1,6 +1,6 @@
-"""Creep and recovery: the strain with which a fluid and its solvent answer a stress, by scipy."""
+"""Creep, recovery, oscillation: the strain with which a fluid and its solvent answer a stress, by scipy."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,7 +10,7 @@ from independent.material import RateLaw
 
 def strain_at(
     law: RateLaw,
-    levels: Sequence[tuple[float, float]],
+    levels: Sequence[tuple[float, float | Callable[[float], float]]],
     solvent_viscosity: float,
     times: np.ndarray,
 ) -> np.ndarray:
@@ -21,7 +21,8 @@ def strain_at(
     law
         Of the modes.
     levels
-        Pairs of the time in s from which, and of the stress in Pa; the first from 0.
+        Pairs of the time in s from which, and of the stress in Pa, a number or a function of the time;
+        the first from 0.
     solvent_viscosity
         In Pa s, positive: by it the rate follows from what of the stress the modes do not carry.
     times
@@ -35,7 +36,8 @@ def strain_at(
 
         def change(t, scaled, stress=stress):
             values = (scale * scaled)[:-1]
-            rate = (stress - law.stress(values, 0.0)[0, 1]) / solvent_viscosity
+            imposed = stress(t) if callable(stress) else stress
+            rate = (imposed - law.stress(values, 0.0)[0, 1]) / solvent_viscosity
             return np.append(law.change(values, rate), rate) / scale
 
         here = times[(times > begin) & (times <= end)]

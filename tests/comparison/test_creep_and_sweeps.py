@@ -51,6 +51,17 @@ def creep(law, stress, off=None):
     )  # fmt: skip
 
 
+def oscillation_of_stress(law, stress):
+    """Two cycles from rest; the rate is that of the noisy strain, as a file without one has it."""
+    times = np.linspace(0.0, 4.0 * np.pi, 81)[1:]
+    strain = strain_at(law, [(0.0, lambda t: stress * np.sin(t))], SOLVENT, times)
+    strain, imposed = noisy(strain, int(stress)), stress * np.sin(times)
+    return dc.Run(
+        f"oscillation_{stress:g}", times, imposed_stress(times, imposed),
+        np.gradient(strain, times), imposed, strain=strain,
+    )  # fmt: skip
+
+
 def sweep(law, strain):
     n = len(strain)
     moduli = np.array([modulus_of(law, each, 2.0, 12) for each in strain])
@@ -168,6 +179,13 @@ def test_small_stress_and_small_strain_give_no_term_and_determine_nothing(runs):
     found = compared(runs())
     assert not found.outcomes["tensor_sindy"].terms
     assert {"N1", "N2"} <= set(found.undetermined)
+
+
+@pytest.mark.slow
+def test_an_oscillation_of_the_stress_is_explained_by_the_law_that_made_it():
+    found = compared([oscillation_of_stress(GIESEKUS, stress) for stress in (30.0, 80.0)])
+    assert found.explanation.verdict == "explained"
+    assert [term.term for term in found.outcomes["tensor_sindy"].terms] == ["sigma.sigma"]
 
 
 @pytest.mark.slow
