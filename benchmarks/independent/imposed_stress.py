@@ -1,4 +1,4 @@
-"""Creep, recovery, oscillation: the strain with which a fluid and its solvent answer a stress, by scipy."""
+"""The strain with which a fluid and its solvent answer a stress, by scipy."""
 
 from collections.abc import Callable, Sequence
 
@@ -21,8 +21,8 @@ def strain_at(
     law
         Of the modes.
     levels
-        Pairs of the time in s from which, and of the stress in Pa, a number or a function of the time;
-        the first from 0.
+        Pairs of the time in s from which, and of the stress in Pa, a number or a function of
+        time; the first from 0.
     solvent_viscosity
         In Pa s, positive: by it the rate follows from what of the stress the modes do not carry.
     times

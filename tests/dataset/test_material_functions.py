@@ -5,10 +5,7 @@ import pytest
 
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
-from discover.dataset.material_functions import as_compared
-from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.protocols import imposed_stress
 from discover.study import parse_study
 from discover.study.data import load_study_data
 from discover.study.in_memory import data_in_memory
@@ -192,7 +189,7 @@ def test_an_estimator_takes_creep_as_its_strain_and_a_sweep_as_its_moduli(tmp_pa
     assert [run.name for run in as_runs(taken)] == [run.name for run in taken]
 
 
-def test_an_estimator_takes_a_flow_curve_as_it_is_and_follows_the_rate_of_a_given_stress(tmp_path):
+def test_an_estimator_takes_a_flow_curve_as_it_is_and_imposes_a_given_stress(tmp_path):
     from discover.learners.runs import as_runs
 
     curve = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
@@ -204,20 +201,7 @@ def test_an_estimator_takes_a_flow_curve_as_it_is_and_follows_the_rate_of_a_give
     files = {"runs.csv": "file,control\nwave.csv,stress\n"}
     files["wave.csv"] = "\n".join(["time_s,stress_Pa,strain", *rows])
     wave = load_dataset(write(tmp_path, files))["wave.csv"]
-    (followed,) = as_runs([wave])
-    assert (wave.quantity, followed.quantity) == ("strain", "sigma12")
-    # the slope of 1 − cos is sin; a moving cubic over 15 samples is good to a per cent
-    np.testing.assert_allclose(followed.rate[10:-10], np.sin(times)[10:-10], atol=0.01)
-
-
-def test_a_stress_that_oscillates_is_imposed_on_every_law_as_one_that_jumps_is():
-    times = np.linspace(0.1, 6.0, 60)
-    stress = 50.0 * np.sin(times)
-    strain = 0.4 * np.sin(times - 0.5)
-    run = Run(
-        "stress", times, imposed_stress(times, stress), np.gradient(strain, times), stress,
-        strain=strain,
-    )  # fmt: skip
-    (taken,) = as_compared([run])
-    assert taken.protocol.control == "stress"
-    np.testing.assert_allclose(taken.recorded, strain)
+    (imposed,) = as_runs([wave])
+    # a rate derived from a noisy strain errs smoothly, and that looks like a missing term
+    assert (imposed.protocol.control, imposed.quantity) == ("stress", "strain")
+    np.testing.assert_array_equal(imposed.recorded, wave.strain)
