@@ -142,15 +142,6 @@ def paced_by(
     return replace(protocol, table_strains=jnp.asarray(recorded))
 
 
-def jumps(protocol: FlowProtocol) -> bool:
-    """Return whether a stress that is imposed jumps at any time, as in creep and in recovery."""
-    if protocol.control != "stress":
-        return False
-    width = np.diff(np.asarray(protocol.table_times))
-    # a jump takes a small share of the time to the next sample
-    return jumps_at_start(protocol) or bool(np.any(width[:-1] < 2.0 * _AT_ONCE * width[1:]))
-
-
 def jumps_at_start(protocol: FlowProtocol) -> bool:
     """Return whether a stress is imposed at once at t = 0, as in creep."""
     return protocol.control == "stress" and float(protocol.begins) < 0.0
