@@ -1,6 +1,7 @@
 """The final model, as the result of a closed loop holds it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -56,7 +57,8 @@ def stage_of(
         for p, at in zip(effect.parameters, model.positions(name), strict=True)
     }
     if by_mode is not None:
-        parameters[effect.parameters[0].name] = by_mode
+        first = effect.parameters[0].name
+        parameters[first] = with_shared_interval(by_mode, parameters[first])
     return Stage(
         effect=name,
         kind=effect.kind,
@@ -72,6 +74,24 @@ def stage_of(
         source=effect.source,
         check=effect.check,
     )
+
+
+def with_shared_interval(by_mode: ConstantByMode, shared: StageParameter) -> ConstantByMode:
+    """Return a constant by mode with the interval that all modes share, where they share one.
+
+    Parameters
+    ----------
+    by_mode
+        The constant with what is known of each mode.
+    shared
+        The constant as fitted for all modes: its interval over all explanations is held too, and
+        that given the effects takes it that all modes have the same.
+    """
+    if by_mode.degree:
+        return by_mode
+    ends = np.array([by_mode.ci95, shared.ci95])
+    held = float(ends[:, 0].min()), float(ends[:, 1].max())
+    return replace(by_mode, ci95=held, ci95_given_effects=shared.ci95_given_effects)
 
 
 def declared_parameters(

@@ -26,6 +26,7 @@ from discover.closed_loop.final_model import (
     declared_parameters,
     stage_of,
     states_of,
+    with_shared_interval,
 )
 from discover.closed_loop.free_form import free_forms
 from discover.closed_loop.free_in_model import free_functions_in_model
@@ -179,8 +180,8 @@ def run_loop(
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, fitted_runs, current, bounds, unknown)
     by_mode = constants_by_mode(model, batch, current, bounds, search.degrees, search.prior)
+    by_mode |= ended.by_mode
     differ = {name for name, found in by_mode.items() if found.degree}
-    of_law = {p.name: by_mode[p.name] for p in declared.free_parameters if p.name in by_mode}
     after = errors_of(records, len(thetas) - 1)
     held = None
     if held_batch is not None:
@@ -211,6 +212,12 @@ def run_loop(
             min((one.criterion for one in times), default=np.inf),
         )  # fmt: skip
     over_all = over_explanations(bounds, model, current, carried, side_by_side)
+    constants = declared_parameters(declared, current, (bounds, over_all))
+    of_law = {
+        name: with_shared_interval(by_mode[name], one)
+        for name, one in constants.items()
+        if name in by_mode
+    }
     stages = tuple(
         stage_of(search, name, (bounds, over_all), errors_of(records, i), by_mode.get(name))
         for i, name in enumerate(active, start=1)
@@ -271,7 +278,7 @@ def run_loop(
         },
         rankings=tuple(search.rankings),
         records=tuple(records),
-        declared_parameters=declared_parameters(declared, current, (bounds, over_all)) | of_law,
+        declared_parameters=constants | of_law,
         declared_effects=declared_effects(model, current, bounds, by_mode),
         declared_law=None if differ & {*of_law} else declared_law(declared, current),
         explanations=side_by_side,

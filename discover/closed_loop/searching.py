@@ -1,7 +1,7 @@
 """The search for what the runs lack, from a declared law or from one that is chosen on the way."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from discover.closed_loop.candidates import admission
@@ -9,6 +9,7 @@ from discover.closed_loop.explanations import Carried, search_and_carry
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law, law_beside_effects
+from discover.closed_loop.modes_apart import modes_apart
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
@@ -17,6 +18,7 @@ from discover.dataset import Run
 from discover.effects import BY_MODE, AbstractEffect
 from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.forward.declared import may_differ_by_mode
+from discover.inference.constants import ConstantByMode
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.problem import effect_of
 from discover.statistics.residual import Expectation
@@ -36,12 +38,15 @@ class SearchResult:
         The search, with what it found.
     carried
         The sets of effects that explain the records; none of silent ones.
+    by_mode
+        What is known of each mode's constant, where one for all modes explains the records.
     """
 
     declared: DeclaredModel
     laws: tuple[LawFit, ...]
     search: Search
     carried: list[Carried]
+    by_mode: Mapping[str, ConstantByMode] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,8 @@ class SearchTask:
         A law chosen while effects were missing may stand for a part of them. So the laws are fitted
         once more beside what was found, and another is searched beside and taken if that is
         likelier. Where what was found does not explain the runs, its constants may differ from mode
-        to mode: that is searched once more too, and taken on strong evidence.
+        to mode: that is searched once more too, and taken on strong evidence. Where it does, what
+        it leaves open of each mode's constant is looked at beside it.
 
         Parameters
         ----------
@@ -124,8 +130,13 @@ class SearchTask:
             name for name in search.active if may_differ_by_mode(effect_of(search.model, name))
         ]
         alike = len(declared.modulus) < 2 or declared.by_mode
-        if alike or not names or search.explained:
+        if alike or not names:
             return first
+        if search.explained:
+            self.say(f"what the runs say of {', '.join(names)} in each mode")
+            apart = modes_apart(search, names, data_scales(self.fitted))
+            if apart is None or apart.evidence <= INDISTINGUISHABLE:
+                return first if apart is None else replace(first, by_mode=apart.constants)
         self.say(f"constants that may differ from mode to mode: {', '.join(names)}")
         apart = replace(declared, by_mode=tuple(names))
         again = self._from(apart, first.laws, f"{self.name}_by_mode")

@@ -1,7 +1,7 @@
 """The constant of each mode as finally fitted, and whether the data say anything of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -38,8 +38,9 @@ def constants_by_mode(
 ) -> dict[str, ConstantByMode]:
     """Return the constants by mode of a final fit.
 
-    The interval of a mode holds that of the chosen degree and that of one degree more, where there
-    is one: evidence for the lower degree does not say that the next coefficient is zero.
+    The interval of a mode, and that at the mean time, holds that of the chosen degree and that of
+    one degree more, where there is one: evidence for the lower degree does not say that the next
+    coefficient is zero.
 
     Parameters
     ----------
@@ -62,6 +63,7 @@ def constants_by_mode(
             continue
         constant = _Constant(law, at, declared.by_mode_slices[name].start, places)
         low, high, half = constant.band(batch, fit, of.degree)
+        mean = bounds[constant.at]
         if of.degree + 1 < len(of.evidence):
             free = (*fit.free, constant.start + of.degree)
             wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
@@ -69,6 +71,8 @@ def constants_by_mode(
                 more = constant.band(batch, wider, of.degree + 1)
                 low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
                 half = np.maximum(half, more[2])
+                (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider, of.degree + 1)
+                mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
         own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)
         values = constant.of_modes(fit)
@@ -77,7 +81,7 @@ def constants_by_mode(
         each = zip(times, values, low, high, known, strict=True)
         found[name] = ConstantByMode(
             float(fit.theta[constant.at]),
-            bounds[constant.at],
+            mean,
             "",
             float(times[0] / 10.0 ** places[0]),
             of.degree,
@@ -98,6 +102,11 @@ class _Constant:
     at: int
     start: int
     places: Float[np.ndarray, " k"]
+
+    @property
+    def at_the_mean(self) -> "_Constant":
+        """The same constant at the mean time alone."""
+        return replace(self, places=np.zeros(1))
 
     def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
         """Return the constant of each mode, moved on the link's scale."""

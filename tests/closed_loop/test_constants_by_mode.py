@@ -230,7 +230,7 @@ def test_the_picture_says_what_is_determined_and_what_is_not():
     drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).by_mode, False)
     assert drawn is not None
     assert "Not determined by these data in the modes of 0.05 s" in drawn.caption
-    assert by_mode_picture(loop((0.3, 0.3, 0.3), by_mode=()).by_mode, False) is None
+    assert by_mode_picture({}, False) is None
 
 
 def test_a_law_by_mode_is_written_out_with_the_constants_of_each():
@@ -270,10 +270,10 @@ def test_what_cannot_differ_by_mode_is_refused(options, text):
         dc.close_loop(data((0.3, 0.3, 0.3)), base, **({"free": ["alpha"]} | options))
 
 
-def told_maxwell(mobilities):
+def told_maxwell(mobilities, rates=RATES):
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
     asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2}
-    return dc.close_loop(data(mobilities), base, held_out=["4.0"], **asked)
+    return dc.close_loop(data(mobilities, rates), base, held_out=[f"{rates[2]}"], **asked)
 
 
 def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_for():
@@ -287,4 +287,19 @@ def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_f
 def test_control_one_constant_that_explains_the_runs_stays_one():
     result = told_maxwell((0.3, 0.3, 0.3))
     assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
-    assert result.by_mode == {}
+    one = result.by_mode["giesekus_mobility"]
+    assert one.degree == 0
+    assert one.ci95[0] <= one.ci95_given_effects[0] < one.ci95_given_effects[1] <= one.ci95[1]
+    # every mode is stretched in some run, so that the data say much of each
+    assert all(mode.ci95[0] < 0.3 < mode.ci95[1] < 0.5 for mode in one.modes)
+
+
+def test_one_constant_that_explains_slow_runs_is_not_claimed_of_modes_that_they_do_not_stretch():
+    result = told_maxwell((0.1, 0.3, 0.6), rates=(0.1, 0.2, 0.4))
+    one = result.by_mode["giesekus_mobility"]
+    assert result.verdict == "effects_added"
+    assert one.degree == 0
+    # the interval that all modes share is a hundredth wide, and wrong for two of the three
+    assert one.ci95_given_effects[1] < 0.3
+    for mode, mobility in zip(one.modes, (0.1, 0.3, 0.6), strict=True):
+        assert mode.left_open or mode.ci95[0] < mobility < mode.ci95[1]

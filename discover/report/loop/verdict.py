@@ -111,10 +111,12 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
 
 
 def named(name: str, parameter: StageParameter) -> str:
-    """Return a parameter's name in the field's letters, and of one by mode, at which time it is."""
+    """Return a parameter's name in the field's letters, and of one by mode, what it stands for."""
     text = readable(name.replace("_", " "))
-    if not isinstance(parameter, ConstantByMode) or not parameter.degree:
+    if not isinstance(parameter, ConstantByMode):
         return text
+    if not parameter.degree:
+        return f"{text} (one for all modes; the interval lets them differ)"
     time = significant(parameter.mean_time_s, 3)
     return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"
 

@@ -16,7 +16,9 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
-from discover.report.wording import effect_title, readable, significant
+from discover.report.wording import effect_title, interval, readable, significant
+
+_FEW = 3  # modes, each of which is told
 
 _DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
 
@@ -98,7 +100,7 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     tried = tried if len(gains) > 1 else f" (evidence over one constant, linear: {gains[0]})"
     text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
     if not constant.degree:
-        return f"{text}: {significant(constant.value, 2)}. These data show no difference."
+        return f"{text}: {significant(constant.value, 2)}. {_allowed(constant)}"
     known = [mode for mode in constant.modes if not mode.left_open]
     if not known:
         return f"{text}, and not determined by these data in any mode."
@@ -108,3 +110,22 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     if open_ones:
         text += f" Not determined by these data in the modes of {', '.join(open_ones)} s."
     return text
+
+
+def _allowed(constant: ConstantByMode) -> str:
+    """Return by how much modes may still differ where one constant serves for all."""
+    said = "These data show no difference"
+    each = sorted(constant.modes, key=lambda mode: mode.relaxation_time_s)
+    known = [mode for mode in each if mode.ci95 is not None]
+    if not known:
+        return f"{said}, and determine it in no single mode."
+    if len(known) > _FEW:
+        # at which the least and the most is known
+        known = sorted(known, key=lambda mode: np.ptp(mode.ci95))[:: len(known) - 1]
+    ranges = [
+        f"{interval(mode.ci95)} in the mode of {significant(mode.relaxation_time_s, 2)} s"
+        for mode in known
+    ]
+    text = f"{said}, and allow {' and '.join(ranges)}"
+    left = [significant(mode.relaxation_time_s, 2) for mode in each if mode.ci95 is None]
+    return f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."

@@ -1,0 +1,90 @@
+"""What the runs say of each mode's constant, where one constant for all modes explains them.
+
+One constant that meets the noise does not show that the modes share it. A mode that the flow hardly
+stretches may have any, and the interval of the common one, which takes it for granted, says nothing
+of that.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from discover.closed_loop.search import Search
+from discover.forward import AugmentedModel
+from discover.forward.least_squares import Prior, intervals
+from discover.forward.modulus_errors import modulus_shifts
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.constants import ConstantByMode
+from discover.inference.degrees import Degree, choose_degrees
+from discover.inference.problem import FitProblem, effect_of
+
+
+@dataclass(frozen=True)
+class ModesApart:
+    """Constants of a search, as far as they may differ from mode to mode.
+
+    Attributes
+    ----------
+    constants
+        By name of the parameter or the effect, with an interval for each mode that holds those of
+        one constant for all modes and of one that is linear in log λ.
+    evidence
+        The strongest for any of them to differ, see `discover.inference.evidence`.
+    """
+
+    constants: dict[str, ConstantByMode]
+    evidence: float
+
+
+def modes_apart(
+    search: Search, names: Sequence[str], scales: Mapping[str, float]
+) -> ModesApart | None:
+    """Return what a search left open of constants by mode; None where it cannot be fitted.
+
+    Beside the effects that were found, no others: a program of those alone compiles fast.
+
+    Parameters
+    ----------
+    search
+        A finished search in a fluid of several modes, none of whose constants may differ so far.
+    names
+        Of free parameters of the law, and of effects in the model that may differ by mode.
+    scales
+        Of the data, as the model of the search has them.
+    """
+    before = search.model
+    declared = replace(before.declared, by_mode=tuple(names))
+    active = [effect_of(before, name) for name in search.active]
+    model = AugmentedModel(declared, active, scales)
+    places = _places(before, model, search.active)
+    prior = search.prior
+    kept = [i for i, at in enumerate(prior.positions) if at in places]
+    known = Prior(
+        tuple(places[prior.positions[i]] for i in kept),
+        tuple(prior.mean[i] for i in kept),
+        tuple(prior.weight[i] for i in kept),
+    )
+    problem = FitProblem(model, search.batch, 1, known)
+    start = model.zero()
+    start[[*places.values()]] = search.fit.theta[[*places]]
+    fit = problem.fit(start, [places[at] for at in search.fit.free])
+    if not fit.usable:
+        return None
+    alike = {name: Degree() for name in names}
+    _, chosen = choose_degrees(problem, fit, alike)
+    evidence = max(max(one.evidence) for one in chosen.values())
+    alike = {name: Degree(0, one.evidence) for name, one in chosen.items()}
+    shifts = modulus_shifts(model, fit.theta, search.batch)
+    bounds = intervals(model, search.batch, fit, shifts)
+    found = constants_by_mode(model, search.batch, fit, bounds, alike, known)
+    return ModesApart(found, float(evidence))
+
+
+def _places(before: AugmentedModel, model: AugmentedModel, active: Sequence[str]) -> dict[int, int]:
+    """Return where each parameter of a model stands in one with constants by mode."""
+    first = 2 + len(before.declared.free_parameters)
+    places = {at: at for at in range(first)}
+    for name in [*(known.name for known in before.declared.effects), *active]:
+        places |= dict(zip(before.positions(name), model.positions(name), strict=True))
+    instants = range(before.instants.start, before.instants.stop)
+    places |= dict(zip(instants, range(model.instants.start, model.instants.stop), strict=True))
+    return places
