@@ -11,6 +11,14 @@ from pathlib import Path
 # when it is first imported, which is why it stands here and not in the function.
 os.environ.setdefault("EQX_ON_ERROR", "nan")
 
+# What XLA starts piece by piece, in threads that wait for one another, at every step of a loop. The
+# loops here are thousands of steps on arrays of a few hundred numbers: as one piece of machine code
+# each they take half the processor, and fits side by side do not disturb one another. XLA reads
+# this when it compiles first, and has no such option for one program.
+_WHOLE_LOOPS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
+if "xla_backend_extra_options" not in (_flags := os.environ.get("XLA_FLAGS", "")):
+    os.environ["XLA_FLAGS"] = f"{_flags} {_WHOLE_LOOPS}".strip()
+
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     """Let JAX keep what it compiled, so that a second start does not compile again.

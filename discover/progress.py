@@ -1,6 +1,9 @@
 """One shape of progress, for everything that takes long."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from threading import Event
 
 from discover.errors import InputError
 
@@ -27,6 +30,36 @@ def checked(progress: Progress | None) -> Progress | None:
         "progress must be a function of a text and the fraction done, such as "
         f"lambda text, fraction: print(text); got {progress!r}."
     )
+
+
+class Stopped(BaseException):
+    """What ends work that nobody waits for any more; no error, so that nothing takes it for one."""
+
+
+_stop: ContextVar[Event | None] = ContextVar("stop", default=None)
+
+
+@contextmanager
+def may_be_stopped(stop: Event) -> Iterator[None]:
+    """Let what this thread does be ended by an event, where it asks `require_wanted`."""
+    before = _stop.set(stop)
+    try:
+        yield
+    finally:
+        _stop.reset(before)
+
+
+def require_wanted() -> None:
+    """Go on only if somebody still waits for what this thread computes.
+
+    Raises
+    ------
+    Stopped
+        If nobody does.
+    """
+    stop = _stop.get()
+    if stop is not None and stop.is_set():
+        raise Stopped
 
 
 def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from discover.comparison.at_once import at_once
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
 from discover.comparison.fitting.further_laws import fit_further_laws
 from discover.comparison.fitting.law_by_mode import LawByMode, SparseLaw, fit_law_by_mode
@@ -45,6 +47,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
+from discover.progress import Progress
 from discover.statistics.residual import Expectation
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
@@ -113,20 +116,16 @@ def judge(
     repeats = repeats_among(list(known.before.data.dataset))
     expectation = expectation_of(study, known.before.model, repeats)
     explanation = explain(outcomes, flows, expectation, normal, repeats)
-    say("rivals: simulating laws that the data do not rule out")
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     fitted = [flow for flow in flows if flow.kind == "training"]
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")] or fitted
-    rivals, structure, following = [], None, NextMeasurement()
+    following = NextMeasurement()
+    beside = _Beside((), None, ())
+    if explanation.verdict != "no_signal":
+        beside = _beside(study, known, library, chosen, frame, say)
+    rivals, structure = beside.rivals, beside.structure
     others: list[OtherConstant] = []
     own_bands: Mapping[str, PredictionBand] = {}
-    if chosen is not None and explanation.verdict != "no_signal":
-        met = chosen.details.get("rivals", ())
-        rivals = find_rivals(
-            chosen.terms, met, frame.model, frame.flows, library, chosen.predictions
-        )
-        runs = frame.data.fit.runs
-        structure = structure_of(chosen.terms, runs, library, frame.model, normal)
     if chosen is not None and explanation.in_library:
         # where a quantity is said to be determined, its band says how well
         keys = {flow.key for flow in (*judged, *fitted)}
@@ -149,14 +148,9 @@ def judge(
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
-    classical: Sequence[ClassicalFit] = ()
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         statements = open_where_dense_is_wide(statements, outcomes, judged)
-        say("the classical laws on the same runs")
-        # the criterion of the sparse law counts these, and both stand in one column
-        independent = None if chosen is None else chosen.details.get("n_independent")
-        classical = _classical(study, known, independent)
     by_mode = None
     # of normal stresses that were fitted too a law by mode says nothing
     if not (chosen is None or silent_records or normal or study.compare.quick):
@@ -175,7 +169,7 @@ def judge(
         structure,
         statements,
         replace(following, bands=claimed(bands, statements, flows)),
-        classical,
+        () if silent_records else beside.classical,
         ()
         if silent_records
         else (
@@ -185,6 +179,48 @@ def judge(
         ),
         by_mode,
     )
+
+
+class _Beside(NamedTuple):
+    """What is looked at beside the laws found, for the fields of `Judgement` of the same names."""
+
+    rivals: Sequence[Rival]
+    structure: Structure | None
+    classical: Sequence[ClassicalFit]
+
+
+def _beside(
+    study: Study,
+    known: Known,
+    library: TermLibrary,
+    chosen: LearnerOutcome | None,
+    frame: Frame,
+    say: Callable[[str], None],
+) -> _Beside:
+    """Return rivals, structure and classical laws, which need nothing of one another."""
+
+    def classical(tell: Progress) -> Sequence[ClassicalFit]:
+        tell("fitted to the same runs", 0.0)
+        # the criterion of the sparse law counts these, and both stand in one column
+        return _classical(study, known, chosen and chosen.details.get("n_independent"))
+
+    def rivals(tell: Progress) -> Sequence[Rival]:
+        assert chosen is not None
+        tell("simulating laws that the data do not rule out", 0.0)
+        met, model = chosen.details.get("rivals", ()), frame.model
+        return find_rivals(chosen.terms, met, model, frame.flows, library, chosen.predictions)
+
+    def structure(tell: Progress) -> Structure:
+        assert chosen is not None
+        tell("what the runs can tell of it", 0.0)
+        runs, normal = frame.data.fit.runs, study.compare.use_normal_stresses
+        return structure_of(chosen.terms, runs, library, frame.model, normal)
+
+    parts: dict[str, Callable[[Progress], Any]] = {"the classical laws": classical}
+    if chosen is not None:
+        parts |= {"rivals": rivals, "the library": structure}
+    found = at_once(parts, lambda text, _: say(text))
+    return _Beside(found.get("rivals", ()), found.get("the library"), found["the classical laws"])
 
 
 def _by_mode(

@@ -1,9 +1,10 @@
 """What each learner finds, kept as it is found, so that a run that was stopped can go on."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from discover.comparison.at_once import at_once
 from discover.comparison.fitting.sampled_rates import with_sampled_rates
 from discover.comparison.fitting.training import train
 from discover.comparison.instrument import Learned
@@ -15,6 +16,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law
+from discover.learners.registry import BUILT_IN
 from discover.learners.result import LearnerResult
 from discover.progress import Progress
 from discover.study.run_folder import RunFolder
@@ -41,6 +43,38 @@ class Learning:
     seed: int
     store: RunFolder | None = None
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
+
+    def outcomes(
+        self, learners: Sequence[str], known: Known, progress: Progress
+    ) -> dict[str, LearnerOutcome]:
+        """Return what each learner finds, those of this package side by side.
+
+        Whether another one may share a process with threads is not known, so they come after.
+
+        Parameters
+        ----------
+        learners
+            Their names.
+        known, progress
+            As in `outcome`.
+        """
+        if known.along is not None:
+            _ = known.along.twins  # once, and not in every thread
+
+        def part(learner: str) -> Callable[[Progress], LearnerOutcome]:
+            return lambda say: self.outcome(learner, known, say)
+
+        ours = [one for one in learners if one in BUILT_IN]
+        others = [[one] for one in learners if one not in BUILT_IN]
+        found: dict[str, LearnerOutcome] = {}
+        for group in [ours, *others] if ours else others:
+            done, share = len(found) / len(learners), len(group) / len(learners)
+
+            def say(text: str, fraction: float, done: float = done, share: float = share) -> None:
+                progress(text, done + share * fraction)
+
+            found |= at_once({learner: part(learner) for learner in group}, say)
+        return {learner: found[learner] for learner in learners}
 
     def outcome(
         self, learner: str, known: Known, progress: Progress, part: str = ""

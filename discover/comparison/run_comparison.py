@@ -20,7 +20,6 @@ from discover.comparison.instrument.known import Known, known_part
 from discover.comparison.judgement import judge
 from discover.comparison.learning import Learning, distilled, require_teacher, sweep_studies
 from discover.comparison.outcomes.flows import comparison_flows
-from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.outcomes.truth import TrueTerm, true_terms
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
@@ -99,10 +98,12 @@ def compare(
     def step(title: str) -> Progress:
         return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
 
-    own: dict[str, LearnerOutcome] = {}
-    for learner in options.learners:
-        own[learner] = learning.outcome(learner, known, step(learner))
-        done += 1
+    own = learning.outcomes(
+        options.learners,
+        known,
+        lambda text, fraction: progress(text, fraction * len(options.learners) / n_parts),
+    )
+    done += len(own)
     points = []
     for law, value, other in sweep:
         other_data = thinned_to(load_study_data(other, seed), options.most_samples)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -117,10 +118,14 @@ def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
 ):
     from discover.comparison import learning as module
 
-    known = module.train
+    known, kept = module.train, tmp_path / "out" / "state" / "tensor_sindy.json"
 
     def interrupted(learner, *args, **kwargs):
         if learner == "tbnn_ude":
+            # the two are trained side by side: stopped once the other one has ended
+            deadline = time.monotonic() + 60.0
+            while not kept.is_file() and time.monotonic() < deadline:
+                time.sleep(0.01)
             raise KeyboardInterrupt
         return known(learner, *args, **kwargs)
 

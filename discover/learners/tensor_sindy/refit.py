@@ -16,6 +16,7 @@ from discover.learners.trajectories.damped_steps import levenberg_marquardt
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled
+from discover.progress import require_wanted
 
 # One support to a program, and programs side by side in threads: a batch of supports by `vmap`
 # takes as many steps as its slowest member, two to three times the work (`benchmarks/refits.py`).
@@ -200,6 +201,7 @@ def refit(
     One `Fit` each. A support whose start has no finite trajectory comes back with a misfit of
     about 1000, which no search accepts.
     """
+    require_wanted()
     target = np.asarray(problem.weight * problem.target).reshape(-1)
     observed = np.asarray(problem.weight).reshape(-1) > 0
 

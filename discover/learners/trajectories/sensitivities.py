@@ -37,13 +37,18 @@ from tensor_library.kinematics import rate_of_deformation
 
 _LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
 
+_FEW = 10
+"""Sensitivities that are pushed through the terms one by one. The compiler makes one loop of that,
+where it fuses nothing with a product of the small matrix J; but of as many terms the work grows
+with the square."""
+
 
 # Compiled as a part of the whole either way; as a unit of its own it is traced once and not once
 # for every stage of the integration.
 @partial(jax.jit, static_argnums=0)
 def _mode_rates(library, base, active, coefficients, inner, state, rate):
     """Return d/dt of one mode's augmented state (s, 1 + q + m), dimensionless."""
-    stress = state[:, 0]
+    stress, columns = state[:, 0], state[:, 1:]
 
     def stress_rate(stress, inner):
         own = stress_in(stress)
@@ -51,18 +56,20 @@ def _mode_rates(library, base, active, coefficients, inner, state, rate):
         # a law's structure variables stand behind σ, and no term touches them
         terms = jax.vmap(lambda term: as_state(term, stress))(terms)
         known = base.stress_rate(stress, rate)
-        change = known - jnp.tensordot(coefficients, terms, axes=1)
-        return change, (change, terms)
+        return known - jnp.sum(coefficients[:, None] * terms, axis=0), terms
 
-    if library.inner_names:
-        (jacobian, inner_columns), (change, terms) = jax.jacfwd(
-            stress_rate, argnums=(0, 1), has_aux=True
-        )(stress, inner)
-        source = jnp.concatenate([-terms.T, inner_columns], axis=1)
+    change, push, terms = jax.linearize(stress_rate, stress, inner, has_aux=True)
+    push = jax.vmap(push, in_axes=1, out_axes=1)
+    n_terms, size = coefficients.shape[0], stress.shape[0]
+    if columns.shape[1] <= _FEW:
+        along = push(columns, jnp.eye(inner.shape[0], columns.shape[1], n_terms, inner.dtype))
     else:
-        jacobian, (change, terms) = jax.jacfwd(stress_rate, has_aux=True)(stress, inner)
-        source = -terms.T
-    return jnp.concatenate([change[:, None], jacobian @ state[:, 1:] + source], axis=1)
+        unit = jnp.eye(size + inner.shape[0], dtype=stress.dtype)
+        jacobian = push(unit[:size], unit[size:])
+        along = jacobian[:, :size] @ columns
+        along = along.at[:, n_terms:].add(jacobian[:, size:])
+    along = along.at[:, :n_terms].add(-terms.T)
+    return jnp.concatenate([change[:, None], along], axis=1)
 
 
 def _vector_field(t, state, args):

@@ -1,0 +1,42 @@
+"""Loops that the compiler makes one piece of machine code of."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+LOOP = """
+import discover.compilation_cache
+import jax, jax.numpy as jnp, os
+def steps(state):
+    return jax.lax.scan(lambda y, _: (y - 0.1 * jnp.cos(y), None), state, None, 100)[0]
+print("xla_cpu_small_call" in jax.jit(steps).lower(jnp.eye(60)).compile().as_text())
+print(os.environ["XLA_FLAGS"])
+"""
+
+
+def compiled_with(flags):
+    """Whether a loop is one piece, and the options of a process that is given some."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOOP],
+        env={**os.environ, "XLA_FLAGS": flags},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    whole, options = done.stdout.splitlines()
+    return whole == "True", options
+
+
+@pytest.mark.parametrize("flags", ["", "--xla_cpu_use_fusion_emitters=false"])
+def test_a_loop_is_one_piece_beside_what_the_user_chose(flags):
+    whole, options = compiled_with(flags)
+    assert whole
+    assert options.startswith(flags)
+
+
+def test_who_chose_the_same_kind_of_option_keeps_it():
+    chosen = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=0"
+    assert compiled_with(chosen) == (False, chosen)
