@@ -9,7 +9,12 @@ import numpy as np
 from discover.comparison.at_once import at_once
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
 from discover.comparison.fitting.further_laws import fit_further_laws
-from discover.comparison.fitting.law_by_mode import LawByMode, SparseLaw, fit_law_by_mode
+from discover.comparison.fitting.law_by_mode import (
+    LawByMode,
+    SparseLaw,
+    coefficient_in_modes,
+    fit_law_by_mode,
+)
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.declared_constants import (
@@ -30,7 +35,7 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
-from discover.comparison.judging.modes_apart import open_where_modes_differ
+from discover.comparison.judging.modes_apart import open_where_modes_differ, said_of_each_mode
 from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
@@ -151,11 +156,11 @@ def judge(
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         statements = open_where_dense_is_wide(statements, outcomes, judged)
-    by_mode = None
+    by_mode, one_for_all = None, ""
     # of normal stresses that were fitted too a law by mode says nothing
     if not (chosen is None or silent_records or normal or study.compare.quick):
         say("constants that differ from mode to mode")
-        by_mode = _by_mode(chosen, frame, explanation, expectation, len(library))
+        by_mode, one_for_all = _by_mode(chosen, frame, explanation, expectation, len(library))
         statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
@@ -174,6 +179,7 @@ def judge(
         if silent_records
         else (
             *_of_modes(outcomes, explanation, expectation),
+            *((one_for_all,) if one_for_all else ()),
             *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
             *apart,
         ),
@@ -229,20 +235,28 @@ def _by_mode(
     explanation: Explanation,
     expectation: Expectation,
     n_candidates: int,
-) -> LawByMode | None:
+) -> tuple[LawByMode | None, str]:
     """Return the best law with constants by mode, where one for all modes is in doubt.
 
     It is where the law found explains nothing, or needs several terms: what differs from mode to
-    mode looks like a little of many terms.
+    mode looks like a little of many terms. Of one term that explains the runs, the second is a
+    sentence on what they say of each mode.
     """
-    doubtful = not explanation.in_library or len(chosen.terms) > 1
     model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
     predicted = [chosen.predictions[flow.key] for flow in training]
-    if not doubtful or len(model.modulus) < 2 or not model.law.linear_relaxation:
-        return None
+    n_modes = len(model.modulus)
+    if n_modes < 2 or not model.law.linear_relaxation:
+        return None, ""
+    if explanation.in_library and not chosen.terms:
+        return None, ""
+    if explanation.in_library and len(chosen.terms) == 1:
+        (term,) = chosen.terms
+        alike = coefficient_in_modes(model, term, frame.data.fit.runs)
+        if alike is None or not alike.degree:
+            return None, said_of_each_mode(term.term, alike, n_modes)
     seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
     if len(seen) < len(predicted):
-        return None  # it runs away in a run that it was learned from
+        return None, ""  # it runs away in a run that it was learned from
     sparse = SparseLaw(
         [term.term for term in chosen.terms],
         sum(1 + len(term.inner) for term in chosen.terms),
@@ -250,7 +264,7 @@ def _by_mode(
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())
-    return fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates)
+    return fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates), ""
 
 
 def _of_modes(

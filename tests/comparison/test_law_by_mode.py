@@ -7,11 +7,16 @@ import pytest
 from independent.flow import start_up as independent_start_up
 from independent.giesekus import multimode_giesekus
 
-from discover.comparison.fitting.law_by_mode import SparseLaw, fit_law_by_mode
-from discover.comparison.judging.modes_apart import open_where_modes_differ
+from discover.comparison.fitting.law_by_mode import (
+    SparseLaw,
+    coefficient_in_modes,
+    fit_law_by_mode,
+)
+from discover.comparison.judging.modes_apart import open_where_modes_differ, said_of_each_mode
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.dataset import Run
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
 from discover.report.plots.by_mode import by_mode_in_brief
 from discover.statistics.residual import Expectation
@@ -35,10 +40,14 @@ def records(mobilities, rates, noise=NOISE):
     return runs
 
 
+def known_part():
+    modes = np.array(MODULI), np.array(RELAXATION_TIMES)
+    return DeclaredModel(UpperConvectedMaxwell(), "ucm", {}, *modes, (), None)
+
+
 def fitted(mobilities):
     """The answer, beside a law with the mean mobility in every mode as what was found."""
-    modes = np.array(MODULI), np.array(RELAXATION_TIMES)
-    model = DeclaredModel(UpperConvectedMaxwell(), "ucm", {}, *modes, (), None)
+    model = known_part()
     mean = float(np.mean(mobilities))
     path = [
         {"support": [], "coefficients": [], "inner": {}},
@@ -78,6 +87,34 @@ def test_its_constants_are_told_in_few_words(law):
 
 def test_control_one_constant_for_all_modes_is_no_law_by_mode():
     assert fitted((0.25, 0.25, 0.25)) is None
+
+
+def test_slow_runs_that_one_coefficient_explains_leave_that_of_the_fast_modes_open():
+    term = RecoveredTerm("sigma.sigma", 0.5)
+    slow = records(MOBILITIES, (0.02, 0.05, 0.1))
+    found = coefficient_in_modes(known_part(), term, slow)
+    assert found.degree == 0
+    for mode, truth in zip(found.modes, MOBILITIES, strict=True):
+        assert mode.left_open or mode.ci95[0] < truth < mode.ci95[1]
+    fast, _, slowest = found.modes
+    assert slowest.ci95[1] - slowest.ci95[0] < 0.1
+    assert fast.left_open or fast.ci95[1] - fast.ci95[0] > 0.3
+    said = said_of_each_mode("sigma.sigma", found, 3)
+    assert said.startswith("The coefficient of sigma.sigma is taken to be the same in all 3 modes.")
+    assert "at 10 s" in said
+
+
+def test_control_runs_that_stretch_every_mode_determine_that_of_each():
+    term = RecoveredTerm("sigma.sigma", 0.25)
+    found = coefficient_in_modes(known_part(), term, records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0)))
+    assert found.degree == 0
+    assert all(mode.ci95[1] - mode.ci95[0] < 0.1 for mode in found.modes)
+
+
+def test_a_term_that_the_sweep_tells_is_only_said_to_be_the_same_in_all_modes():
+    assert coefficient_in_modes(known_part(), RecoveredTerm("gammadot", 0.1), []) is None
+    said = said_of_each_mode("gammadot", None, 3)
+    assert said.endswith("the same in all 3 modes, which was not tested.")
 
 
 NORMAL = [Statement(name, IN_LIBRARY, "The band is narrow.") for name in ("N1", "N2")]

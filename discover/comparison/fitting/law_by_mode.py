@@ -16,6 +16,7 @@ from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
+from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
@@ -135,18 +136,8 @@ def fit_law_by_mode(
         Number of terms in the library, the choice among which every term pays for.
     """
     sets = _candidate_sets(path)
-    effects = {name: make_effect(name) for of_set in sets for name in of_set}
-    declared = ForwardDeclared(
-        model.law,
-        model.modulus,
-        model.relaxation_time,
-        model.solvent_viscosity,
-        law_name=model.law_name,
-        parameters=tuple(model.parameters.items()),
-        by_mode=tuple(effects),
-    )
-    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
-    problem = FitProblem(forward, make_batch(fitted), n_candidates)
+    problem = _problem(model, [name for of_set in sets for name in of_set], fitted, n_candidates)
+    forward = problem.model
     found = [_fitted(problem, of_set) for of_set in sets]
     usable = [(fit, degrees) for fit, degrees in found if fit.usable]
     if not usable:
@@ -164,6 +155,51 @@ def fit_law_by_mode(
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
     )
+
+
+def coefficient_in_modes(
+    model: DeclaredModel, term: RecoveredTerm, fitted: Sequence[Run]
+) -> ConstantByMode | None:
+    """Return what the runs say of each mode's coefficient, where one for all modes explains them.
+
+    A mode that the flow hardly stretches may have any, which the interval of the common coefficient
+    takes no account of. None where the term changes what the sweep tells, or cannot be fitted.
+
+    Parameters
+    ----------
+    model
+        The known part: two modes or more.
+    term
+        The only one of the law that explains the runs.
+    fitted
+        Runs without what a known instrument did.
+    """
+    if term.term in _OF_THE_SPECTRUM or term.inner:
+        return None
+    name = _effect_of(term.term, term.coefficient)
+    problem = _problem(model, [name], fitted, 1)
+    fit, degrees = _fitted(problem, [name])
+    if not fit.usable:
+        return None
+    bounds = intervals(problem.model, problem.batch, fit)
+    return constants_by_mode(problem.model, problem.batch, fit, bounds, degrees).get(name)
+
+
+def _problem(
+    model: DeclaredModel, names: Sequence[str], fitted: Sequence[Run], n_candidates: int
+) -> FitProblem:
+    effects = {name: make_effect(name) for name in names}
+    declared = ForwardDeclared(
+        model.law,
+        model.modulus,
+        model.relaxation_time,
+        model.solvent_viscosity,
+        law_name=model.law_name,
+        parameters=tuple(model.parameters.items()),
+        by_mode=tuple(effects),
+    )
+    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
+    return FitProblem(forward, make_batch(fitted), n_candidates)
 
 
 def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
