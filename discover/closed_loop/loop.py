@@ -38,9 +38,9 @@ from discover.closed_loop.judging.between_samples import (
 )
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
-from discover.closed_loop.judging.judgement import Judgement, Silence, judge
+from discover.closed_loop.judging.judgement import Judgement, judge
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
-from discover.closed_loop.judging.silence import fluid_is_silent, records_are_silent
+from discover.closed_loop.judging.silence import Silence, fluid_is_silent, records_are_silent
 from discover.closed_loop.judging.told_by_kinds import told_by_kinds
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
