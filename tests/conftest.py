@@ -1,11 +1,16 @@
 """Double precision, strict types and shapes for every test."""
 
 import gc
+import importlib
 import importlib.metadata
 import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+# OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
+# a worker on each core that takes ten times the work itself. Read once, when NumPy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import jaxtyping
 import pytest
@@ -13,6 +18,10 @@ from jaxtyping import install_import_hook
 
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
+
+# What is first imported inside a module under the hook below is compiled anew, in every worker.
+for _large in ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic"):
+    importlib.import_module(_large)
 
 # Shapes written on public functions are checked while the tests run. The hook must come before
 # the packages are imported.
