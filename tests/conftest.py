@@ -8,13 +8,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-# OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
-# a worker on each core that takes ten times the work itself. Read once, when NumPy is imported.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
+from threadpoolctl import threadpool_limits
+
+# OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
+# a worker on each core that takes ten times the work itself. The variable is for processes begun
+# from here, and for SciPy's library; NumPy's is there already, brought by a plugin of pytest.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+threadpool_limits(1, "blas")
 
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
@@ -92,6 +95,13 @@ _COMPILED_SOON = (
 )
 _KNOWN_TO = ("0.10",)
 
+# in these the tests spend more time than it takes to optimise them
+_WORTH_OPTIMISING = (
+    "discover.learners.tensor_sindy.refit._descend",
+    "discover.learners.tensor_dense.posterior._descend",
+    "discover.identify.side_by_side.many_laws._predict",
+)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compile without optimising where slow tests are left out.
@@ -99,9 +109,22 @@ def pytest_configure(config: pytest.Config) -> None:
     Most programs of the others run for milliseconds, and LLVM takes longer over them than they do.
     A release runs the slow ones too, compiled as users have them.
     """
-    version = importlib.metadata.version("jax").rpartition(".")[0]
-    if _leaves_slow_out(config) and version in _KNOWN_TO:
+    if _compiles_soon(config):
         os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Optimise the few programs that run long; all tests are imported, in a worker, by now."""
+    if _compiles_soon(session.config):
+        for place in _WORTH_OPTIMISING:
+            module, _, name = place.rpartition(".")
+            program = getattr(importlib.import_module(module), name)
+            program.ask_for(xla_backend_optimization_level=1)
+
+
+def _compiles_soon(config: pytest.Config) -> bool:
+    version = importlib.metadata.version("jax").rpartition(".")[0]
+    return _leaves_slow_out(config) and version in _KNOWN_TO
 
 
 def _leaves_slow_out(config: pytest.Config) -> bool:

@@ -12,10 +12,11 @@ from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid
-from tensor_library.library import build_library
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
 
 MODULUS, TIME, EXTENSIBILITY = 2.0, 0.03, 16.0
-LIBRARY = build_library(degree=1)
+LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
 
 
 def held(extensibility, noise=0.01):

@@ -55,17 +55,22 @@ def up():
     return Run("up", times, start_up(1.0), np.ones(40), np.ones(40))
 
 
+# one program for every value: outside of one each of its operations is compiled by itself
+observed, law_along = eqx.filter_jit(observe), eqx.filter_jit(states_and_jacobian)
+
+
 def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
     runs = [swing(2.0), up()]
     problem = make_problem(runs, LIBRARY, MODULUS, TIME)
     active = jnp.array([list(LIBRARY.names).index(name) for name in ("sigma", "sigma.sigma")])
     at, inner = jnp.array([0.1, MOBILITY]), jnp.zeros(0)
-    value, slope = observe(problem, active, at, inner)
+    value, slope = observed(problem, active, at, inner)
     assert np.all(np.isfinite(value))
     step = 1e-5
     for i in range(2):
         ends = [
-            observe(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0] for sign in (1, -1)
+            observed(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0]
+            for sign in (1, -1)
         ]
         difference = (ends[0] - ends[1]) / (2.0 * step)
         # of second order in the step
@@ -74,7 +79,7 @@ def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
         )
     alone = make_problem([up()], LIBRARY, MODULUS, TIME)
     assert alone.flows.parts[0][1].cycle is None
-    only, _ = observe(alone, active, at, inner)
+    only, _ = observed(alone, active, at, inner)
     np.testing.assert_allclose(value[1, :40], only[0, :40], rtol=1e-6)
 
 
@@ -98,14 +103,12 @@ def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
     numbers = jnp.zeros(8).at[3].set(MOBILITY), jnp.zeros(8)
     law = eqx.tree_at(lambda law: (law.constants, law.network_mask), law, numbers)
     rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
-    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
+    along, jacobian = law_along(rebuild.start, rebuild, problem)
     assert np.all(np.isfinite(along.recorded))
     step = 1e-5
     for i in (1, 3):
         moved = [
-            states_and_jacobian(rebuild.start + s * step * jnp.eye(8)[i], rebuild, problem)[
-                0
-            ].recorded
+            law_along(rebuild.start + s * step * jnp.eye(8)[i], rebuild, problem)[0].recorded
             for s in (1, -1)
         ]
         difference = (moved[0] - moved[1]) / (2.0 * step)
