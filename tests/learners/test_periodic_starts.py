@@ -56,7 +56,7 @@ def up():
 
 
 # one program for every value: outside of one each of its operations is compiled by itself
-observed, law_along = eqx.filter_jit(observe), eqx.filter_jit(states_and_jacobian)
+observed = eqx.filter_jit(observe)
 
 
 def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
@@ -103,12 +103,14 @@ def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
     numbers = jnp.zeros(8).at[3].set(MOBILITY), jnp.zeros(8)
     law = eqx.tree_at(lambda law: (law.constants, law.network_mask), law, numbers)
     rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
-    along, jacobian = law_along(rebuild.start, rebuild, problem)
+    along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
     assert np.all(np.isfinite(along.recorded))
     step = 1e-5
     for i in (1, 3):
         moved = [
-            law_along(rebuild.start + s * step * jnp.eye(8)[i], rebuild, problem)[0].recorded
+            states_and_jacobian(rebuild.start + s * step * jnp.eye(8)[i], rebuild, problem)[
+                0
+            ].recorded
             for s in (1, -1)
         ]
         difference = (moved[0] - moved[1]) / (2.0 * step)
