@@ -73,8 +73,8 @@ def as_users_run_it() -> Iterator[None]:
     jaxtyping.config.update("jaxtyping_disable", before)
 
 
-# files of a quarter of a minute and more, with slow tests or without, the longest first; what shares programs stands apart, so that one
-# worker finds what the other compiled
+# files of a quarter of a minute and more, with slow tests or without, the longest first; what
+# shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
     "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
     "test_tbnn_training.py", "test_planting.py", "test_tensor_sindy_estimator.py",
