@@ -1,6 +1,7 @@
 """Double precision, strict types and shapes for every test."""
 
 import gc
+import importlib
 import importlib.metadata
 import os
 import sys
@@ -10,9 +11,20 @@ from pathlib import Path
 import jaxtyping
 import pytest
 from jaxtyping import install_import_hook
+from threadpoolctl import threadpool_limits
+
+# OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
+# a worker on each core that takes ten times the work itself. The variable is for processes begun
+# from here, and for SciPy's library; NumPy's is there already, brought by a plugin of pytest.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+threadpool_limits(1, "blas")
 
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
+
+# What is first imported inside a module under the hook below is compiled anew, in every worker.
+for _large in ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic"):
+    importlib.import_module(_large)
 
 # Shapes written on public functions are checked while the tests run. The hook must come before
 # the packages are imported.
@@ -61,12 +73,14 @@ def as_users_run_it() -> Iterator[None]:
     jaxtyping.config.update("jaxtyping_disable", before)
 
 
-# files of a minute and more, the longest first; what shares programs stands apart, so that one
-# worker finds what the other compiled
+# files of a quarter of a minute and more, with slow tests or without, the longest first; what
+# shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
     "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
     "test_tbnn_training.py", "test_planting.py", "test_tensor_sindy_estimator.py",
-    "test_comparison.py", "test_estimators.py", "test_reports.py",
+    "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
+    "test_modulus_errors.py", "test_modes_of_a_stiff_fluid.py", "test_flows_of_fluids.py",
+    "test_constants_by_mode.py", "test_loop.py", "test_law_choice.py",
 )  # fmt: skip
 
 
@@ -83,6 +97,13 @@ _COMPILED_SOON = (
 )
 _KNOWN_TO = ("0.10",)
 
+# in these the tests spend more time than it takes to optimise them
+_WORTH_OPTIMISING = (
+    "discover.learners.tensor_sindy.refit._descend",
+    "discover.learners.tensor_dense.posterior._descend",
+    "discover.identify.side_by_side.many_laws._predict",
+)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compile without optimising where slow tests are left out.
@@ -90,9 +111,22 @@ def pytest_configure(config: pytest.Config) -> None:
     Most programs of the others run for milliseconds, and LLVM takes longer over them than they do.
     A release runs the slow ones too, compiled as users have them.
     """
-    version = importlib.metadata.version("jax").rpartition(".")[0]
-    if _leaves_slow_out(config) and version in _KNOWN_TO:
+    if _compiles_soon(config):
         os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Optimise the few programs that run long; all tests are imported, in a worker, by now."""
+    if _compiles_soon(session.config):
+        for place in _WORTH_OPTIMISING:
+            module, _, name = place.rpartition(".")
+            program = getattr(importlib.import_module(module), name)
+            program.ask_for(xla_backend_optimization_level=1)
+
+
+def _compiles_soon(config: pytest.Config) -> bool:
+    version = importlib.metadata.version("jax").rpartition(".")[0]
+    return _leaves_slow_out(config) and version in _KNOWN_TO
 
 
 def _leaves_slow_out(config: pytest.Config) -> bool:

@@ -28,15 +28,14 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> Path:
         Folder for both files; made if it is not there.
     """
     from discover.dataset.checking.folder import check_folder
-    from discover.report.data.page import data_page, first_study
-    from discover.study.atomic import make_folder, write_text
+    from discover.study.atomic import make_folder
 
     here = Path(name)
     # where the study lies a relative path would be another one
     folder = here.resolve().as_posix() if here.is_dir() else name
     make_folder(out)
-    write_text(out / STUDY_FILE, first_study(dataset, folder))
-    return write_text(out / "report.html", data_page(dataset, check_folder(name), folder))
+    _write_study(dataset, folder, out)
+    return _write_page(dataset, folder, out / "report.html", check_folder(name))
 
 
 def write_import_page(
@@ -56,8 +55,6 @@ def write_import_page(
         What the import said of the files.
     """
     from discover.dataset.load import load_dataset
-    from discover.report.data.page import data_page, first_study
-    from discover.study.atomic import write_text
 
     place = folder.resolve().as_posix()
     try:
@@ -65,5 +62,25 @@ def write_import_page(
     except InputError:
         return None  # the check says why
     if not (folder / STUDY_FILE).exists():
-        write_text(folder / STUDY_FILE, first_study(dataset, place))
-    return write_text(folder / IMPORT_PAGE, data_page(dataset, findings, place, said))
+        _write_study(dataset, place, folder)
+    return _write_page(dataset, place, folder / IMPORT_PAGE, findings, said)
+
+
+def _write_study(dataset: "Dataset", folder: str, out: Path) -> None:
+    from discover.report.data.page import first_study
+    from discover.study.atomic import write_text
+
+    write_text(out / STUDY_FILE, first_study(dataset, folder))
+
+
+def _write_page(
+    dataset: "Dataset",
+    folder: str,
+    path: Path,
+    findings: Sequence["Finding"],
+    said: Sequence[str] = (),
+) -> Path:
+    from discover.report.data.page import data_page
+    from discover.study.atomic import write_text
+
+    return write_text(path, data_page(dataset, findings, folder, said))

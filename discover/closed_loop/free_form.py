@@ -15,7 +15,8 @@ from sklearn.preprocessing import SplineTransformer
 
 from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
+from discover.closed_loop.results.free_curve import FreeForm, Slot, drawn_form, error_of
+from discover.closed_loop.runs import all_at_a_rate_in_shear
 from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.forward import Batch
@@ -78,10 +79,7 @@ def free_forms(
     held_batch, held_runs
         Runs that judge.
     """
-    if any(
-        run.flow != "shear" or run.protocol.control != "rate" or run.quantity != "sigma12"
-        for run in [*runs, *held_runs]
-    ):
+    if not all_at_a_rate_in_shear([*runs, *held_runs]):
         return ()
     weight = np.asarray(search.batch.weight)
     starts = {
@@ -220,23 +218,17 @@ def _free_form_of(search: Search, runs, trial: _Trial, gain: float, held: float 
     span = _variable(trial.slot, runs, batch, predicted)[seen]
     grid = np.linspace(float(np.min(span)), float(np.max(span)), _DRAWN)
     basis = trial.splines.transform(grid.reshape(-1, 1))
-    value = basis @ trial.coefficients
-    deviation = np.sqrt(np.clip(np.einsum("im,mk,ik->i", basis, own, basis), 0.0, None))
-    variable, unit = _SLOTS[trial.slot]
-    errors = np.sqrt(np.sum(trial.residual**2, axis=1))
-    return FreeForm(
+    return drawn_form(
         trial.slot,
-        variable,
-        unit,
+        _SLOTS[trial.slot],
         trial.effects,
         grid,
-        value,
-        value - 1.96 * deviation,
-        value + 1.96 * deviation,
-        nearest_form(grid, value, deviation, trial.slot == "recorded_stress"),
+        basis,
+        trial.coefficients,
+        own,
         gain,
         tolerated.left(trial.residual).verdict != "unexplained",
-        ErrorPair(float(np.mean(errors)), held),
+        ErrorPair(error_of(trial.residual), held),
     )
 
 
@@ -252,5 +244,4 @@ def _held_out_error(search: Search, trial: _Trial, batch: Batch | None, runs) ->
     predicted = np.where(seen, residual / np.where(seen, weight, 1.0) + recorded, 0.0)
     variable = _variable(trial.slot, runs, batch, predicted)
     columns = _columns(trial.slot, trial.splines, variable, predicted) * weight[..., None]
-    left = residual + columns @ trial.coefficients
-    return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))
+    return error_of(residual + columns @ trial.coefficients)

@@ -14,7 +14,8 @@ import numpy as np
 
 from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.closed_loop.results.free_curve import FreeForm, Slot, nearest_form
+from discover.closed_loop.results.free_curve import FreeForm, Slot, drawn_form, error_of
+from discover.closed_loop.runs import all_at_a_rate_in_shear
 from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
@@ -87,11 +88,7 @@ def free_functions_in_model(
     held_batch
         Runs that judge.
     """
-    simple = all(
-        run.flow == "shear" and run.protocol.control == "rate" and run.quantity == "sigma12"
-        for run in runs
-    )
-    if not simple or search.degrees:
+    if not all_at_a_rate_in_shear(runs) or search.degrees:
         return ()
     curves = _curves(search, runs)
     found = [e for e in search.model.effects if e.name in search.active]
@@ -120,7 +117,9 @@ def free_functions_in_model(
     kept: dict[str, FreeForm] = {}
     for gain, fit, curve, beside in sorted(gains, key=lambda one: -one[0]):
         if gain >= INDISTINGUISHABLE and curve.effect.name not in kept:
-            held = _error_of(model, fit, held_batch)
+            held = None
+            if held_batch is not None:
+                held = error_of(model.residuals([fit.theta], held_batch)[0])
             kept[curve.effect.name] = _form(search, model, fit, curve, beside, gain, held)
     return tuple(kept.values())
 
@@ -163,15 +162,6 @@ def _start(
     return theta, [*free, *coefficients]
 
 
-def _error_of(model: AugmentedModel, fit: Fit, batch: Batch | None) -> float | None:
-    if batch is None:
-        return None
-    left = model.residuals([fit.theta], batch)[0]
-    if not np.all(np.isfinite(left)):
-        return np.inf  # the model runs away
-    return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))
-
-
 def _form(
     search: Search,
     model: AugmentedModel,
@@ -192,19 +182,14 @@ def _form(
     own = [seen.index(row) for row in rows[:count]]
     grid = np.linspace(0.0, reach, _DRAWN)
     basis = np.asarray(spline_basis(jnp.asarray(grid), curve.largest, curve.onset))[:, :count]
-    value = basis @ fit.theta[[fit.free[row] for row in rows[:count]]]
-    variance = np.einsum("im,mk,ik->i", basis, covariance[np.ix_(own, own)], basis)
-    deviation = np.sqrt(np.clip(variance, 0.0, None))
-    return FreeForm(
+    return drawn_form(
         curve.slot,
-        curve.effect.variable,
-        "Pa" if curve.slot == "slip" else "",
-        tuple(beside),
+        (curve.effect.variable, "Pa" if curve.slot == "slip" else ""),
+        beside,
         grid,
-        value,
-        value - 1.96 * deviation,
-        value + 1.96 * deviation,
-        nearest_form(grid, value, deviation, in_stress=False, in_time=False),
+        basis,
+        fit.theta[[fit.free[row] for row in rows[:count]]],
+        covariance[np.ix_(own, own)],
         gain,
         search.tolerated.left(fit.residual).verdict != "unexplained",
         ErrorPair(float(np.mean(fit.run_errors)), held),

@@ -119,6 +119,14 @@ def with_later_spikes(
     return found
 
 
+def all_at_a_rate_in_shear(runs: Sequence[Run]) -> bool:
+    """Return whether all runs are shear stresses at a given rate, which free functions explain."""
+    return all(
+        run.flow == "shear" and run.protocol.control == "rate" and run.quantity == "sigma12"
+        for run in runs
+    )
+
+
 def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
     size = float(np.sqrt(np.mean(run.recorded**2)))

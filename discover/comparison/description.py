@@ -56,7 +56,7 @@ def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:
         text += f", {', '.join(fixed)}"
     if known.along is not None:
         one_mode = len(model.modulus) == 1
-        names = ", ".join(in_words_of(name, one_mode) for name in known.along.positions)
+        names = ", ".join(in_words_of(name, one_mode) for name in known.along.constants.positions)
         text += f"; fitted along with each learner: {names}"
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 

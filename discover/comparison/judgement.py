@@ -165,7 +165,7 @@ def judge(
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
     apart = [*refuted, *disagreements(outcomes, judged, bands)]
-    if known.along is not None and known.along.moves_modes:
+    if known.along is not None and known.along.constants.moves_modes:
         statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
     return Judgement(
         explanation,
@@ -300,7 +300,10 @@ def _classical(study: Study, known: Known, independent: float | None) -> Sequenc
     if known.along is None:
         relaxes = study.model.known_relaxation
         return [*fit_classical_laws(before.model, known.flows, relaxes, independent), *fits]
-    each = [known.frame_of(known.along.raw(known.along.classical[law].theta)) for law in CLASSICAL]
+    each = [
+        known.frame_of(known.along.constants.raw(known.along.before.classical[law].theta))
+        for law in CLASSICAL
+    ]
     return [*classical_along(known.along, each, known.flows, independent), *fits]
 
 

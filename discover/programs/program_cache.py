@@ -80,6 +80,7 @@ class Compiled(Generic[P, R]):
         self._function: Any = function
         self._made_from = made_from
         self._runs_long = runs_long
+        self._asked_for: dict[str, Any] = {}
         self._traced: Any = eqx.filter_jit(function)
         self._programs: dict[Any, Callable[[Any, Any, Sequence[Any]], R]] = {}
         self._lock = threading.RLock()
@@ -88,6 +89,10 @@ class Compiled(Generic[P, R]):
     def __reduce__(self) -> str:
         # by name, as a function: another process makes programs of its own
         return self._function.__qualname__
+
+    def ask_for(self, **options: Any) -> None:
+        """Have what is compiled from here on compiled with options of XLA's, beside the usual."""
+        self._asked_for = options
 
     def forget(self) -> None:
         """Drop what this process holds."""
@@ -118,7 +123,8 @@ class Compiled(Generic[P, R]):
 
     def _made(self, args, kwargs, arrays, folder):
         """Return the program for such arguments: found, or exported and kept, or traced."""
-        options = None if self._runs_long else _compiled_soon()
+        soon = None if self._runs_long else _compiled_soon()
+        options = {**(soon or {}), **self._asked_for} or None
         # its signature does not name what it hands on to jax.jit
         alone = eqx.filter_jit(self._function, compiler_options=options)  # pyright: ignore
 
@@ -140,7 +146,7 @@ class Compiled(Generic[P, R]):
                 kept = self._export(args, kwargs, arrays)
                 save_program(file, *kept)
             nesting, data = kept
-            options = options if len(data) < _LARGE else None
+            options = options if len(data) < _LARGE else self._asked_for or None
             exported = jax.export.deserialize(bytearray(data))
         except (NotDescribable, NotImplementedError, ValueError, TypeError) as reason:
             _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)

@@ -272,7 +272,8 @@ def test_what_cannot_differ_by_mode_is_refused(options, text):
 
 def told_maxwell(mobilities, rates=RATES):
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
-    asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2}
+    # other explanations change neither stages nor constants by mode
+    asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2, "explanations": 1}
     return dc.close_loop(data(mobilities, rates), base, held_out=[f"{rates[2]}"], **asked)
 
 

@@ -10,7 +10,7 @@ from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc
-from discover.closed_loop.loop import _predicts_worse
+from discover.closed_loop.beyond_the_search import predicts_worse
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
 from discover.report.loop.verdict import loop_verdict
@@ -124,4 +124,4 @@ def test_the_nearest_form_is_the_one_that_drew_the_curve(curve, name):
 def test_a_curve_beside_which_runs_held_out_are_missed_more_or_not_at_all_met_is_worse(
     curve, found, worse
 ):
-    assert _predicts_worse(ErrorPair(0.01, curve), ErrorPair(0.1, found)) == worse
+    assert predicts_worse(ErrorPair(0.01, curve), ErrorPair(0.1, found)) == worse

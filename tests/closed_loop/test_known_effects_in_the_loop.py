@@ -27,9 +27,9 @@ def data():
     return Dataset("weak transducer", tuple(runs))
 
 
-def closed(data, effects, max_effects=2):
+def closed(data, effects):
     declared = DeclaredModel.maxwell(1.0, 1.0, effects=known_effects(effects))
-    return run_loop(data, declared, effects=CANDIDATES, max_effects=max_effects)
+    return run_loop(data, declared, effects=CANDIDATES, max_effects=2, explanations=1)
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +37,12 @@ def fitted(data):
     return closed(data, {"stress_gain": "fit"})
 
 
-def test_a_known_effect_is_not_found_again(data, fitted):
-    known = closed(data, {"stress_gain": {"gain_error": GAIN}})
+@pytest.fixture(scope="module")
+def known(data):
+    return closed(data, {"stress_gain": {"gain_error": GAIN}})
+
+
+def test_a_known_effect_is_not_found_again(fitted, known):
     for result in (fitted, known):
         assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
         alpha = result.stages[0].parameters["alpha"]
@@ -58,11 +62,9 @@ def test_one_to_be_fitted_is_reported_with_its_interval(fitted):
     assert said["law"]["terms"] == []
 
 
-def test_the_error_before_has_the_known_effects_in_it(data):
-    without, known = (
-        closed(data, effects, max_effects=0)
-        for effects in ({}, {"stress_gain": {"gain_error": GAIN}})
-    )
+def test_the_error_before_has_the_known_effects_in_it(data, known):
+    # both find what is missing: a loop that may not looks for it among all curves
+    without = closed(data, {})
     # in slow flow a Maxwell fluid and the gain are all there is
     assert without.records[0].errors[0] > 0.08
     assert known.records[0].errors[0] < 0.04

@@ -33,7 +33,10 @@ def runs(law, rates, seed=0, end=8.0):
 
 def chosen(data, held_out=(), names=NAMES):
     base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
-    return dc.close_loop(data, base, held_out=held_out, laws=names, max_effects=0)
+    # none is added: with one candidate each law is a small program, with all of them a large one
+    return dc.close_loop(
+        data, base, held_out=held_out, laws=names, effects=["stress_offset"], max_effects=0
+    )
 
 
 @pytest.mark.parametrize(
@@ -131,7 +134,9 @@ def test_control_without_the_other_law_it_has_no_start(no_start_of_its_own):
 def found_beside(material, names, effects):
     base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
     data = runs(material, (0.5, 2.0, 4.0), seed=2, end=10.0)
-    return dc.close_loop(data, base, held_out=["at_4"], laws=names, effects=effects, max_effects=1)
+    return dc.close_loop(
+        data, base, held_out=["at_4"], laws=names, effects=effects, max_effects=1, explanations=1
+    )
 
 
 def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():

@@ -55,17 +55,22 @@ def up():
     return Run("up", times, start_up(1.0), np.ones(40), np.ones(40))
 
 
+# one program for every value: outside of one each of its operations is compiled by itself
+observed = eqx.filter_jit(observe)
+
+
 def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
     runs = [swing(2.0), up()]
     problem = make_problem(runs, LIBRARY, MODULUS, TIME)
     active = jnp.array([list(LIBRARY.names).index(name) for name in ("sigma", "sigma.sigma")])
     at, inner = jnp.array([0.1, MOBILITY]), jnp.zeros(0)
-    value, slope = observe(problem, active, at, inner)
+    value, slope = observed(problem, active, at, inner)
     assert np.all(np.isfinite(value))
     step = 1e-5
     for i in range(2):
         ends = [
-            observe(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0] for sign in (1, -1)
+            observed(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0]
+            for sign in (1, -1)
         ]
         difference = (ends[0] - ends[1]) / (2.0 * step)
         # of second order in the step
@@ -74,7 +79,7 @@ def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
         )
     alone = make_problem([up()], LIBRARY, MODULUS, TIME)
     assert alone.flows.parts[0][1].cycle is None
-    only, _ = observe(alone, active, at, inner)
+    only, _ = observed(alone, active, at, inner)
     np.testing.assert_allclose(value[1, :40], only[0, :40], rtol=1e-6)
 
 

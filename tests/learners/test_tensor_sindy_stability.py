@@ -14,7 +14,8 @@ SLIP = ("johnson_segalman", {"xi": 0.4})
 
 @pytest.fixture(scope="module")
 def fitted():
-    return TensorSINDy(LIBRARY, max_terms=3, n_stability=0).fit(small_dataset(*SLIP, noise=0.02))
+    model = TensorSINDy(LIBRARY, max_terms=3, n_folds=0, n_stability=0)
+    return model.fit(small_dataset(*SLIP, noise=0.02))
 
 
 def stability(model, seed=0, n_pairs=5):
@@ -48,7 +49,7 @@ def test_terms_that_made_nothing_are_not_stable(fitted):
 
 
 def test_the_same_seed_gives_the_same_halves(fitted):
-    first, again = stability(fitted), stability(fitted)
+    first, again = stability(fitted, n_pairs=2), stability(fitted, n_pairs=2)
     np.testing.assert_array_equal(first.frequency, again.frequency)
 
 

@@ -36,6 +36,11 @@ def fluid(mobility=MOBILITY):
     return Fluid(Giesekus(mobility), MODULUS, TIME, SOLVENT)
 
 
+def of_fluid(flows):
+    """Return what is observed of all runs, in one program."""
+    return jax.jit(lambda law: flows.over(partial(observed_on_grid, law)))(fluid())
+
+
 def test_creep_and_recovery_of_two_modes_are_those_of_scipy():
     exact = strain_at(LAW, [(0.0, 60.0), (6.0, 0.0)], SOLVENT, TIMES)
     found = observe(fluid(), imposed_stress(TIMES, STRESS), TIMES)[:, 0]
@@ -62,7 +67,7 @@ def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own():
     flows = lay_out(protocols, [COUNTED, COUNTED[:2], COUNTED])
     assert len(flows) == 3
     assert flows.n_steps == lay_out(protocols[:2], [COUNTED, COUNTED[:2]]).n_steps
-    found = flows.over(partial(observed_on_grid, fluid()))[..., 0]
+    found = of_fluid(flows)[..., 0]
     for one, protocol, mask in zip(found, protocols, flows.sample_mask, strict=True):
         alone = observe(fluid(), protocol, COUNTED[: int(mask.sum())])[:, 0]
         # both end where Newton's next step would change 1e-8
@@ -76,7 +81,8 @@ def swept(law, strains, together):
     ((flows, grids),) = lay_out([protocol], [np.arange(1.0, n + 1.0)]).parts
     flow, grid = jax.tree.map(lambda leaf: leaf[0], (flows, grids))
     make = partial(dynamics_of_fluid, protocol=flow)
-    return np.asarray(solved_on_grid(make, law, flow, grid, together).observed[:, 0])
+    solved = jax.jit(lambda law: solved_on_grid(make, law, flow, grid, together).observed)
+    return np.asarray(solved(law)[:, 0])
 
 
 def test_once_one_strain_has_no_periodic_state_no_other_of_a_sweep_is_solved_for():
@@ -98,7 +104,7 @@ def test_steady_states_are_solved_for_once_each_however_many_samples_stand_besid
     flows = lay_out([curve, start_up(1.0)], [counted, times]).with_steps_in(256)
     number = {protocols.control: grids.times.size for protocols, grids in flows.parts}
     assert number["steady"] == 8  # five, rounded up
-    found, _ = flows.over(partial(observed_on_grid, fluid()))
+    found, _ = of_fluid(flows)
     np.testing.assert_allclose(found[:5], observe(fluid(), curve, counted), rtol=1e-12)
     np.testing.assert_array_equal(found[5:], np.broadcast_to(found[4], found[5:].shape))
 

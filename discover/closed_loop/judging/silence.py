@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2
@@ -13,6 +14,9 @@ from discover.forward.least_squares import Fit
 from discover.statistics import holds_signal
 from discover.statistics.dead_records import CHANCE
 from discover.statistics.residual import judged_cost, judging, summarise
+
+Silence = Literal["records", "fluid"]
+"""What holds no signal: the records themselves, or what a fit leaves to the fluid of them."""
 
 _OFF = 1e-30  # factor on the moduli of a fluid that is switched off
 _ALIKE = 1.1

@@ -1,7 +1,7 @@
 """A free function that was found, and the closed form that is nearest to it."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -62,6 +62,64 @@ class FreeForm:
     def to_json(self) -> dict[str, Any]:
         """Return what ``loop.json`` holds of it."""
         return asdict(self)
+
+
+def drawn_form(
+    slot: Slot,
+    variable: tuple[str, str],
+    beside: Sequence[str],
+    grid: Float[np.ndarray, " n"],
+    basis: Float[np.ndarray, "n m"],
+    coefficients: Float[np.ndarray, " m"],
+    covariance: Float[np.ndarray, "m m"],
+    evidence: float,
+    explains: bool,
+    error: ErrorPair,
+) -> FreeForm:
+    """Return a sum of splines as a result holds it: with its band, and the nearest closed form.
+
+    Parameters
+    ----------
+    slot, beside, evidence, explains, error
+        As of a `FreeForm`.
+    variable
+        Of what it is a function, and its unit.
+    grid, basis
+        Where it is drawn, and the splines there.
+    coefficients, covariance
+        Of the splines.
+    """
+    value = basis @ coefficients
+    variance = np.einsum("im,mk,ik->i", basis, covariance, basis)
+    deviation = np.sqrt(np.clip(variance, 0.0, None))
+    in_model = slot in ("relaxation", "slip")  # where nothing is a function of time
+    nearest = nearest_form(grid, value, deviation, slot == "recorded_stress", not in_model)
+    return FreeForm(
+        slot,
+        *variable,
+        tuple(beside),
+        grid,
+        value,
+        value - 1.96 * deviation,
+        value + 1.96 * deviation,
+        nearest,
+        evidence,
+        explains,
+        error,
+    )
+
+
+def error_of(left: Float[np.ndarray, "runs n"]) -> float:
+    """Return the mean relative error of runs, infinite where a model runs away.
+
+    Parameters
+    ----------
+    left
+        Weighted residuals, padded.
+    """
+    if not np.all(np.isfinite(left)):
+        return np.inf
+    return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))
 
 
 _Form = Callable[..., np.ndarray]

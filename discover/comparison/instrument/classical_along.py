@@ -12,7 +12,8 @@ from discover.comparison.fitting.classical import (
     contender,
     parameter_of,
 )
-from discover.comparison.instrument.fitted_along import CLASSICAL_EFFECTS, FittedAlong
+from discover.comparison.instrument.before_learning import CLASSICAL_EFFECTS
+from discover.comparison.instrument.fitted_along import FittedAlong
 from discover.comparison.instrument.frame import Frame
 from discover.comparison.outcomes.flows import Flow, of_recorded, predict, relative_errors
 from discover.identify.side_by_side.many_laws import fluid_of
@@ -44,7 +45,7 @@ def classical_along(
     """
     laws = []
     for name in CLASSICAL:
-        fit = along.classical[name]
+        fit = along.before.classical[name]
         value = None
         if name in CLASSICAL_EFFECTS:
             value = float(fit.theta[along.model.positions(CLASSICAL_EFFECTS[name])[0]])
@@ -62,7 +63,7 @@ def classical_along(
         )
         # the terms of all laws, those of the others at zero: one program for all
         fluid = jax.tree.map(lambda leaf, i=i: leaf[i], fluid_of(laws, base))
-        fit = along.classical[name]
+        fit = along.before.classical[name]
         squares = np.sum(fit.residual**2, axis=1)
         misfit = float(np.sqrt(np.sum(sizes * squares) / samples))
         parameters = {}
@@ -78,6 +79,8 @@ def classical_along(
             errors[flow.name] = of_recorded(relative_errors(seen, flow.reference), flow)
         counted = independent or samples
         criterion = extended_bic(max(misfit, FLOOR), counted, len(parameters), 0, len(CLASSICAL))
-        constants = {c: along.value_of(c, raw) for c, raw in along.raw(fit.theta).items()}
+        constants = {
+            c: along.constants.value_of(c, raw) for c, raw in along.constants.raw(fit.theta).items()
+        }
         fits.append(ClassicalFit(name, parameters, misfit, criterion, errors, constants))
     return fits

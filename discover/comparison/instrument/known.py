@@ -109,7 +109,7 @@ def known_part(
             high_deborah,
             pipkin,
         )
-        return replace(known, before=known.frame_of(along.raw(along.alone.theta)))
+        return replace(known, before=known.frame_of(along.constants.raw(along.before.alone.theta)))
     free_of_it, _ = corrected(data, effects)
     flows = corrected_flows(data, free_of_it, high_deborah, pipkin)
     return Known(Frame(replace(model, effects=()), free_of_it, flows), None, flows, effects)

@@ -1,0 +1,203 @@
+"""The model that a search ended with, on the runs: its fit, what it predicts, its constants."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.explanations import Carried
+from discover.closed_loop.final_model import Bounds
+from discover.closed_loop.judging.before_after import errors_of, record_runs
+from discover.closed_loop.judging.between_samples import change_between_samples, coarse_rates
+from discover.closed_loop.judging.finer_steps import on_finer_steps
+from discover.closed_loop.judging.held_out import HeldOut
+from discover.closed_loop.judging.held_out import held_out as predict_held_out
+from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.run_record import RunRecord
+from discover.closed_loop.search import Search
+from discover.closed_loop.searching import SearchResult
+from discover.dataset import Run
+from discover.dataset.coarse_rates import CoarseRates
+from discover.forward import AugmentedModel, Batch, make_batch
+from discover.forward.least_squares import Fit, intervals
+from discover.forward.modulus_errors import modulus_shifts
+from discover.forward.step_instants import with_own_instants
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.constants import ConstantByMode
+
+
+@dataclass(frozen=True)
+class FinalFit:
+    """The final model on the runs, in the steps that its effects need.
+
+    Attributes
+    ----------
+    search, carried
+        The search that has ended, and the sets of effects that explain the records.
+    fitted, held_out
+        The runs that were fitted, and those that only judge.
+    held_batch
+        These, as the model has them, if there are any.
+    order
+        Names of the runs of the data set, in its order.
+    """
+
+    search: Search
+    carried: Sequence[Carried]
+    fitted: Sequence[Run]
+    held_out: Sequence[Run]
+    held_batch: Batch | None
+    order: Sequence[str]
+
+    @property
+    def model(self) -> AugmentedModel:
+        """The declared model with all candidates."""
+        return self.search.model
+
+    @property
+    def batch(self) -> Batch:
+        """The fitted runs as the model has them."""
+        return self.search.batch
+
+    @property
+    def fit(self) -> Fit:
+        """The final fit."""
+        return self.search.fit
+
+    @property
+    def active(self) -> list[str]:
+        """Names of the effects that were found."""
+        return self.search.active
+
+    @property
+    def present(self) -> list[str]:
+        """Names of all effects of the model: those found, and those that were known."""
+        return [*self.active, *(known.name for known in self.model.declared.effects)]
+
+    @property
+    def error(self) -> float:
+        """Relative misfit, mean over the fitted runs."""
+        return float(np.mean(self.fit.run_errors))
+
+    @cached_property
+    def records_fitted(self) -> list[RunRecord]:
+        """The fitted runs with predictions of every stage of the search."""
+        return record_runs(
+            self.model, self.batch, self.fitted, self.search.path, held_out=False, order=self.order
+        )
+
+    @cached_property
+    def records_held_out(self) -> list[RunRecord]:
+        """The same of the runs held out."""
+        if self.held_batch is None:
+            return []
+        return record_runs(
+            self.model, self.held_batch, self.held_out, self.search.path, held_out=True,
+            order=self.order,
+        )  # fmt: skip
+
+    @property
+    def records(self) -> list[RunRecord]:
+        """The same of all runs."""
+        return [*self.records_fitted, *self.records_held_out]
+
+    def error_at(self, stage: int) -> ErrorPair:
+        """Return the errors of the declared model, stage 0, or after so many effects."""
+        return errors_of(self.records, stage)
+
+    @property
+    def error_after(self) -> ErrorPair:
+        """The errors of the final model."""
+        return self.error_at(len(self.search.path) - 1)
+
+    @cached_property
+    def shifts(self) -> Float[np.ndarray, "k runs n"]:
+        """What errors of the moduli change of the fitted runs."""
+        return modulus_shifts(self.model, self.fit.theta, self.batch)
+
+    def unseen(self) -> HeldOut | None:
+        """Return what the final model leaves of the runs held out, if there are any."""
+        if self.held_batch is None:
+            return None
+        resolution = NumericalResolution(self.model, self.held_batch, self.held_out)
+        return predict_held_out(self.model, self.batch, self.fit, self.search.path[-1], resolution)
+
+    def between_samples(
+        self, batch: Batch, runs: Sequence[Run]
+    ) -> Float[np.ndarray, "runs n"] | None:
+        """Return what other rates between the samples of some runs would change, if anything."""
+        return change_between_samples(
+            self.model, batch, runs, self.fit.theta, self.active, self.error
+        )
+
+
+@dataclass(frozen=True)
+class FinalConstants:
+    """What is known of the constants of the final model.
+
+    Attributes
+    ----------
+    bounds
+        95 % intervals by position, given the effects of the model.
+    unknown
+        What other rates between the samples of the fitted runs would change; None if nothing.
+    coarse
+        What that does to constants; None if nothing.
+    by_mode
+        Constants that may differ from mode to mode, by name.
+    """
+
+    bounds: Bounds
+    unknown: Float[np.ndarray, "runs n"] | None
+    coarse: CoarseRates | None
+    by_mode: Mapping[str, ConstantByMode]
+
+    @property
+    def rates_known(self) -> bool:
+        """Whether what the rate did between its samples leaves the constants alone."""
+        return self.coarse is None or not self.coarse.is_coarse
+
+
+def final_fit(
+    ended: SearchResult, fitted: Sequence[Run], held_out: Sequence[Run], order: Sequence[str]
+) -> FinalFit:
+    """Return the final fit of a search, in the steps that its effects need.
+
+    Parameters
+    ----------
+    ended
+        The search; it goes on with this fit.
+    fitted, held_out
+        The runs that were fitted, and those that only judge.
+    order
+        Names of the runs of the data set, in its order.
+    """
+    search = ended.search
+    search.fit = on_finer_steps(search.model, search.batch, fitted, search.fit, search.active)
+    held_batch = search.held_batch
+    if held_batch is not None:
+        held_out = with_own_instants(search.model, search.fit.theta, held_out)
+        held_batch = make_batch(held_out)
+    return FinalFit(search, ended.carried, fitted, held_out, held_batch, order)
+
+
+def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> FinalConstants:
+    """Return what is known of the constants of a final model.
+
+    Parameters
+    ----------
+    final
+        The final fit.
+    apart
+        What is known of each mode's constant where one for all modes explains the records.
+    """
+    search, model, batch, fit = final.search, final.model, final.batch, final.fit
+    bounds: Bounds = intervals(model, batch, fit, final.shifts)
+    unknown, coarse = final.between_samples(batch, final.fitted), None
+    if unknown is not None:
+        coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
+    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, search.prior)
+    return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart})

@@ -1,0 +1,81 @@
+"""The verdict on a final model, with what takes the place of effects that were found."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from discover.closed_loop.explanations.limits import names_of_limits
+from discover.closed_loop.explanations.other_times import (
+    FACTOR,
+    OtherTimes,
+    compared_with_times,
+    other_times,
+)
+from discover.closed_loop.final_fit import FinalConstants, FinalFit
+from discover.closed_loop.judging.between_samples import judged_with
+from discover.closed_loop.judging.judgement import Judgement, judge
+from discover.closed_loop.judging.silence import Silence, fluid_is_silent
+from discover.dataset import Run
+from discover.dataset.checking.start import doubts_of_start
+
+
+@dataclass(frozen=True)
+class FinalVerdict:
+    """What is to be believed of a final model.
+
+    Attributes
+    ----------
+    judgement
+        The verdict with its reasons.
+    silence
+        What holds no signal, if anything does.
+    other_times
+        Factors on all relaxation times that explain the runs as well.
+    """
+
+    judgement: Judgement
+    silence: Silence | None
+    other_times: Sequence[OtherTimes]
+
+
+def verdict_on(
+    final: FinalFit, constants: FinalConstants, silent: bool, whole: Sequence[Run]
+) -> FinalVerdict:
+    """Return what is to be believed of a final model.
+
+    What takes the place of an effect joins the aliases of the search.
+
+    Parameters
+    ----------
+    final, constants
+        The final model on the runs, and its constants.
+    silent
+        Whether the records are noise about a constant.
+    whole
+        The fitted runs as they were recorded: a window of strain may have cut their start off.
+    """
+    search, active, silence = final.search, final.active, _silence(final, silent)
+    judgement = judge(
+        search.tolerated,
+        final.fit,
+        active,
+        final.records,
+        final.unseen(),
+        silence,
+        [run.name for run in whole if any(doubts_of_start(run))],
+    )
+    judgement = judged_with(judgement, constants.coarse)
+    times = other_times(search, final.carried, judgement) if final.carried else []
+    judgement, instead = compared_with_times(judgement, active, final.carried, times)
+    aliases = [(name, FACTOR) for name in instead]
+    aliases += names_of_limits(final.model, final.batch, final.fitted, final.fit, active).items()
+    for name, other in aliases:
+        search.aliases[name] = (*search.aliases.get(name, ()), other)
+    return FinalVerdict(judgement, silence, times)
+
+
+def _silence(final: FinalFit, silent: bool) -> Silence | None:
+    if silent:
+        return "records"
+    if fluid_is_silent(final.model, final.batch, final.fit, final.active):
+        return "fluid"
+    return None
