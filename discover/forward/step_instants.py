@@ -1,6 +1,6 @@
 """When rates step that were read in samples: fitted along, for their samples do not tell it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -135,7 +135,7 @@ def with_own_instants(
 def instants_found(
     model: AugmentedModel,
     fit: Fit,
-    bounds: dict[int, tuple[float, float]],
+    bounds: Mapping[int, tuple[float, float]],
     runs: Sequence[Run],
     held_out: Sequence[Run],
 ) -> dict[str, list[dict[str, Any]]]:

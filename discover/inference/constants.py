@@ -47,6 +47,11 @@ class ModeConstant:
     ci95: tuple[float, float] | None
     left_open: bool
 
+    @property
+    def width(self) -> float:
+        """Width of the interval; infinite where there is none."""
+        return float("inf") if self.ci95 is None else self.ci95[1] - self.ci95[0]
+
 
 @dataclass(frozen=True)
 class ConstantByMode(StageParameter):

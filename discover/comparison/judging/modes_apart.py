@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.judging.statements import Statement
 from discover.inference.constants import ConstantByMode
@@ -64,7 +62,7 @@ def said_of_each_mode(term: str, constant: ConstantByMode | None, n_modes: int) 
     if constant is None:
         return f"{text}, which was not tested."
     known = [mode for mode in constant.modes if mode.ci95 is not None]
-    known.sort(key=lambda mode: np.ptp(mode.ci95))
+    known.sort(key=lambda mode: mode.width)
     if not known:
         return f"{text}. These runs determine it in no single one."
     ends = known if len(known) < 3 else [known[0], known[-1]]

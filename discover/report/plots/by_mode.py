@@ -121,7 +121,7 @@ def _allowed(constant: ConstantByMode) -> str:
         return f"{said}, and determine it in no single mode."
     if len(known) > _FEW:
         # at which the least and the most is known
-        known = sorted(known, key=lambda mode: np.ptp(mode.ci95))[:: len(known) - 1]
+        known = sorted(known, key=lambda mode: mode.width)[:: len(known) - 1]
     ranges = [
         f"{interval(mode.ci95)} in the mode of {significant(mode.relaxation_time_s, 2)} s"
         for mode in known
