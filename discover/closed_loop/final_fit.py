@@ -8,9 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.explanations import Carried
-from discover.closed_loop.final_model import Bounds
 from discover.closed_loop.judging.before_after import errors_of, record_runs
-from discover.closed_loop.judging.between_samples import change_between_samples, coarse_rates
+from discover.closed_loop.judging.between_samples import (
+    Bounds,
+    change_between_samples,
+    coarse_rates,
+)
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
@@ -195,7 +198,7 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
         What is known of each mode's constant where one for all modes explains the records.
     """
     search, model, batch, fit = final.search, final.model, final.batch, final.fit
-    bounds: Bounds = intervals(model, batch, fit, final.shifts)
+    bounds = intervals(model, batch, fit, final.shifts)
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
