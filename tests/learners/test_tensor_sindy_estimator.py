@@ -64,7 +64,8 @@ def test_every_optimiser_finds_linear_ptt_in_noise(optimizer):
 
 
 def test_noise_alone_brings_in_no_term():
-    model = TensorSINDy(LIBRARY, **OF_ONE_TERM).fit(small_dataset("ucm", noise=0.02, seed=1))
+    # the whole width: the more terms are tried, the likelier noise looks like some of them
+    model = TensorSINDy(LIBRARY, **ALONE).fit(small_dataset("ucm", noise=0.02, seed=1))
     assert model.terms_ == ()
     assert model.result_.details["chosen"] == 0
 
