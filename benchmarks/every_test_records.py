@@ -7,6 +7,7 @@ import numpy as np
 from independent import Giesekus, PhanThienTanner
 from independent.folders import write_table
 from independent.homogeneous import UNIT
+from independent.imposed_stress import strain_at
 from independent.material import integrate
 from independent.structured import Structured
 from independent.sweeps import modulus_of
@@ -32,20 +33,6 @@ def followed(material, rate: Rate, times, kind="shear", jumps=()) -> np.ndarray:
         gradient = rate(t) * UNIT[kind]
         out.append(material.stress(state, gradient) + SOLVENT * (gradient + gradient.T))
     return np.array(out)
-
-
-def crept(material, stress: Rate, times, jumps=()) -> np.ndarray:
-    """Return the strain at a given shear stress, from rest: the solvent takes the rest of it."""
-    size = len(material.rest())
-
-    def change(t, y):
-        # the stress of these materials at a rate of zero: none of them has a viscosity of its own
-        polymer = material.stress(y[:size], 0.0)[0, 1]
-        rate = (stress(t) - polymer) / SOLVENT
-        return np.append(material.change(y[:size], rate * UNIT["shear"]), rate)
-
-    start, scale = np.append(material.rest(), 0.0), np.append(material.scale(), 1.0)
-    return integrate(change, start, times, jumps, scale)[:, -1]
 
 
 class Folder:
@@ -148,11 +135,7 @@ def step_strain(folder, material):
 def creep(folder, material):
     times = np.append(np.geomspace(0.02, 10.0, 50), 10.0 + np.geomspace(0.02, 10.0, 40))
     for stress in (30.0, 60.0, 90.0):
-
-        def put_on(t, s=stress):
-            return s if t < 10.0 else 0.0
-
-        strain = crept(material, put_on, times, (10.0,))
+        strain = strain_at(material, [(0.0, stress), (10.0, 0.0)], SOLVENT, times)
         applied = np.array([stress if t <= 10.0 else 0.0 for t in times])
         columns = {"time_s": times, "stress_Pa": applied, "strain": folder.noisy(strain)}
         folder.run(f"creep_{stress:g}", columns, control="stress")
@@ -161,7 +144,8 @@ def creep(folder, material):
 def laos_stress(folder, material):
     times = np.linspace(0.0, 4.0 * np.pi, 161)[1:]
     for stress in (40.0, 100.0):
-        strain = crept(material, lambda t, s=stress: s * np.sin(t), times)
+        imposed = [(0.0, lambda t, s=stress: s * np.sin(t))]
+        strain = strain_at(material, imposed, SOLVENT, times)
         columns = {
             "time_s": times, "stress_Pa": stress * np.sin(times), "strain": folder.noisy(strain)
         }  # fmt: skip
