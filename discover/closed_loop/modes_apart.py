@@ -6,7 +6,7 @@ of that.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from discover.closed_loop.search import Search
 from discover.forward import AugmentedModel
@@ -18,29 +18,14 @@ from discover.inference.degrees import Degree, choose_degrees
 from discover.inference.problem import FitProblem, effect_of
 
 
-@dataclass(frozen=True)
-class ModesApart:
-    """Constants of a search, as far as they may differ from mode to mode.
-
-    Attributes
-    ----------
-    constants
-        By name of the parameter or the effect, with an interval for each mode that holds those of
-        one constant for all modes and of one that is linear in log λ.
-    evidence
-        The strongest for any of them to differ, see `discover.inference.evidence`.
-    """
-
-    constants: dict[str, ConstantByMode]
-    evidence: float
-
-
 def modes_apart(
     search: Search, names: Sequence[str], scales: Mapping[str, float]
-) -> ModesApart | None:
-    """Return what a search left open of constants by mode; None where it cannot be fitted.
+) -> dict[str, ConstantByMode]:
+    """Return what a search left open of constants by mode, by name; empty if that has no fit.
 
-    Beside the effects that were found, no others: a program of those alone compiles fast.
+    The interval of each mode holds those of one constant for all modes and of one that is linear in
+    log λ. Beside the effects that were found there are no others in the model: a program of those
+    alone compiles fast.
 
     Parameters
     ----------
@@ -68,15 +53,12 @@ def modes_apart(
     start[[*places.values()]] = search.fit.theta[[*places]]
     fit = problem.fit(start, [places[at] for at in search.fit.free])
     if not fit.usable:
-        return None
-    alike = {name: Degree() for name in names}
-    _, chosen = choose_degrees(problem, fit, alike)
-    evidence = max(max(one.evidence) for one in chosen.values())
+        return {}
+    _, chosen = choose_degrees(problem, fit, {name: Degree() for name in names})
     alike = {name: Degree(0, one.evidence) for name, one in chosen.items()}
     shifts = modulus_shifts(model, fit.theta, search.batch)
     bounds = intervals(model, search.batch, fit, shifts)
-    found = constants_by_mode(model, search.batch, fit, bounds, alike, known)
-    return ModesApart(found, float(evidence))
+    return constants_by_mode(model, search.batch, fit, bounds, alike, known)
 
 
 def _places(before: AugmentedModel, model: AugmentedModel, active: Sequence[str]) -> dict[int, int]:

@@ -134,9 +134,9 @@ class SearchTask:
             return first
         if search.explained:
             self.say(f"what the runs say of {', '.join(names)} in each mode")
-            apart = modes_apart(search, names, data_scales(self.fitted))
-            if apart is None or apart.evidence <= INDISTINGUISHABLE:
-                return first if apart is None else replace(first, by_mode=apart.constants)
+            found = modes_apart(search, names, data_scales(self.fitted))
+            if all(max(one.evidence) <= INDISTINGUISHABLE for one in found.values()):
+                return replace(first, by_mode=found)
         self.say(f"constants that may differ from mode to mode: {', '.join(names)}")
         apart = replace(declared, by_mode=tuple(names))
         again = self._from(apart, first.laws, f"{self.name}_by_mode")

@@ -146,11 +146,8 @@ def fit_law_by_mode(
     fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
     if not any(one.degree for one in degrees.values()):
         return None
-    constants = constants_by_mode(
-        forward, problem.batch, fit, intervals(forward, problem.batch, fit), degrees
-    )
     return LawByMode(
-        constants,
+        _constants(problem, fit, degrees),
         _what_is_left(problem, fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
@@ -181,8 +178,14 @@ def coefficient_in_modes(
     fit, degrees = _fitted(problem, [name])
     if not fit.usable:
         return None
+    return _constants(problem, fit, degrees).get(name)
+
+
+def _constants(
+    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree]
+) -> dict[str, ConstantByMode]:
     bounds = intervals(problem.model, problem.batch, fit)
-    return constants_by_mode(problem.model, problem.batch, fit, bounds, degrees).get(name)
+    return constants_by_mode(problem.model, problem.batch, fit, bounds, degrees)
 
 
 def _problem(
