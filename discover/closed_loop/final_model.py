@@ -6,7 +6,6 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 
-from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.stages import (
     DeclaredEffect,
@@ -15,7 +14,7 @@ from discover.closed_loop.results.stages import (
 )
 from discover.closed_loop.search import Search
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
-from discover.equations import Equation, StatePart, law_parts
+from discover.equations import AugmentedLaw, Equation, StatePart, law_parts
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.forward.least_squares import Fit

@@ -15,12 +15,19 @@ from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.room_left import room_left
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
-from discover.comparison.outcomes.flows import Flow, Stresses, of_recorded, relative_errors
+from discover.comparison.outcomes.flows import (
+    Flow,
+    Stresses,
+    columns_of,
+    of_recorded,
+    relative_errors,
+)
 from discover.comparison.outcomes.outcome import LearnerOutcome, plain
 from discover.comparison.outcomes.range import Placement, place
 from discover.comparison.outcomes.truth import TrueTerm
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
+from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import Structure
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
@@ -164,6 +171,12 @@ class Comparison(PageView, NotebookView):
         """Checks of physical soundness by learner."""
         return {name: outcome.physics for name, outcome in self.outcomes.items()}
 
+    @property
+    def bands_by_mode(self) -> Mapping[str, PredictionBand]:
+        """What the law with constants by mode predicts, by flow; empty if it explains nothing."""
+        law = self.by_mode
+        return law.bands if law is not None and law.explains and law.rivals_sparse else {}
+
     def flows_of(self, kind: str) -> list[Flow]:
         """Return the flows of one kind."""
         return [flow for flow in self.flows if flow.kind == kind]
@@ -192,6 +205,17 @@ class Comparison(PageView, NotebookView):
         """Return the errors of a learner, or of ``"before"``, in a flow."""
         predictions = self.before if who == "before" else self.outcomes[who].predictions
         return relative_errors(predictions[flow.key], flow.reference)
+
+    def errors_by_mode(self) -> dict[str, dict[str, float | None]]:
+        """Return the errors of the law with constants by mode in flows that no fit saw, by run."""
+        bands = {} if self.by_mode is None else self.by_mode.bands
+        return {
+            flow.name: of_recorded(
+                relative_errors(columns_of(bands[flow.key].chosen), flow.reference), flow
+            )
+            for flow in self.judged
+            if flow.key in bands
+        }
 
     def outliers(self, who: str, flow: Flow) -> list[int]:
         """Return the samples of a run held out that do not judge a learner."""
@@ -281,6 +305,9 @@ class Comparison(PageView, NotebookView):
                         "term": t.term,
                         "coefficient": t.coefficient,
                         "ci95": None if t.ci95 is None else list(t.ci95),
+                        "ci95_given_equal_modes": None
+                        if t.ci95_given_equal_modes is None
+                        else list(t.ci95_given_equal_modes),
                         "coefficient_penalised": t.coefficient_penalised,
                         "inner": dict(t.inner),
                         "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},
@@ -338,7 +365,9 @@ class Comparison(PageView, NotebookView):
             ],
             "stood_for_by_constants": list(self.stood_for),
             "classical": {fit.law: fit.to_json() for fit in self.classical},
-            "by_mode": None if self.by_mode is None else self.by_mode.to_json(),
+            "by_mode": None
+            if self.by_mode is None
+            else {**self.by_mode.to_json(), "errors_by_quantity": self.errors_by_mode()},
             "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
             "rivals": [rival.to_json() for rival in self.rivals],
             "undetermined": self.undetermined,

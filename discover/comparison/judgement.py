@@ -4,19 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from discover.comparison.at_once import at_once
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
 from discover.comparison.fitting.further_laws import fit_further_laws
-from discover.comparison.fitting.law_by_mode import (
-    LawByMode,
-    SparseLaw,
-    coefficient_in_modes,
-    fit_law_by_mode,
-)
+from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
+from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
     other_constants,
@@ -35,7 +29,11 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
-from discover.comparison.judging.modes_apart import open_where_modes_differ, said_of_each_mode
+from discover.comparison.judging.modes_apart import (
+    holding_modes_apart,
+    open_where_modes_differ,
+    with_intervals_of_modes,
+)
 from discover.comparison.judging.modes_error import left_open_by_modes
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
@@ -145,9 +143,21 @@ def judge(
         others = other_constants(chosen.terms, frame.model)
         own_bands = following.bands if normal else with_other_gain(following.bands, others)
         following = replace(following, bands=frame.bands(own_bands))
+    fitted_explained = explanation.in_library
     explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
     if not explanation.in_library:
         following, own_bands, others = NextMeasurement(), {}, []
+    of_modes = OfModes()
+    # of normal stresses that were fitted too a law by mode says nothing
+    if not (chosen is None or explanation.verdict == "no_signal" or normal or study.compare.quick):
+        say("constants that differ from mode to mode")
+        of_modes = ask_of_modes(
+            chosen, frame, fitted_explained, explanation, expectation, len(library)
+        )
+    if of_modes.alike is not None and explanation.in_library:
+        outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
+        own_bands = holding_modes_apart(own_bands, of_modes.alike)
+        following = replace(following, bands=frame.bands(own_bands))
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
@@ -156,12 +166,7 @@ def judge(
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
         statements = open_where_dense_is_wide(statements, outcomes, judged)
-    by_mode, one_for_all = None, ""
-    # of normal stresses that were fitted too a law by mode says nothing
-    if not (chosen is None or silent_records or normal or study.compare.quick):
-        say("constants that differ from mode to mode")
-        by_mode, one_for_all = _by_mode(chosen, frame, explanation, expectation, len(library))
-        statements = open_where_modes_differ(statements, by_mode, explanation.in_library)
+    statements = open_where_modes_differ(statements, of_modes.law, explanation.in_library, judged)
     if chosen is not None:
         statements = with_other_constants(statements, chosen.terms, others, frame.model)
     apart = [*refuted, *disagreements(outcomes, judged, bands)]
@@ -179,11 +184,11 @@ def judge(
         if silent_records
         else (
             *_of_modes(outcomes, explanation, expectation),
-            *((one_for_all,) if one_for_all else ()),
+            *((of_modes.said,) if of_modes.said else ()),
             *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
             *apart,
         ),
-        by_mode,
+        of_modes.law,
     )
 
 
@@ -227,44 +232,6 @@ def _beside(
         parts |= {"rivals": rivals, "the library": structure}
     found = at_once(parts, lambda text, _: say(text))
     return _Beside(found.get("rivals", ()), found.get("the library"), found["the classical laws"])
-
-
-def _by_mode(
-    chosen: LearnerOutcome,
-    frame: Frame,
-    explanation: Explanation,
-    expectation: Expectation,
-    n_candidates: int,
-) -> tuple[LawByMode | None, str]:
-    """Return the best law with constants by mode, where one for all modes is in doubt.
-
-    It is where the law found explains nothing, or needs several terms: what differs from mode to
-    mode looks like a little of many terms. Of one term that explains the runs, the second is a
-    sentence on what they say of each mode.
-    """
-    model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
-    predicted = [chosen.predictions[flow.key] for flow in training]
-    n_modes = len(model.modulus)
-    if n_modes < 2 or not model.law.linear_relaxation:
-        return None, ""
-    if explanation.in_library and not chosen.terms:
-        return None, ""
-    if explanation.in_library and len(chosen.terms) == 1:
-        (term,) = chosen.terms
-        alike = coefficient_in_modes(model, term, frame.data.fit.runs)
-        if alike is None or not alike.degree:
-            return None, said_of_each_mode(term.term, alike, n_modes)
-    seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
-    if len(seen) < len(predicted):
-        return None, ""  # it runs away in a run that it was learned from
-    sparse = SparseLaw(
-        [term.term for term in chosen.terms],
-        sum(1 + len(term.inner) for term in chosen.terms),
-        seen,
-    )
-    runs = frame.data.fit.runs, frame.data.held_out.runs
-    path = chosen.details.get("path", ())
-    return fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates), ""
 
 
 def _of_modes(

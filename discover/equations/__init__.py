@@ -1,5 +1,6 @@
 """Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool; and back."""
 
+from discover.equations.augmented_law import AugmentedLaw
 from discover.equations.equation import Box, Equation, Tested
 from discover.equations.from_law import combined, effect_terms, law_parts, law_terms
 from discover.equations.has_equation import HasEquation
@@ -12,6 +13,7 @@ from discover.equations.write import FORMATS, write_equation
 
 __all__ = [
     "FORMATS",
+    "AugmentedLaw",
     "Box",
     "Equation",
     "EquationTerm",

@@ -1,24 +1,20 @@
 """The constant of each mode as finally fitted, and whether the data say anything of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians, uncertainty
+from discover.forward.by_mode import DEGREE
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, jacobians, uncertainty
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.inference.degrees import Degree
+from discover.inference.varying_constant import varying_constants
 
 _OPEN = float(np.log(0.95 / 0.05))
 """Half width of an interval, on the link's scale, from which on nothing is determined: about the
 middle of a range it holds nine tenths of it, about a small constant a factor of 19 either way."""
-
-_FARTHEST = 50.0  # e^50 of a constant is any
-_ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began
 
 _AT_THE_END = 1e-3
 """Share of the range from its upper end within which a constant stands at that end: no finding, for
@@ -39,8 +35,7 @@ def constants_by_mode(
     """Return the constants by mode of a final fit.
 
     The interval of a mode, and that at the mean time, holds that of the chosen degree and that of
-    one degree more, where there is one: evidence for the lower degree does not say that the next
-    coefficient is zero.
+    one degree more, where there is one.
 
     Parameters
     ----------
@@ -53,26 +48,19 @@ def constants_by_mode(
     prior
         What is known of some parameters.
     """
-    declared, found = model.declared, {}
-    modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
-    places = np.asarray(decades(modulus, time))
-    times = declared.relaxation_time * np.exp(fit.theta[1])
-    for name, of in degrees.items():
-        law, at = model.constant(name)
-        if at not in fit.free:
-            continue
-        constant = _Constant(law, at, declared.by_mode_slices[name].start, places)
+    found = {}
+    times = model.declared.relaxation_time * np.exp(fit.theta[1])
+    for name, constant in varying_constants(model, fit, degrees).items():
+        of = degrees[name]
         low, high, half = constant.band(batch, fit, of.degree)
         mean = bounds[constant.at]
-        if of.degree + 1 < len(of.evidence):
-            free = (*fit.free, constant.start + of.degree)
-            wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
-            if wider.usable:
-                more = constant.band(batch, wider, of.degree + 1)
-                low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
-                half = np.maximum(half, more[2])
-                (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider, of.degree + 1)
-                mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
+        wider = constant.with_one_degree_more(model, batch, fit, of, prior)
+        if wider is not None:
+            more = constant.band(batch, wider, of.degree + 1)
+            low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
+            half = np.maximum(half, more[2])
+            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider, of.degree + 1)
+            mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
         own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)
         values = constant.of_modes(fit)
@@ -83,7 +71,7 @@ def constants_by_mode(
             float(fit.theta[constant.at]),
             mean,
             "",
-            float(times[0] / 10.0 ** places[0]),
+            float(times[0] / 10.0 ** constant.places[0]),
             of.degree,
             of.evidence,
             tuple(
@@ -92,50 +80,6 @@ def constants_by_mode(
             ),
         )
     return found
-
-
-@dataclass(frozen=True)
-class _Constant:
-    """A constant by mode: its range, where it and its coefficients stand, and where the modes."""
-
-    law: FreeParameter
-    at: int
-    start: int
-    places: Float[np.ndarray, " k"]
-
-    @property
-    def at_the_mean(self) -> "_Constant":
-        """The same constant at the mean time alone."""
-        return replace(self, places=np.zeros(1))
-
-    def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
-        """Return the constant of each mode, moved on the link's scale."""
-        # one that stands far beyond an end must come back from there too
-        farthest = _ACROSS if np.isfinite(self.law.high - self.law.low) else _FARTHEST
-        moved = np.clip(np.broadcast_to(shift, self.places.shape), -farthest, farthest)
-        coefficients = fit.theta[self.start : self.start + DEGREE]
-        given = map(jnp.asarray, (coefficients, moved, self.places))
-        mean = jnp.asarray(fit.theta[self.at])
-        return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
-
-    def band(
-        self, batch: Batch, fit: Fit, degree: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the 95 % interval of each mode, and half its width on the link's scale.
-
-        To first order there, so that it keeps the range.
-        """
-        covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
-        slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
-        half = np.full(len(self.places), np.inf)
-        if np.isfinite(slope):
-            gradient = np.zeros((len(self.places), len(fit.free)))
-            gradient[:, fit.free.index(self.at)] = slope
-            for i in range(degree):
-                gradient[:, fit.free.index(self.start + i)] = self.places ** (i + 1)
-            variance = np.einsum("ki,ij,kj->k", gradient, covariance, gradient)
-            half = quantile * np.sqrt(np.clip(variance, 0.0, None))
-        return self.of_modes(fit, -half), self.of_modes(fit, half), half
 
 
 def _own_half_widths(model, batch, fit, first: int) -> Float[np.ndarray, " k"]:

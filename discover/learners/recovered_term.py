@@ -18,6 +18,9 @@ class RecoveredTerm:
         From the penalised or thresholded problem that selected it, or None where there was none.
     ci95
         95 % interval of `coefficient`, or None where not computed.
+    ci95_given_equal_modes
+        That of one coefficient for all modes, where `ci95` holds coefficients that differ from mode
+        to mode; else None.
     inner
         Inner parameters by name.
     latex
@@ -37,3 +40,4 @@ class RecoveredTerm:
     latex: str = ""
     inner_ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inner_at_one: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    ci95_given_equal_modes: tuple[float, float] | None = field(default=None, kw_only=True)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
-from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import BANDS_ONLY
 from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder
@@ -28,6 +28,9 @@ COLUMNS = (
 )
 
 PREDICTIONS = "predictions.csv"
+
+BY_MODE = "constants_by_mode"
+"""Source of what a law predicts whose constants differ from mode to mode."""
 
 _ROLES = {"training": "fit", "held_out": "held_out", "test": "prediction"}
 _ROLES["high_deborah"] = "prediction"
@@ -52,6 +55,9 @@ def comparison_predictions(
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
+    curves[BY_MODE] = {
+        key: columns_of(band.chosen) for key, band in comparison.bands_by_mode.items()
+    }
     curves |= {overlay.label: overlay.curves for overlay in overlays}
     parts = []
     for flow in comparison.flows:
@@ -131,13 +137,15 @@ def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[
     """Return the band of a learner's predictions in a flow, by quantity; empty for no claim."""
     if who in BANDS_ONLY:
         return comparison.outcomes[who].bands.get(flow.key) or {}
-    band = comparison.next_measurement.bands.get(flow.key)
-    if who != "tensor_sindy" or band is None:
-        return {}
-    return {
-        quantity: (band.rivals_low[:, i], band.rivals_high[:, i])
-        for i, quantity in enumerate(QUANTITIES)
+    bands = {
+        "tensor_sindy": comparison.next_measurement.bands,
+        BY_MODE: comparison.bands_by_mode,
     }
+    band = bands.get(who, {}).get(flow.key)
+    if band is None:
+        return {}
+    low, high = columns_of(band.rivals_low), columns_of(band.rivals_high)
+    return {quantity: (low[quantity], high[quantity]) for quantity in QUANTITIES}
 
 
 def _measured(flow: Flow, quantity: str) -> Any:

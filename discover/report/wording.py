@@ -191,8 +191,14 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "nothing beside the known part"
     parts = []
     for term in outcome.terms:
-        text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
-        if term.ci95 is not None:
+        equal = term.ci95_given_equal_modes
+        text = f"{estimate(term.coefficient, equal or term.ci95)} {_factor(readable(term.term))}"
+        if term.ci95 is not None and equal is not None:
+            text += (
+                f" (95 % interval {interval(equal)} if it is the same in all modes, else "
+                f"{interval(term.ci95)} at the mean relaxation time)"
+            )
+        elif term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)

@@ -12,10 +12,16 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
-from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.stages import DeclaredEffect
 from discover.effects import make_effect
-from discover.equations import Box, Equation, EquationTerm, StatePart, equation_to_json
+from discover.equations import (
+    AugmentedLaw,
+    Box,
+    Equation,
+    EquationTerm,
+    StatePart,
+    equation_to_json,
+)
 from discover.equations import Tested as Where
 from discover.equations.read import read_result_laws
 from discover.equations.rheotool_reader import read_rheotool

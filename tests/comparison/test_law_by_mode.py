@@ -8,18 +8,37 @@ from independent.flow import start_up as independent_start_up
 from independent.giesekus import multimode_giesekus
 
 from discover.comparison.fitting.law_by_mode import (
+    CoefficientsInModes,
     SparseLaw,
-    coefficient_in_modes,
+    coefficients_in_modes,
     fit_law_by_mode,
 )
-from discover.comparison.judging.modes_apart import open_where_modes_differ, said_of_each_mode
+from discover.comparison.fitting.stresses_by_mode import bands_by_mode
+from discover.comparison.instrument import Frame
+from discover.comparison.judging.asked_of_modes import ask_of_modes
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.modes_apart import (
+    holding_modes_apart,
+    open_where_modes_differ,
+    said_of_each_mode,
+    with_intervals_of_modes,
+)
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
-from discover.dataset import Run
+from discover.comparison.outcomes.flows import Flow, columns_of
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.dataset import Dataset, Run
+from discover.effects import make_effect
+from discover.inference.constants import ConstantByMode
+from discover.inference.draws_by_mode import ConstantsDrawn
+from discover.laws import Fluid
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
 from discover.report.plots.by_mode import by_mode_in_brief
+from discover.report.wording import terms_text
+from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
+from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
 
 MODULI, RELAXATION_TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
@@ -45,6 +64,26 @@ def known_part():
     return DeclaredModel(UpperConvectedMaxwell(), "ucm", {}, *modes, (), None)
 
 
+def flows_of(runs, kind):
+    return [
+        Flow(run.name, kind, run.protocol, run.time, run.rate, {"sigma12": run.stress})
+        for run in runs
+    ]
+
+
+def normal_stresses(mobilities, rate):
+    fluid = multimode_giesekus(mobilities, MODULI, RELAXATION_TIMES)
+    seen = fluid.respond(independent_start_up(rate), TIMES)
+    return {"N1": seen.N1, "N2": seen.N2}
+
+
+def off(band, truth, quantity, of="N1"):
+    """How far a true curve lies outside a band, relative to its own size or that of N1."""
+    low, high = columns_of(band.rivals_low)[quantity], columns_of(band.rivals_high)[quantity]
+    outside = truth[quantity] - np.clip(truth[quantity], low, high)
+    return np.linalg.norm(outside) / np.linalg.norm(truth[of])
+
+
 def fitted(mobilities):
     """The answer, beside a law with the mean mobility in every mode as what was found."""
     model = known_part()
@@ -56,7 +95,8 @@ def fitted(mobilities):
     same = [run.stress for run in records([mean] * 3, FITTED, noise=0.0)]
     runs, unseen = records(mobilities, FITTED), records(mobilities, UNSEEN)
     sparse = SparseLaw(["sigma.sigma"], 1, same)
-    return fit_law_by_mode(model, path, sparse, runs, unseen, Expectation(), 64)
+    flows = [*flows_of(runs, "training"), *flows_of(unseen, "held_out")]
+    return fit_law_by_mode(model, path, sparse, runs, unseen, Expectation(), 64, flows)
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +119,38 @@ def test_the_constant_of_each_mode_is_found_and_predicts_a_run_that_no_fit_saw(l
     assert len(said["constants"]["giesekus_mobility"]["modes"]) == 3
 
 
+IN_INTEGRATION = 1e-3
+"""What independent integrations of these laws may differ by, of the size of N1."""
+
+
+def test_its_normal_stresses_in_a_run_that_no_fit_saw_are_those_of_the_fluid(law):
+    band, truth = law.bands["held_out/at 3"], normal_stresses(MOBILITIES, 3.0)
+    half = {quantity: 0.5 * width for quantity, width in band.widths().items()}
+    for quantity in ("N1", "N2"):
+        assert off(band, truth, quantity) < IN_INTEGRATION
+        assert half[quantity] < 2.0 * NOISE
+    # one mobility for all modes has another N1, though a little of many terms may hide it in σ12
+    alike = normal_stresses([float(np.mean(MOBILITIES))] * 3, 3.0)
+    assert off(band, alike, "N1") > 0.02
+
+
+def test_modes_followed_one_by_one_add_up_to_the_fluid_that_scipy_solves():
+    exact = ConstantsDrawn(("giesekus_mobility",), np.array([[MOBILITIES]]), (1,))
+    model = known_part()
+    fluid = Fluid(model.law, model.modulus, model.relaxation_time, solvent_viscosity=7.0)
+    flows = flows_of(records(MOBILITIES, (3.0,)), "test")
+    effects = [make_effect("giesekus_mobility")]
+    (band,) = bands_by_mode(exact, effects, {"giesekus_mobility": []}, fluid, flows).values()
+    truth = normal_stresses(MOBILITIES, 3.0)
+    predicted = columns_of(band.chosen)
+    for quantity in ("N1", "N2"):
+        apart = predicted[quantity] - truth[quantity]
+        assert np.linalg.norm(apart) < IN_INTEGRATION * np.linalg.norm(truth["N1"])
+    # the solvent flows beside all modes, once
+    polymer = records(MOBILITIES, (3.0,), noise=0.0)[0].stress
+    assert predicted["sigma12"] - polymer == pytest.approx(21.0, abs=1e-3 * np.max(polymer))
+
+
 def test_its_constants_are_told_in_few_words(law):
     brief = by_mode_in_brief("giesekus_mobility", law.constants["giesekus_mobility"])
     assert brief.startswith("Giesekus mobility from 0.1 at 0.1 s to 0.")
@@ -92,7 +164,7 @@ def test_control_one_constant_for_all_modes_is_no_law_by_mode():
 def test_slow_runs_that_one_coefficient_explains_leave_that_of_the_fast_modes_open():
     term = RecoveredTerm("sigma.sigma", 0.5)
     slow = records(MOBILITIES, (0.02, 0.05, 0.1))
-    found = coefficient_in_modes(known_part(), term, slow)
+    found = coefficients_in_modes(known_part(), [term], slow).constants["sigma.sigma"]
     assert found.degree == 0
     for mode, truth in zip(found.modes, MOBILITIES, strict=True):
         assert mode.left_open or mode.ci95[0] < truth < mode.ci95[1]
@@ -104,18 +176,71 @@ def test_slow_runs_that_one_coefficient_explains_leave_that_of_the_fast_modes_op
     assert "at 10 s" in said
 
 
+def test_bands_hold_the_normal_stress_of_modes_that_the_runs_leave_open():
+    slow, fast = records(MOBILITIES, (0.02, 0.05, 0.1)), records(MOBILITIES, (3.0,))
+    flows = [*flows_of(slow, "training"), *flows_of(fast, "held_out")]
+    found = coefficients_in_modes(known_part(), [RecoveredTerm("sigma.sigma", 0.5)], slow, flows)
+    band, truth = found.bands["held_out/at 3"], normal_stresses(MOBILITIES, 3.0)
+    # one mobility for all modes meets σ12 of the slow runs, and is that of the slowest mode
+    one = float(found.constants["sigma.sigma"].value)
+    assert off(band, truth, "N1") < IN_INTEGRATION
+    narrow = replace(band, low=band.chosen, high=band.chosen)
+    narrow = replace(narrow, rivals_low=0.99 * band.chosen, rivals_high=1.01 * band.chosen)
+    alike = normal_stresses([one] * 3, 3.0)
+    missed = np.linalg.norm(alike["N1"] - truth["N1"]) / np.linalg.norm(truth["N1"])
+    assert missed > 0.05
+    assert off(narrow, truth, "N1") > 0.05
+    held = holding_modes_apart({"held_out/at 3": narrow}, found)["held_out/at 3"]
+    assert off(held, truth, "N1") < IN_INTEGRATION
+
+
+def test_control_bands_stay_narrow_where_the_runs_determine_every_mode():
+    runs = records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0))
+    flows = flows_of(runs, "training")
+    term = RecoveredTerm("sigma.sigma", 0.25)
+    found = coefficients_in_modes(known_part(), [term], runs, flows)
+    assert all(0.5 * band.widths()["N1"] < NOISE for band in found.bands.values())
+
+
+def test_an_interval_holds_coefficients_that_differ_and_keeps_that_of_equal_ones_beside_it():
+    term = RecoveredTerm("sigma.sigma", 0.5, ci95=(0.48, 0.52))
+    none = np.zeros(0)
+    outcome = LearnerOutcome("tensor_sindy", (term,), 0.0, (none, none))
+    constant = ConstantByMode(
+        0.5, (0.2, 0.51), "", mean_time_s=1.0, degree=0, evidence=(0.0,), modes=()
+    )
+    found = CoefficientsInModes({"sigma.sigma": constant}, {})
+    (wider,) = with_intervals_of_modes({"tensor_sindy": outcome}, found)["tensor_sindy"].terms
+    assert wider.ci95 == (0.2, 0.52)
+    assert wider.ci95_given_equal_modes == (0.48, 0.52)
+    told = terms_text(replace(outcome, terms=(wider,)))
+    assert "0.48 to 0.52 if it is the same in all modes, else 0.2 to 0.52" in told
+
+
+def test_there_is_no_band_where_laws_that_differ_from_mode_to_mode_run_away(law):
+    band = law.bands["held_out/at 3"]
+    lost = replace(band, rivals_low=np.full_like(band.low, np.nan), reason="it runs away")
+    found = CoefficientsInModes(law.constants, {"held_out/at 3": lost})
+    held = holding_modes_apart({"held_out/at 3": band}, found)["held_out/at 3"]
+    assert held.reason == "it runs away"
+    assert np.all(np.isnan(held.rivals_low))
+
+
 def test_control_runs_that_stretch_every_mode_determine_that_of_each():
     term = RecoveredTerm("sigma.sigma", 0.25)
-    found = coefficient_in_modes(known_part(), term, records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0)))
+    runs = records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0))
+    found = coefficients_in_modes(known_part(), [term], runs).constants["sigma.sigma"]
     assert found.degree == 0
     assert all(mode.ci95[1] - mode.ci95[0] < 0.1 for mode in found.modes)
 
 
 def test_a_term_that_the_sweep_tells_is_only_said_to_be_the_same_in_all_modes():
-    assert coefficient_in_modes(known_part(), RecoveredTerm("gammadot", 0.1), []) is None
+    assert coefficients_in_modes(known_part(), [RecoveredTerm("gammadot", 0.1)], []) is None
     said = said_of_each_mode("gammadot", None, 3)
     assert said.endswith("the same in all 3 modes, which was not tested.")
 
+
+UNSEEN_FLOWS = flows_of(records(MOBILITIES, UNSEEN), "held_out")
 
 NORMAL = [Statement(name, IN_LIBRARY, "The band is narrow.") for name in ("N1", "N2")]
 
@@ -127,7 +252,8 @@ def test_normal_stresses_are_open_where_constants_by_mode_describe_the_runs_as_w
 
 
 def test_normal_stresses_of_a_law_that_explains_nothing_are_not_called_those_of_the_fluid(law):
-    said = open_where_modes_differ(NORMAL, law, in_library=False)
+    said = open_where_modes_differ(NORMAL, law, in_library=False, flows=UNSEEN_FLOWS)
+    assert "If that is the fluid's, its N1 is known to ± " in said[0].text
     assert "N1 of the law shown is not that of the fluid" in said[0].text
 
 
@@ -136,3 +262,36 @@ def test_control_they_stay_determined_where_such_a_law_is_worth_less_or_explains
     unexplained = replace(law, left=replace(law.left, verdict="unexplained"))
     for other in (None, worse, unexplained):
         assert open_where_modes_differ(NORMAL, other, in_library=True) == NORMAL
+
+
+def asked(fitted_rates, mobilities, unseen):
+    """What is said where one coefficient explains the runs fitted, and misses one held out."""
+    runs = records(mobilities, fitted_rates)
+    flows = [*flows_of(runs, "training"), *flows_of(unseen, "held_out")]
+    parts = (Dataset("all", (*runs, *unseen)), Dataset("a", (*runs,)), Dataset("b", (*unseen,)))
+    nothing = np.zeros(0)
+    outcome = LearnerOutcome(
+        "tensor_sindy",
+        (RecoveredTerm("sigma.sigma", mobilities[-1]),),
+        0.0,
+        (nothing, nothing),
+        predictions={flow.key: {"sigma12": flow.reference["sigma12"]} for flow in flows},
+    )
+    missed = Explanation({"tensor_sindy": LackOfFit("unexplained", NOISE, NOISE, 0.0, 0.0)})
+    frame = Frame(known_part(), StudyData(*parts), flows)
+    return ask_of_modes(outcome, frame, True, missed, Expectation(), 64)
+
+
+TO_BE_FITTED = "those that differ, which the fitted runs allow, do: fit one of them too."
+
+
+def test_a_run_held_out_that_coefficients_by_mode_would_allow_is_told_as_one_to_fit():
+    found = asked((0.02, 0.05, 0.1), MOBILITIES, records(MOBILITIES, UNSEEN))
+    assert found.law is None
+    assert found.said.endswith(TO_BE_FITTED)
+
+
+def test_control_a_run_held_out_of_another_fluid_is_not():
+    (run,) = records(MOBILITIES, UNSEEN)
+    stiffer = replace(run, stress=1.5 * run.stress)
+    assert asked((0.02, 0.05, 0.1), MOBILITIES, [stiffer]).said == ""

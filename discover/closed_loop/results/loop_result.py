@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from discover.closed_loop.augmented_law import AugmentedLaw
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanations
@@ -27,6 +26,7 @@ from discover.closed_loop.results.stages import (
     Verdict,
 )
 from discover.equations import (
+    AugmentedLaw,
     Equation,
     EquationTerm,
     HasEquation,

@@ -1,19 +1,23 @@
 """A law whose constants differ from mode to mode, beside the one law for all modes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from discover.comparison.fitting.stresses_by_mode import bands_by_mode
+from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
-from discover.effects import make_effect
+from discover.effects import ConstitutiveEffect, make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, intervals
+from discover.identify.rivals.bands import PredictionBand
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees
+from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
 from discover.learners import RecoveredTerm
@@ -32,6 +36,8 @@ _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 """Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
 
 _MOST_TERMS = 3
+
+_DRAWS = 40
 
 _STARTS = (1.0, 10.0)
 """Multiples of an effect's first trial, which is the size from which it shows."""
@@ -71,12 +77,15 @@ class LawByMode:
         pay for the choice of their terms.
     errors
         Relative errors of σ12 in runs that no fit saw, by name; None where it runs away.
+    bands
+        What it predicts, by the key of the flow.
     """
 
     constants: Mapping[str, ConstantByMode]
     left: LackOfFit
     gain: float
     errors: Mapping[str, float | None]
+    bands: Mapping[str, PredictionBand] = field(default_factory=dict)
 
     @property
     def explains(self) -> bool:
@@ -102,7 +111,29 @@ class LawByMode:
             "reason": self.left.reason,
             "criterion_below_sparse": self.gain,
             "errors": dict(self.errors),
+            "bands": {key: band.to_json() for key, band in self.bands.items()},
         }
+
+
+@dataclass(frozen=True)
+class CoefficientsInModes:
+    """What the runs say of each mode where the same coefficients in all of them explain the runs.
+
+    Attributes
+    ----------
+    constants
+        By spelling of the term.
+    bands
+        Of laws whose coefficients may differ from mode to mode, by the key of the flow.
+    """
+
+    constants: Mapping[str, ConstantByMode]
+    bands: Mapping[str, PredictionBand]
+
+    @property
+    def differ(self) -> bool:
+        """Whether evidence asks for one that differs from mode to mode."""
+        return any(one.degree for one in self.constants.values())
 
 
 def fit_law_by_mode(
@@ -113,6 +144,7 @@ def fit_law_by_mode(
     held_out: Sequence[Run],
     expectation: Expectation,
     n_candidates: int,
+    flows: Sequence[Flow] = (),
 ) -> LawByMode | None:
     """Return the best law with constants by mode; None where none differs from mode to mode.
 
@@ -134,6 +166,8 @@ def fit_law_by_mode(
         What a complete law may leave.
     n_candidates
         Number of terms in the library, the choice among which every term pays for.
+    flows
+        In which it predicts.
     """
     sets = _candidate_sets(path)
     problem = _problem(model, [name for of_set in sets for name in of_set], fitted, n_candidates)
@@ -151,34 +185,61 @@ def fit_law_by_mode(
         _what_is_left(problem, fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
+        _bands(problem, fit, degrees, model, flows),
     )
 
 
-def coefficient_in_modes(
-    model: DeclaredModel, term: RecoveredTerm, fitted: Sequence[Run]
-) -> ConstantByMode | None:
-    """Return what the runs say of each mode's coefficient, where one for all modes explains them.
+def coefficients_in_modes(
+    model: DeclaredModel,
+    terms: Sequence[RecoveredTerm],
+    fitted: Sequence[Run],
+    flows: Sequence[Flow] = (),
+) -> CoefficientsInModes | None:
+    """Return what the runs say of each mode's coefficients, where equal ones explain them.
 
-    A mode that the flow hardly stretches may have any, which the interval of the common coefficient
-    takes no account of. None where the term changes what the sweep tells, or cannot be fitted.
+    A mode that the flow hardly stretches may have any, which the intervals of common coefficients
+    take no account of. None where a term changes what the sweep tells, or cannot be fitted.
 
     Parameters
     ----------
     model
         The known part: two modes or more.
-    term
-        The only one of the law that explains the runs.
+    terms
+        Of the law that explains the runs.
     fitted
         Runs without what a known instrument did.
+    flows
+        In which laws with coefficients by mode predict.
     """
-    if term.term in _OF_THE_SPECTRUM or term.inner:
+    if any(term.term in _OF_THE_SPECTRUM or term.inner for term in terms):
         return None
-    name = _effect_of(term.term, term.coefficient)
-    problem = _problem(model, [name], fitted, 1)
-    fit, degrees = _fitted(problem, [name])
+    names = {_effect_of(term.term, term.coefficient): term.term for term in terms}
+    problem = _problem(model, [*names], fitted, 1)
+    fit, degrees = _fitted(problem, [*names])
     if not fit.usable:
         return None
-    return _constants(problem, fit, degrees).get(name)
+    constants = _constants(problem, fit, degrees)
+    if set(constants) != set(names):
+        return None
+    bands = _bands(problem, fit, degrees, model, flows)
+    return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
+
+
+def _bands(
+    problem: FitProblem,
+    fit: Fit,
+    degrees: Mapping[str, Degree],
+    model: DeclaredModel,
+    flows: Sequence[Flow],
+) -> dict[str, PredictionBand]:
+    drawn = draw_constants(problem, fit, degrees, _DRAWS)
+    if drawn is None:
+        return {}
+    forward = problem.model
+    found = (effect_of(forward, name) for name in drawn.names)
+    effects = [effect for effect in found if isinstance(effect, ConstitutiveEffect)]
+    inner = {name: fit.theta[forward.positions(name)[1:]] for name in drawn.names}
+    return bands_by_mode(drawn, effects, inner, model.fluid, flows)
 
 
 def _constants(

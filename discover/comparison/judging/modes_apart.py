@@ -1,16 +1,78 @@
 """What is open where constants may differ from mode to mode: N1 and N2, and a coefficient."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from discover.comparison.fitting.law_by_mode import LawByMode
+import numpy as np
+
+from discover.comparison.fitting.law_by_mode import CoefficientsInModes, LawByMode
 from discover.comparison.judging.statements import Statement
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
 from discover.inference.constants import ConstantByMode
-from discover.words import plainly
+from discover.words import percent_of, plainly
+
+
+def with_intervals_of_modes(
+    outcomes: Mapping[str, LearnerOutcome], modes: CoefficientsInModes
+) -> dict[str, LearnerOutcome]:
+    """Return the outcomes, intervals of the sparse law holding coefficients that differ by mode.
+
+    Parameters
+    ----------
+    outcomes
+        By learner.
+    modes
+        What the runs say of each mode.
+    """
+    sparse = outcomes["tensor_sindy"]
+    terms = []
+    for term in sparse.terms:
+        constant = modes.constants.get(term.term)
+        if term.ci95 is not None and constant is not None:
+            low, high = zip(term.ci95, constant.ci95, strict=True)
+            wider = min(low), max(high)
+            term = replace(term, ci95=wider, ci95_given_equal_modes=term.ci95)
+        terms.append(term)
+    return {**outcomes, "tensor_sindy": replace(sparse, terms=tuple(terms))}
+
+
+def holding_modes_apart(
+    bands: Mapping[str, PredictionBand], modes: CoefficientsInModes
+) -> dict[str, PredictionBand]:
+    """Return the bands of the sparse law, holding coefficients that differ by mode.
+
+    There is none where those run away.
+
+    Parameters
+    ----------
+    bands
+        By the key of the flow.
+    modes
+        What the runs say of each mode.
+    """
+    return {key: _holding(band, modes.bands.get(key)) for key, band in bands.items()}
+
+
+def _holding(band: PredictionBand, other: PredictionBand | None) -> PredictionBand:
+    if other is None:
+        return band
+    return replace(
+        band,
+        low=np.minimum(band.low, other.rivals_low),
+        high=np.maximum(band.high, other.rivals_high),
+        rivals_low=np.minimum(band.rivals_low, other.rivals_low),
+        rivals_high=np.maximum(band.rivals_high, other.rivals_high),
+        reason=band.reason or other.reason,
+    )
 
 
 def open_where_modes_differ(
-    statements: Sequence[Statement], law: LawByMode | None, in_library: bool
+    statements: Sequence[Statement],
+    law: LawByMode | None,
+    in_library: bool,
+    flows: Sequence[Flow] = (),
 ) -> list[Statement]:
     """Return the statements, N1 and N2 open where constants by mode describe the runs as well.
 
@@ -25,24 +87,33 @@ def open_where_modes_differ(
         The best law with constants by mode; None where there is none.
     in_library
         Whether the sparse law, the same in every mode, explains the runs.
+    flows
+        Flows to tell the width of its bands in.
     """
     if law is None or not law.explains or not law.rivals_sparse:
         return list(statements)
-    which = f"with {law.n_constants} constants that differ from mode to mode"
     return [
-        replace(s, determined="no", text=_text(s, which, in_library))
+        replace(s, determined="no", text=_text(s, law, in_library, flows))
         if s.quantity in ("N1", "N2")
         else s
         for s in statements
     ]
 
 
-def _text(statement: Statement, which: str, in_library: bool) -> str:
+def _text(statement: Statement, law: LawByMode, in_library: bool, flows: Sequence[Flow]) -> str:
+    which = f"with {law.n_constants} constants that differ from mode to mode"
+    quantity = statement.quantity
+    bands = [law.bands[flow.key] for flow in flows if flow.key in law.bands]
+    of_it = ""
+    if bands and not any(band.reason for band in bands):
+        half = 0.5 * max(band.widths()[quantity] for band in bands)
+        of = " of N1" if quantity == "N2" else ""
+        of_it = f" If that is the fluid's, its {quantity} is known to ± {percent_of(half)}{of}."
     if in_library:
-        return f"A law {which} describes these runs as well. {statement.text}"
+        return f"A law {which} describes these runs as well.{of_it} {statement.text}"
     return (
         f"No law with the same constants in every mode explains the data, and one {which} does: "
-        f"the {statement.quantity} of the law shown is not that of the fluid."
+        f"the {quantity} of the law shown is not that of the fluid.{of_it}"
     )
 
 

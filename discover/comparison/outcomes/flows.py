@@ -290,10 +290,15 @@ def _oscillates(protocol: FlowProtocol, rates: np.ndarray) -> bool:
     return bool(np.any(np.asarray(protocol.amplitudes)) or changes >= 3)
 
 
+def columns_of(observed: Float[np.ndarray, "n 3"]) -> dict[str, np.ndarray]:
+    """Return the compared quantities by name."""
+    return dict(zip(QUANTITIES, observed.T, strict=True))
+
+
 def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
     """Return what a fluid does in a flow, or None if it runs away."""
     try:
-        return dict(zip(QUANTITIES, observe(fluid, flow.protocol, flow.times).T, strict=True))
+        return columns_of(observe(fluid, flow.protocol, flow.times))
     except SimulationError:
         return None
 

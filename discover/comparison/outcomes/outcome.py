@@ -131,7 +131,7 @@ class LearnerOutcome(TermTables):
             RecoveredTerm(
                 **{
                     **t,
-                    "ci95": None if t["ci95"] is None else tuple(t["ci95"]),
+                    **{n: t.get(n) and tuple(t[n]) for n in ("ci95", "ci95_given_equal_modes")},
                     "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
                     "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
                 }

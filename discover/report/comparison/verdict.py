@@ -87,7 +87,7 @@ def _found(comparison: Comparison) -> str:
             else "sparse regression's term describes the data and is no finding"
         )
     if comparison.by_mode is not None and comparison.by_mode.rivals_sparse:
-        parts.append(_by_mode(comparison.by_mode))
+        parts.append(_by_mode(comparison, comparison.by_mode))
     if network is not None and network.terms and "tbnn_ude" in explanation.by:
         largest = max(network.terms, key=lambda t: abs(t.coefficient))
         parts.append(
@@ -99,7 +99,7 @@ def _found(comparison: Comparison) -> str:
     return sentence([*parts, *_where_usable(comparison)])
 
 
-def _by_mode(law: LawByMode) -> str:
+def _by_mode(comparison: Comparison, law: LawByMode) -> str:
     """Return what constants that differ from mode to mode make of the data."""
     constants = ", ".join(by_mode_in_brief(name, one) for name, one in law.constants.items())
     left = f"{percent(law.left.misfit)}, which {'is noise' if law.explains else 'is not noise'}"
@@ -110,6 +110,8 @@ def _by_mode(law: LawByMode) -> str:
         unseen = (
             f", and misses runs held out by {percent(float(np.mean(missed)))}" if missed else ""
         )
+        normal = [one for row in comparison.errors_by_mode().values() if (one := row.get("N1"))]
+        unseen += f", their N1 by up to {percent(max(normal))}" if normal else ""
     return (
         f"a law whose constants differ from mode to mode ({constants}; {law.n_constants} "
         f"constants) leaves {left}{unseen}"

@@ -37,7 +37,7 @@ def by_mode_picture(
     """
     if not constants:
         return None
-    with figure(1, len(constants), width=min(9.0, 5.0 * len(constants)), height=3.0) as (
+    with figure(1, len(constants), width=9.0, height=2.8) as (
         drawing,
         axes,
     ):

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle, shade_between
 from discover.report.plots.style import (
     BEFORE_STYLE,
+    BY_MODE_STYLE,
+    BY_MODE_TITLE,
     INK,
     MEASURED,
     OVERLAY_STYLES,
@@ -60,6 +62,8 @@ def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ())
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
             yield learner_title(name), learner_style(name), prediction
+    if flow.key in comparison.bands_by_mode:
+        yield BY_MODE_TITLE, BY_MODE_STYLE, columns_of(comparison.bands_by_mode[flow.key].chosen)
     for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
         if flow.key in overlay.curves:
             yield literal(overlay.label), style, overlay.curves[flow.key]
@@ -207,20 +211,23 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
                 linewidth=0,
                 label=label,
             )
-    band = comparison.next_measurement.bands.get(flow.key)
-    if band is None:
-        return
-    column = QUANTITIES.index(quantity)
-    shade_between(
-        panel,
-        along,
-        band.rivals_low[shown, column],
-        band.rivals_high[shown, column],
-        color=SPARSE,
-        alpha=0.18,
-        linewidth=0,
-        label="left open by the data (95 %, with rivals)",
-    )
+    for bands, colour, label in (
+        (comparison.bands_by_mode, BY_MODE_STYLE["color"], "constants by mode, 95 %"),
+        (comparison.next_measurement.bands, SPARSE, "left open by the data (95 %, with rivals)"),
+    ):
+        if (band := bands.get(flow.key)) is None:
+            continue
+        column = QUANTITIES.index(quantity)
+        shade_between(
+            panel,
+            along,
+            band.rivals_low[shown, column],
+            band.rivals_high[shown, column],
+            color=colour,
+            alpha=0.18,
+            linewidth=0,
+            label=label,
+        )
 
 
 def _axis_of(comparison: Comparison, flow: Flow) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect
-from discover.equations import effect_terms, law_terms
+from discover.equations.from_law import effect_terms, law_terms
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
 from tensor_library.algebra import Symmetric

@@ -1,0 +1,132 @@
+"""Whether the modes of a fluid share their constants, as far as the runs can tell."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discover.comparison.fitting.law_by_mode import (
+    CoefficientsInModes,
+    LawByMode,
+    SparseLaw,
+    coefficients_in_modes,
+    fit_law_by_mode,
+)
+from discover.comparison.instrument import Frame
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.modes_apart import said_of_each_mode
+from discover.comparison.judging.statements import IN_NOISE
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.statistics.residual import Expectation
+
+_MOST_OUTSIDE = 0.1
+"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
+
+_BY_MODES_APART = (
+    "The runs held out do not follow coefficients that are the same in every mode, and those that "
+    "differ, which the fitted runs allow, do: fit one of them too."
+)
+
+
+@dataclass(frozen=True)
+class OfModes:
+    """What was found of the modes.
+
+    Attributes
+    ----------
+    alike
+        What the fitted runs say of each mode where equal coefficients explain them.
+    law
+        The best law with constants by mode; None where equal ones do as well.
+    said
+        For a reader; empty where there is one mode, or `law` says it.
+    """
+
+    alike: CoefficientsInModes | None = None
+    law: LawByMode | None = None
+    said: str = ""
+
+
+def ask_of_modes(
+    chosen: LearnerOutcome,
+    frame: Frame,
+    fitted_explained: bool,
+    explanation: Explanation,
+    expectation: Expectation,
+    n_candidates: int,
+) -> OfModes:
+    """Return what the runs say of each mode, and the law by mode where one for all is in doubt.
+
+    It is where the law found explains nothing, or needs several terms: what differs from mode to
+    mode looks like a little of many terms.
+
+    Parameters
+    ----------
+    chosen
+        What sparse regression found.
+    frame
+        In which it did.
+    fitted_explained
+        Whether its law explains the runs that were fitted.
+    explanation
+        Whether it explains those held out too.
+    expectation
+        What a complete law may leave.
+    n_candidates
+        Number of terms in the library.
+    """
+    model, terms = frame.model, chosen.terms
+    if len(model.modulus) < 2 or not model.law.linear_relaxation:
+        return OfModes()
+    alike, said = None, ""
+    if fitted_explained:
+        if not terms and explanation.in_library:
+            return OfModes()
+        if terms:
+            alike = coefficients_in_modes(model, terms, frame.data.fit.runs, frame.flows)
+        if explanation.in_library:
+            constants = {} if alike is None else alike.constants
+            n_modes = len(model.modulus)
+            each = (said_of_each_mode(t.term, constants.get(t.term), n_modes) for t in terms)
+            said = " ".join(each)
+            if alike is not None and len(terms) == 1 and not alike.differ:
+                return OfModes(alike, None, said)
+        elif alike is not None and _holds(frame, alike, explanation):
+            said = _BY_MODES_APART
+    law = _law_by_mode(chosen, frame, expectation, n_candidates)
+    return OfModes(alike, law, said if law is None else "")
+
+
+def _holds(frame: Frame, alike: CoefficientsInModes, explanation: Explanation) -> bool:
+    """Return whether every run held out lies in the band of coefficients that differ by mode."""
+    noise = explanation.lack_of_fit["tensor_sindy"].noise
+    return all(_inside(flow, alike, noise) for flow in frame.flows if flow.kind == "held_out")
+
+
+def _inside(flow: Flow, alike: CoefficientsInModes, noise: float) -> bool:
+    band = alike.bands.get(flow.key)
+    if band is None or band.reason:
+        return False
+    record = np.asarray(flow.reference["sigma12"])
+    allowed = IN_NOISE * noise * np.sqrt(np.mean(record**2))
+    low, high = band.rivals_low[:, 0], band.rivals_high[:, 0]
+    return float(np.mean(np.abs(record - np.clip(record, low, high)) > allowed)) <= _MOST_OUTSIDE
+
+
+def _law_by_mode(
+    chosen: LearnerOutcome, frame: Frame, expectation: Expectation, n_candidates: int
+) -> LawByMode | None:
+    model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
+    predicted = [chosen.predictions[flow.key] for flow in training]
+    seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
+    if len(seen) < len(predicted):
+        return None  # it runs away in a run that it was learned from
+    sparse = SparseLaw(
+        [term.term for term in chosen.terms],
+        sum(1 + len(term.inner) for term in chosen.terms),
+        seen,
+    )
+    runs = frame.data.fit.runs, frame.data.held_out.runs
+    path = chosen.details.get("path", ())
+    law = fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
+    return None if law is None else replace(law, bands=frame.bands(law.bands))

@@ -1,0 +1,98 @@
+"""Constants by mode drawn from what the runs leave of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import norm
+from scipy.stats.qmc import LatinHypercube
+
+from discover.forward import Batch
+from discover.forward.least_squares import Fit, uncertainty
+from discover.inference.degrees import Degree
+from discover.inference.problem import FitProblem
+from discover.inference.varying_constant import VaryingConstant, varying_constants
+from discover.statistics import root_of
+
+_TWO_SIDED = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class ConstantsDrawn:
+    """Constants of every mode that the runs allow, in groups.
+
+    Attributes
+    ----------
+    names
+        Of the constants.
+    values
+        Shape (draws, constants, k). Each group begins with the fit that it is drawn about.
+    sizes
+        Length of each group. The first has the degrees that evidence asked for; in every other one
+        constant has one degree more.
+    """
+
+    names: tuple[str, ...]
+    values: Float[np.ndarray, "draws constants k"]
+    sizes: tuple[int, ...]
+
+
+def draw_constants(
+    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree], n_draws: int, seed: int = 0
+) -> ConstantsDrawn | None:
+    """Return constants by mode drawn about a fit, on the scale of their link.
+
+    Of the fit itself, and of one with one degree more for each constant that may have it, as
+    intervals hold both. None where a constant stands at an end of its range, from where no first
+    order leads anywhere.
+
+    Parameters
+    ----------
+    problem, fit
+        What is fitted to what, and the final fit.
+    degrees
+        Degree of each constant by mode.
+    n_draws
+        About each fit.
+    seed
+        Of the draws.
+    """
+    model, batch = problem.model, problem.batch
+    constants = varying_constants(model, fit, degrees)
+    if not constants:
+        return None
+    fits = [(fit, dict(degrees))]
+    for name, constant in constants.items():
+        of = degrees[name]
+        wider = constant.with_one_degree_more(model, batch, fit, of, problem.prior)
+        if wider is not None:
+            fits.append((wider, {**degrees, name: replace(of, degree=of.degree + 1)}))
+    rng = np.random.default_rng(seed)
+    groups = [_about(batch, one, constants, of, n_draws, rng) for one, of in fits]
+    drawn = [group for group in groups if group is not None]
+    if len(drawn) < len(groups):
+        return None
+    return ConstantsDrawn(tuple(constants), np.concatenate(drawn), tuple(map(len, drawn)))
+
+
+def _about(
+    batch: Batch,
+    fit: Fit,
+    constants: Mapping[str, VaryingConstant],
+    degrees: Mapping[str, Degree],
+    n_draws: int,
+    rng: np.random.Generator,
+) -> Float[np.ndarray, "draws constants k"] | None:
+    covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+    # evenly along every axis, or the ends of a band of few draws would be a matter of luck
+    even = norm.ppf(LatinHypercube(len(covariance), scramble=False, rng=rng).random(n_draws))
+    moved = (quantile / _TWO_SIDED) * even @ root_of(covariance).T
+    columns = []
+    for name, constant in constants.items():
+        gradient = constant.gradient(fit, degrees[name].degree)
+        if gradient is None:
+            return None
+        shifts = [np.zeros(len(constant.places)), *(moved @ gradient.T)]
+        columns.append(np.stack([constant.of_modes(fit, shift) for shift in shifts]))
+    return np.stack(columns, axis=1)

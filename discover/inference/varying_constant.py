@@ -1,0 +1,145 @@
+"""A constant that may differ from mode to mode, on the scale of its link about a fit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward import AugmentedModel, Batch, FreeParameter
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, uncertainty
+from discover.inference.degrees import Degree
+
+_FARTHEST = 50.0  # e^50 of a constant is any
+_ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began
+
+
+@dataclass(frozen=True)
+class VaryingConstant:
+    """A constant by mode: its range, where it and its coefficients stand, and where the modes.
+
+    Attributes
+    ----------
+    law
+        Its range.
+    at
+        Position of the constant at the mean time.
+    start
+        Position of the first coefficient in log λ.
+    places
+        Of the modes, from `decades`.
+    """
+
+    law: FreeParameter
+    at: int
+    start: int
+    places: Float[np.ndarray, " k"]
+
+    @property
+    def at_the_mean(self) -> "VaryingConstant":
+        """The same constant at the mean time alone."""
+        return replace(self, places=np.zeros(1))
+
+    def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
+        """Return the constant of each mode, moved on the link's scale.
+
+        Parameters
+        ----------
+        fit
+            The fit.
+        shift
+            By how much, shape (k,) or ().
+        """
+        # one that stands far beyond an end must come back from there too
+        farthest = _ACROSS if np.isfinite(self.law.high - self.law.low) else _FARTHEST
+        moved = np.clip(np.broadcast_to(shift, self.places.shape), -farthest, farthest)
+        coefficients = fit.theta[self.start : self.start + DEGREE]
+        given = map(jnp.asarray, (coefficients, moved, self.places))
+        mean = jnp.asarray(fit.theta[self.at])
+        return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
+
+    def gradient(self, fit: Fit, degree: int) -> Float[np.ndarray, "k free"] | None:
+        """Return the derivative of each mode's link in what was fitted; None at an end of a range.
+
+        Parameters
+        ----------
+        fit
+            The fit.
+        degree
+            How many coefficients in log λ are free in it.
+        """
+        slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
+        if not np.isfinite(slope):
+            return None
+        gradient = np.zeros((len(self.places), len(fit.free)))
+        gradient[:, fit.free.index(self.at)] = slope
+        for i in range(degree):
+            gradient[:, fit.free.index(self.start + i)] = self.places ** (i + 1)
+        return gradient
+
+    def band(
+        self, batch: Batch, fit: Fit, degree: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the 95 % interval of each mode, and half its width on the link's scale.
+
+        To first order there, so that it keeps the range.
+
+        Parameters
+        ----------
+        batch, fit, degree
+            The fitted runs, the fit, and how many coefficients in log λ are free in it.
+        """
+        covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+        gradient = self.gradient(fit, degree)
+        half = np.full(len(self.places), np.inf)
+        if gradient is not None:
+            variance = np.einsum("ki,ij,kj->k", gradient, covariance, gradient)
+            half = quantile * np.sqrt(np.clip(variance, 0.0, None))
+        return self.of_modes(fit, -half), self.of_modes(fit, half), half
+
+    def with_one_degree_more(
+        self, model: AugmentedModel, batch: Batch, fit: Fit, of: Degree, prior: Prior = NO_PRIOR
+    ) -> Fit | None:
+        """Return the fit with the next coefficient free too; None where there is none.
+
+        Evidence for the lower degree does not say that the next coefficient is zero.
+
+        Parameters
+        ----------
+        model, batch, fit
+            The model, the fitted runs and the fit.
+        of
+            The degree of the constant in it.
+        prior
+            What is known of some parameters.
+        """
+        if of.degree + 1 >= len(of.evidence):
+            return None
+        free = (*fit.free, self.start + of.degree)
+        wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
+        return wider if wider.usable else None
+
+
+def varying_constants(
+    model: AugmentedModel, fit: Fit, degrees: Mapping[str, Degree]
+) -> dict[str, VaryingConstant]:
+    """Return the constants by mode that a fit has.
+
+    Parameters
+    ----------
+    model, fit
+        The model and the fit.
+    degrees
+        Degree of each constant by mode.
+    """
+    declared, found = model.declared, {}
+    modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
+    places = np.asarray(decades(modulus, time))
+    for name in degrees:
+        law, at = model.constant(name)
+        if at in fit.free:
+            start = declared.by_mode_slices[name].start
+            found[name] = VaryingConstant(law, at, start, places)
+    return found
