@@ -35,7 +35,11 @@ from discover.comparison.judging.modes_apart import (
     with_intervals_of_modes,
 )
 from discover.comparison.judging.modes_error import left_open_by_modes
-from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
+from discover.comparison.judging.next_measurement import (
+    NextMeasurement,
+    bands_of_law,
+    next_measurement,
+)
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
     ONLY_STATES,
@@ -133,20 +137,23 @@ def judge(
         # where a quantity is said to be determined, its band says how well
         keys = {flow.key for flow in (*judged, *fitted)}
         banded = [flow for flow in frame.flows if flow.key in keys]
-        # bands and experiments take it that the law, or a rival, is the fluid's
-        left = explanation.lack_of_fit["tensor_sindy"]
-        # outliers are no noise of the next experiment
+        # bands take it that the law, or a rival, is the fluid's
+        own_bands = bands_of_law(chosen, rivals, frame.model.fluid, banded, seed)
+        others = other_constants(chosen.terms, frame.model)
+        own_bands = own_bands if normal else with_other_gain(own_bands, others)
+    fitted_explained, left = explanation.in_library, explanation.lack_of_fit.get("tensor_sindy")
+    bands = frame.bands(own_bands)
+    explanation = hold_against_unseen(explanation, outcomes, flows, bands, expectation)
+    if chosen is not None and left is not None and explanation.in_library:
+        # experiments are asked for once runs held out bear the law out; outliers are no noise of
+        # the next one
         misfit = left.misfit if left.outliers else None
         following = next_measurement(
-            chosen, rivals, frame.model.fluid, banded, study.compare.next, seed, misfit
+            chosen, rivals, frame.model.fluid, own_bands, study.compare.next, seed, misfit
         )
-        others = other_constants(chosen.terms, frame.model)
-        own_bands = following.bands if normal else with_other_gain(following.bands, others)
-        following = replace(following, bands=frame.bands(own_bands))
-    fitted_explained = explanation.in_library
-    explanation = hold_against_unseen(explanation, outcomes, flows, following.bands, expectation)
-    if not explanation.in_library:
-        following, own_bands, others = NextMeasurement(), {}, []
+        following = replace(following, bands=bands)
+    else:
+        own_bands, others = {}, []
     of_modes = OfModes()
     # of normal stresses that were fitted too a law by mode says nothing
     if not (chosen is None or explanation.verdict == "no_signal" or normal or study.compare.quick):

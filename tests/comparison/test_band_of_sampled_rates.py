@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from independent import Giesekus, oscillation
 
-from discover.comparison.judging.next_measurement import next_measurement
+from discover.comparison.judging.next_measurement import bands_of_law
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import measured_rate, oscillatory_shear
-from discover.study.schema import NextExperiment
 
 AMPLITUDE, FREQUENCY = 5.0, 1.5
 TIMES = np.linspace(0.02, 8.0, 100)
@@ -24,7 +23,7 @@ def band(protocol):
     terms = (RecoveredTerm("sigma.sigma", 0.3),)
     outcome = LearnerOutcome("tensor_sindy", terms, 0.0, history)
     fluid = Fluid.dimensionless(make_law("ucm"))
-    return next_measurement(outcome, [], fluid, [flow], NextExperiment()).bands[flow.key]
+    return bands_of_law(outcome, [], fluid, [flow])[flow.key]
 
 
 @pytest.mark.slow

@@ -8,7 +8,12 @@ from discover.identify.design.experiment_outcome import judge_laws
 from discover.identify.design.experiments import candidate_experiments
 from discover.identify.design.next_experiment import DECISIVE, propose_experiments, squared_distance
 from discover.identify.rivals.bands import bands_of_predictions, prediction_bands
-from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
+from discover.identify.side_by_side.many_laws import (
+    Contender,
+    fluid_of,
+    predict_laws,
+    sigma_points,
+)
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.simulate import simulate
 
@@ -157,3 +162,22 @@ def test_an_unknown_class_of_experiment_is_an_input_error():
         candidate_experiments(1.0, ["squeeze"])
     with pytest.raises(InputError, match="Wi"):
         candidate_experiments(1.0, weissenberg_numbers=[-1.0])
+
+
+def test_sigma_points_have_the_covariance_that_they_stand_for():
+    covariance = np.array([[4.0, 1.0], [1.0, 2.0]]) * 1e-4
+    law = Contender("both", {"sigma.sigma": 0.2, "tr(sigma)*sigma": 0.1}, covariance=covariance)
+    first, *others = sigma_points(law, 32, np.random.default_rng(0))
+    assert first is law
+    assert len(others) == 4  # two for each parameter
+    moved = np.array([[*one.terms.values()] for one in others]) - [*law.terms.values()]
+    np.testing.assert_allclose(moved.T @ moved / len(moved), covariance, rtol=1e-12)
+    np.testing.assert_allclose(moved.sum(axis=0), 0.0, atol=1e-15)
+
+
+def test_laws_that_are_known_exactly_or_only_by_draws_have_no_sigma_points():
+    rng, terms = np.random.default_rng(0), {"sigma.sigma": 0.2}
+    exact = Contender("exact", terms)
+    assert sigma_points(exact, 32, rng) == (exact,)
+    drawn = Contender("drawn", terms, covariance=SMALL, drawn=np.full((50, 1), 0.3))
+    assert [law.terms["sigma.sigma"] for law in sigma_points(drawn, 8, rng)] == [0.2, *[0.3] * 8]

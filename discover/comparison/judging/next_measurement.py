@@ -118,16 +118,14 @@ class NextMeasurement:
         return [IdentifiabilityCell.of(proposal) for proposal in self.oscillations]
 
 
-def next_measurement(
+def bands_of_law(
     outcome: LearnerOutcome,
     rivals: Iterable[Any],
     declared: Fluid,
     flows: Sequence[Flow],
-    options: NextExperiment,
     seed: int = 0,
-    misfit: float | None = None,
-) -> NextMeasurement:
-    """Return bands and proposals for the law that sparse regression chose.
+) -> dict[str, PredictionBand]:
+    """Return the bands of the law that sparse regression chose, by the key of the flow.
 
     Parameters
     ----------
@@ -139,29 +137,50 @@ def next_measurement(
         The known part.
     flows
         Flows to draw bands for.
-    options
-        What the user could run.
     seed
         Of the draws from the parameters' uncertainty.
+    """
+    if not flows:
+        return {}
+    chosen, others = contenders(outcome, rivals)
+    found = prediction_bands(
+        chosen,
+        others,
+        declared,
+        [flow.protocol for flow in flows],
+        [flow.times for flow in flows],
+        n_draws=_MOST_DRAWS,
+        seed=seed,
+    )
+    found = _with_sampled_rates(found, chosen, declared, flows)
+    return {flow.key: band for flow, band in zip(flows, found, strict=True)}
+
+
+def next_measurement(
+    outcome: LearnerOutcome,
+    rivals: Iterable[Any],
+    declared: Fluid,
+    bands: Mapping[str, PredictionBand],
+    options: NextExperiment,
+    seed: int = 0,
+    misfit: float | None = None,
+) -> NextMeasurement:
+    """Return proposals for the law that sparse regression chose, beside its bands.
+
+    Parameters
+    ----------
+    outcome, rivals, declared, seed
+        As in `bands_of_law`.
+    bands
+        What that returns.
+    options
+        What the user could run.
     misfit
         Relative error of the law without outliers, where there are any.
     """
     chosen, others = contenders(outcome, rivals)
     misfit = float(outcome.details.get("misfit") or 0.0) if misfit is None else misfit
     noise = options.noise or max(misfit, LEAST_NOISE)
-    bands = {}
-    if flows:
-        found = prediction_bands(
-            chosen,
-            others,
-            declared,
-            [flow.protocol for flow in flows],
-            [flow.times for flow in flows],
-            n_draws=_MOST_DRAWS,
-            seed=seed,
-        )
-        found = _with_sampled_rates(found, chosen, declared, flows)
-        bands = {flow.key: band for flow, band in zip(flows, found, strict=True)}
     proposals = []
     if others:
         moduli, times = (np.asarray(v) for v in (declared.modulus, declared.relaxation_time))

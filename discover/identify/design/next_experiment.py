@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.identify.design.experiments import OBSERVED, Experiment
-from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
+from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws, sigma_points
 from discover.laws.multimode import Fluid
 
 DECISIVE = 5.0
@@ -29,6 +29,9 @@ OVERWHELMING = 50.0
 """More evidence than this makes no experiment better than another."""
 
 MOST_EVIDENCE = 1e6
+
+_HIDDEN = 1e-3
+"""Of the noise: a deviation of the prediction that changes no evidence by more than its square."""
 
 # an error of 1e-5 is nothing beside the noise that a measurement is given here
 _LIMITS = {"strain_step": 0.2, "phase_step": 0.3}
@@ -109,13 +112,13 @@ def propose_experiments(
     observed
         What could be measured, of `OBSERVED`.
     n_draws
-        Draws of each law's parameters.
+        Of each law's parameters, where its covariance does not serve.
     seed
         Of the draws.
     """
     laws = [chosen, *rivals]
     rng = np.random.default_rng(seed)
-    groups = [draws(law, n_draws, rng) for law in laws]
+    groups = [sigma_points(law, n_draws, rng) for law in laws]
     flat = [law for group in groups for law in group]
     starts = np.cumsum([0, *(len(group) for group in groups)])
     predicted = predict_laws(
@@ -164,19 +167,27 @@ def _evidence(runs, kinds, noise: float) -> Float[np.ndarray, "laws laws"]:
     scale[2] = scale[1]
     size = noise * np.maximum(scale, 1e-300)
     measured = [(run[..., list(kinds)] / size[list(kinds)]).reshape(len(run), -1) for run in runs]
+    factors = [_seen(spread_of(of_law)) for of_law in measured]
     evidence = np.zeros((len(runs), len(runs)))
     for i in range(len(runs)):
         for j in range(i):
-            evidence[i, j] = evidence[j, i] = _pair(measured[i], measured[j])
+            apart = measured[i][0] - measured[j][0]
+            both = np.concatenate([factors[i], factors[j]], axis=0)
+            evidence[i, j] = evidence[j, i] = _of_pair(apart, both)
     return evidence
 
 
-def _pair(first: np.ndarray, second: np.ndarray) -> float:
-    difference = first[0] - second[0]
+def _of_pair(difference: np.ndarray, factor: np.ndarray) -> float:
     if not np.all(np.isfinite(difference)):
         return MOST_EVIDENCE
-    factor = np.concatenate([spread_of(first), spread_of(second)], axis=0)
     return float(min(0.5 * squared_distance(difference, factor), MOST_EVIDENCE))
+
+
+def _seen(factor: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "r n"]:
+    """Return a factor of the same covariance without what noise hides, for all pairs at once."""
+    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
+    kept = sizes > _HIDDEN
+    return sizes[kept, None] * rows[kept]
 
 
 def squared_distance(

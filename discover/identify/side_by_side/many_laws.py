@@ -111,37 +111,78 @@ def draws(
 
     From a covariance by Latin hypercubes   [McKay, Beckman & Conover 1979, Technometrics 21, 239].
     """
-    if n_draws == 0 or contender.without_band:
+    if n_draws == 0 or not _is_uncertain(contender):
         return (contender,)
-    if contender.drawn is None and contender.covariance is None:
-        return (contender,)
-    names, inner = list(contender.terms), list(contender.inner)
-    centre = np.array([*contender.terms.values(), *contender.inner.values()])
     if contender.drawn is None:
         assert contender.covariance is not None  # one of the two is there
         root = root_of(contender.covariance)
         # evenly along every axis, or the ends of a band of few draws would be a matter of luck
         even = norm.ppf(LatinHypercube(len(root), scramble=False, rng=rng).random(n_draws))
-        drawn = centre + even @ root.T
+        drawn = _centre(contender) + even @ root.T
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]
-    split = len(names)
-    moduli: list[np.ndarray | None] = [None] * len(drawn)
-    errors = contender.modulus_errors
+    errors, moduli = contender.modulus_errors, None
     if errors is not None and modulus is not None and contender.covariance is not None:
-        moduli = list(modulus + errors.draw(drawn - centre, contender.covariance, rng))
-    return (
-        contender,
-        *(
-            Contender(
-                contender.name,
-                dict(zip(names, row[:split], strict=True)),
-                dict(zip(inner, row[split:], strict=True)),
-                modulus=own,
-            )
-            for row, own in zip(drawn, moduli, strict=True)
-        ),
-    )
+        moved = drawn - _centre(contender)
+        moduli = modulus + errors.draw(moved, contender.covariance, rng)
+    return (contender, *_with_parameters(contender, drawn, moduli))
+
+
+def sigma_points(
+    contender: Contender, most: int, rng: np.random.Generator
+) -> tuple[Contender, ...]:
+    """Return laws whose predictions have the contender's covariance; itself comes first.
+
+    To second order, and with two laws for each parameter, by the unscented transform   [Julier &
+    Uhlmann 2004, Proc. IEEE 92, 401]. Where the covariance does not serve, or has too many
+    parameters, `draws`.
+
+    Parameters
+    ----------
+    contender
+        The law.
+    most
+        So many besides itself.
+    rng
+        Of draws.
+    """
+    if not _is_uncertain(contender) or contender.drawn is not None or contender.covariance is None:
+        return draws(contender, most, rng)
+    root = root_of(contender.covariance)
+    seen = root.T[np.any(root, axis=0)]
+    if 2 * len(seen) > most:
+        return draws(contender, most, rng)
+    far = np.sqrt(len(seen)) * seen
+    return (contender, *_with_parameters(contender, _centre(contender) + np.array([*far, *-far])))
+
+
+def _is_uncertain(contender: Contender) -> bool:
+    if contender.without_band:
+        return False
+    return contender.drawn is not None or contender.covariance is not None
+
+
+def _centre(contender: Contender) -> Float[np.ndarray, " p"]:
+    return np.array([*contender.terms.values(), *contender.inner.values()])
+
+
+def _with_parameters(
+    contender: Contender,
+    values: Float[np.ndarray, "draws p"],
+    moduli: Float[np.ndarray, "draws k"] | None = None,
+) -> list[Contender]:
+    """Return the law with other parameters and, where they are given, other moduli."""
+    names, inner = list(contender.terms), list(contender.inner)
+    split = len(names)
+    return [
+        Contender(
+            contender.name,
+            dict(zip(names, row[:split], strict=True)),
+            dict(zip(inner, row[split:], strict=True)),
+            modulus=None if moduli is None else moduli[i],
+        )
+        for i, row in enumerate(values)
+    ]
 
 
 def predict_laws(
