@@ -282,7 +282,7 @@ def asked(fitted_rates, mobilities, unseen):
     return ask_of_modes(outcome, frame, True, missed, Expectation(), 64)
 
 
-TO_BE_FITTED = "those that differ, which the fitted runs allow, do: fit one of them too."
+TO_BE_FITTED = "would, as another law may: fit one of them too."
 
 
 def test_a_run_held_out_that_coefficients_by_mode_would_allow_is_told_as_one_to_fit():

@@ -23,8 +23,8 @@ _MOST_OUTSIDE = 0.1
 """Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
 
 _BY_MODES_APART = (
-    "The runs held out do not follow coefficients that are the same in every mode, and those that "
-    "differ, which the fitted runs allow, do: fit one of them too."
+    "The runs held out do not follow coefficients that are the same in every mode. Those that "
+    "differ, which the fitted runs allow, would, as another law may: fit one of them too."
 )
 
 

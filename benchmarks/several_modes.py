@@ -1,0 +1,190 @@
+"""How true is what is said of fluids of several modes, each with constants of its own.
+
+Three modes recorded by scipy, start-ups with 1 % noise, told to `compare` as upper convected
+Maxwell with the right spectrum: laws of the library with one constant and with constants by mode,
+mixtures of laws, and chains that no library holds. Of two runs held out one is slower than the fastest
+fitted, one faster. N1 and N2 are known and told to nobody. Each case is a line of JSON, so a
+stopped run goes on.
+
+    python benchmarks/several_modes.py --seed 1 --out modes.jsonl
+
+Seeds of 1 to 9 are for development.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+from independent import (
+    Giesekus,
+    Modes,
+    PhanThienTanner,
+    PomPom,
+    RoliePoly,
+    multimode_giesekus,
+    start_up,
+)
+
+import discover as dc
+
+MODULI, RELAXATION_TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
+TIMES = np.geomspace(0.02, 20.0, 60)
+FAST, SLOW = (0.3, 1.0, 5.0), (0.02, 0.05, 0.1)
+NOISE = 0.01
+_IN_INTEGRATION = 2e-3
+"""Of the size of a curve: what a band may miss by independent integration."""
+
+
+def fluids(rng: np.random.Generator) -> dict:
+    """Return the fluids by name, constants drawn."""
+    low, high = np.sort(rng.uniform(0.05, 0.6, 2))
+    rising = np.geomspace(low, high + 0.1, 3)
+    ends = 0.05, 0.3
+    modes = list(zip(MODULI, RELAXATION_TIMES, strict=True))
+
+    def ptt(epsilons, slip=0.0):
+        pairs = zip(epsilons, modes, strict=True)
+        return Modes(*(_ptt(epsilon, *mode, slip) for epsilon, mode in pairs))
+
+    return {
+        "Giesekus, one mobility": multimode_giesekus([high] * 3, MODULI, RELAXATION_TIMES),
+        "Giesekus, rising": multimode_giesekus(rising, MODULI, RELAXATION_TIMES),
+        "Giesekus, peaked": multimode_giesekus([low, high, low], MODULI, RELAXATION_TIMES),
+        "linear PTT, one": ptt([rng.uniform(*ends)] * 3),
+        "linear PTT, falling": ptt(np.geomspace(0.4, 0.05, 3)),
+        "linear PTT with slip": ptt(np.geomspace(0.05, 0.3, 3), rng.uniform(0.05, 0.2)),
+        "Giesekus and PTT": Modes(
+            Giesekus(high, *modes[0]), _ptt(0.2, *modes[1]), Giesekus(low, *modes[2])
+        ),
+        "Rolie-Poly": Modes(
+            *(RoliePoly(rng.uniform(0.0, 1.0), t / 5.0, -0.5, g, t) for g, t in modes)
+        ),
+        "pom-pom": Modes(
+            *(
+                PomPom(arms, 0.4 * t, g, t)
+                for arms, (g, t) in zip((2.0, 4.0, 8.0), modes, strict=True)
+            )
+        ),
+    }
+
+
+def _ptt(epsilon: float, modulus: float, time: float, slip: float = 0.0) -> PhanThienTanner:
+    return PhanThienTanner(epsilon, slip=slip, modulus=modulus, relaxation_time=time)
+
+
+def runs_of(fluid, rates, rng: np.random.Generator) -> tuple[list, dict]:
+    """Return noisy records of start-ups, and what nobody is told."""
+    runs, truths = [], {}
+    for rate in rates:
+        seen = fluid.respond(start_up(rate), TIMES)
+        size = NOISE * np.sqrt(np.mean(seen.sigma12**2))
+        stress = seen.sigma12 + size * rng.standard_normal(len(TIMES))
+        name = f"at_{rate:g}"
+        runs.append(dc.Run(name, TIMES, dc.start_up(rate), np.full(len(TIMES), rate), stress))
+        truths[name] = {"N1": seen.N1, "N2": seen.N2}
+    return runs, truths
+
+
+def run_case(name: str, fluid, fitted, rng: np.random.Generator) -> dict:
+    """Return what a comparison says of one fluid, beside what is there."""
+    unseen = (0.6 * fitted[-1], 3.0 * fitted[-1])
+    runs, truths = runs_of(fluid, (*fitted, *unseen), rng)
+    held_out = [run.name for run in runs[len(fitted) :]]
+    base = dc.Fluid(dc.make_law("ucm"), list(MODULI), list(RELAXATION_TIMES))
+    began = time.process_time()
+    found = dc.compare(
+        dc.Dataset(name, tuple(runs)),
+        base,
+        held_out=held_out,
+        learners=["tensor_sindy"],
+        library={"degree": 1},
+        max_terms=3,
+    )
+    sparse = found.outcomes["tensor_sindy"]
+    flows = {flow.name: flow for flow in found.judged}
+    bands = {"sparse": found.next_measurement.bands, "by_mode": found.bands_by_mode}
+    judged = [
+        {"source": source, "run": run, **_held(by_flow[flow.key], truths[run])}
+        for source, by_flow in bands.items()
+        for run, flow in flows.items()
+        if flow.key in by_flow
+    ]
+    law = found.by_mode
+    return {
+        "fluid": name,
+        "fitted": list(fitted),
+        "verdict": found.verdict,
+        "terms": [
+            {"term": t.term, "coefficient": t.coefficient, "ci95": t.ci95} for t in sparse.terms
+        ],
+        "undetermined": found.undetermined,
+        "by_mode": None
+        if law is None
+        else {
+            "verdict": law.left.verdict,
+            "constants": {
+                n: [m.ci95 for m in constant.modes] for n, constant in law.constants.items()
+            },
+            "errors": dict(law.errors),
+        },
+        "bands": judged,
+        "said": list(found.warnings),
+        "processor_s": time.process_time() - began,
+    }
+
+
+def _held(band, truth) -> dict:
+    size = float(np.linalg.norm(truth["N1"]))
+    row = {}
+    for column, quantity in ((1, "N1"), (2, "N2")):
+        low, high = band.rivals_low[:, column], band.rivals_high[:, column]
+        outside = truth[quantity] - np.clip(truth[quantity], low, high)
+        off = float(np.linalg.norm(outside)) / size
+        half = 0.5 * float(np.linalg.norm(high - low)) / size
+        # limits are nan where nothing is claimed
+        row[quantity] = None if np.isnan(off) else {"off": off, "half_width": half}
+    return row
+
+
+def main() -> None:
+    """Run the cases that are not in the file yet, and print all."""
+    parser = argparse.ArgumentParser(description="fluids of several modes")
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--only", nargs="*", default=[], help="names of fluids")
+    asked = parser.parse_args()
+    lines = asked.out.read_text("utf-8").splitlines() if asked.out.is_file() else []
+    rows = [json.loads(line) for line in lines]
+    done = {(row["seed"], row["fluid"], tuple(row["fitted"])) for row in rows}
+    for name, fluid in fluids(np.random.default_rng(asked.seed)).items():
+        for rates in (FAST, SLOW):
+            if (asked.seed, name, rates) in done or (asked.only and name not in asked.only):
+                continue
+            rng = np.random.default_rng([asked.seed, len(name), int(100 * rates[0])])
+            row = {"seed": asked.seed, **run_case(name, fluid, rates, rng)}
+            rows.append(row)
+            with asked.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+    print_table(rows)
+
+
+def print_table(rows: list[dict]) -> None:
+    """Print what is said of each fluid, and the bands that miss."""
+    for row in rows:
+        law = row["by_mode"]
+        said = "" if law is None else f"; by mode {law['verdict']}: {', '.join(law['constants'])}"
+        terms = ", ".join(f"{t['coefficient']:.3g} {t['term']}" for t in row["terms"])
+        print(f"{row['fluid']} ({row['fitted'][-1]:g} 1/s): {row['verdict']}: {terms}{said}")
+        for band in row["bands"]:
+            for quantity in ("N1", "N2"):
+                held = band[quantity]
+                if held is not None and held["off"] > _IN_INTEGRATION:
+                    off, half = (100.0 * held[k] for k in ("off", "half_width"))
+                    where = f"{band['source']} {band['run']} {quantity}"
+                    print(f"    {where} off {off:.1f} ± {half:.1f} %")
+
+
+if __name__ == "__main__":
+    main()
