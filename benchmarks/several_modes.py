@@ -2,9 +2,9 @@
 
 Three modes recorded by scipy, start-ups with 1 % noise, told to `compare` as upper convected
 Maxwell with the right spectrum: laws of the library with one constant and with constants by mode,
-mixtures of laws, and chains that no library holds. Of two runs held out one is slower than the fastest
-fitted, one faster. N1 and N2 are known and told to nobody. Each case is a line of JSON, so a
-stopped run goes on.
+mixtures of laws, and chains that no library holds. Of two runs held out one is slower than the
+fastest fitted, one faster. N1 and N2 are known and told to nobody. Each case is a line of JSON, so
+a stopped run goes on.
 
     python benchmarks/several_modes.py --seed 1 --out modes.jsonl
 

@@ -1,7 +1,7 @@
 """What is to be believed of what the learners found: one judgement from all checks."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from discover.comparison.at_once import at_once
@@ -50,6 +50,7 @@ from discover.comparison.judging.statements import (
 )
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
@@ -122,81 +123,138 @@ def judge(
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
     repeats = repeats_among(list(known.before.data.dataset))
     expectation = expectation_of(study, known.before.model, repeats)
-    explanation = explain(outcomes, flows, expectation, normal, repeats)
+    at_first = explain(outcomes, flows, expectation, normal, repeats)
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
-    fitted = [flow for flow in flows if flow.kind == "training"]
-    judged = [flow for flow in flows if flow.kind in ("test", "held_out")] or fitted
-    following = NextMeasurement()
+    is_silent = at_first.verdict == "no_signal"
     beside = _Beside((), None, ())
-    if explanation.verdict != "no_signal":
+    if not is_silent:
         beside = _beside(study, known, library, chosen, frame, say)
-    rivals, structure = beside.rivals, beside.structure
-    others: list[OtherConstant] = []
-    own_bands: Mapping[str, PredictionBand] = {}
-    if chosen is not None and explanation.in_library:
-        # where a quantity is said to be determined, its band says how well
-        keys = {flow.key for flow in (*judged, *fitted)}
-        banded = [flow for flow in frame.flows if flow.key in keys]
-        # bands take it that the law, or a rival, is the fluid's
-        own_bands = bands_of_law(chosen, rivals, frame.model.fluid, banded, seed)
-        others = other_constants(chosen.terms, frame.model)
-        own_bands = own_bands if normal else with_other_gain(own_bands, others)
-    fitted_explained, left = explanation.in_library, explanation.lack_of_fit.get("tensor_sindy")
-    bands = frame.bands(own_bands)
-    explanation = hold_against_unseen(explanation, outcomes, flows, bands, expectation)
-    if chosen is not None and left is not None and explanation.in_library:
-        # experiments are asked for once runs held out bear the law out; outliers are no noise of
-        # the next one
-        misfit = left.misfit if left.outliers else None
-        following = next_measurement(
-            chosen, rivals, frame.model.fluid, own_bands, study.compare.next, seed, misfit
-        )
-        following = replace(following, bands=bands)
-    else:
-        own_bands, others = {}, []
+    tested = _tested(study, known, chosen, frame, outcomes, at_first, beside.rivals, seed)
+    explanation = tested.explanation
     of_modes = OfModes()
     # of normal stresses that were fitted too a law by mode says nothing
-    if not (chosen is None or explanation.verdict == "no_signal" or normal or study.compare.quick):
+    if not (chosen is None or is_silent or normal or study.compare.quick):
         say("constants that differ from mode to mode")
-        of_modes = ask_of_modes(
-            chosen, frame, fitted_explained, explanation, expectation, len(library)
-        )
+        explained = at_first.in_library
+        of_modes = ask_of_modes(chosen, frame, explained, explanation, expectation, len(library))
     if of_modes.alike is not None and explanation.in_library:
         outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
-        own_bands = holding_modes_apart(own_bands, of_modes.alike)
-        following = replace(following, bands=frame.bands(own_bands))
+        tested = replace(tested, bands=holding_modes_apart(tested.bands, of_modes.alike))
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
-    outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
+    outcomes = with_small_strain_told(outcomes, explanation, tested.others)
+    outcomes = with_gain_in_dense(outcomes, tested.others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
-    bands, silent_records = following.bands, explanation.verdict == "no_signal"
-    statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
-    if not silent_records:
-        statements = open_where_contested(statements, contested(outcomes, judged, bands))
-        statements = open_where_dense_is_wide(statements, outcomes, judged)
-    statements = open_where_modes_differ(statements, of_modes.law, explanation.in_library, judged)
-    if chosen is not None:
-        statements = with_other_constants(statements, chosen.terms, others, frame.model)
-    apart = [*refuted, *disagreements(outcomes, judged, bands)]
-    if known.along is not None and known.along.constants.moves_modes:
-        statements = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in statements]
+    bands = frame.bands(tested.bands)
+    statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
+    warnings = [
+        *_of_modes(outcomes, explanation, expectation),
+        *((of_modes.said,) if of_modes.said else ()),
+        *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
+        *refuted,
+        *disagreements(outcomes, _judged(flows), bands),
+    ]
     return Judgement(
         explanation,
         outcomes,
-        rivals,
-        structure,
+        beside.rivals,
+        beside.structure,
         statements,
-        replace(following, bands=claimed(bands, statements, flows)),
-        () if silent_records else beside.classical,
-        ()
-        if silent_records
-        else (
-            *_of_modes(outcomes, explanation, expectation),
-            *((of_modes.said,) if of_modes.said else ()),
-            *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
-            *apart,
-        ),
+        replace(tested.following, bands=claimed(bands, statements, flows)),
+        () if is_silent else beside.classical,
+        () if is_silent else tuple(warnings),
         of_modes.law,
     )
+
+
+def _judged(flows: Sequence[Flow]) -> list[Flow]:
+    """Return the flows in which laws are judged: those that no fit saw, or else those fitted."""
+    unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    return unseen or [flow for flow in flows if flow.kind == "training"]
+
+
+@dataclass(frozen=True)
+class _Tested:
+    """What runs held out leave of a law that explains those fitted.
+
+    Attributes
+    ----------
+    explanation
+        Whether it explains both.
+    bands
+        Of the sparse law in its own frame, by the key of the flow; empty where it does not.
+    others
+        Declared constants that its linear terms amount to.
+    following
+        What to measure next.
+    """
+
+    explanation: Explanation
+    bands: Mapping[str, PredictionBand] = field(default_factory=dict)
+    others: Sequence[OtherConstant] = ()
+    following: NextMeasurement = field(default_factory=NextMeasurement)
+
+
+def _tested(
+    study: Study,
+    known: Known,
+    chosen: LearnerOutcome | None,
+    frame: Frame,
+    outcomes: Mapping[str, LearnerOutcome],
+    at_first: Explanation,
+    rivals: Sequence[Rival],
+    seed: int,
+) -> _Tested:
+    flows, normal = known.flows, study.compare.use_normal_stresses
+    fluid, bands, others = frame.model.fluid, {}, []
+    if chosen is not None and at_first.in_library:
+        # where a quantity is said to be determined, its band says how well
+        keys = {flow.key for flow in flows if flow.kind in ("training", "test", "held_out")}
+        banded = [flow for flow in frame.flows if flow.key in keys]
+        # bands take it that the law, or a rival, is the fluid's
+        bands = bands_of_law(chosen, rivals, fluid, banded, seed)
+        others = other_constants(chosen.terms, frame.model)
+        bands = bands if normal else with_other_gain(bands, others)
+    seen = frame.bands(bands)
+    explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
+    if chosen is None or not explanation.in_library:
+        return _Tested(explanation)
+    left = at_first.lack_of_fit["tensor_sindy"]
+    # outliers are no noise of the next experiment
+    misfit = left.misfit if left.outliers else None
+    options = study.compare.next
+    following = next_measurement(chosen, rivals, fluid, bands, options, seed, misfit)
+    return _Tested(explanation, bands, others, following)
+
+
+def _statements(
+    study: Study,
+    known: Known,
+    chosen: LearnerOutcome | None,
+    frame: Frame,
+    outcomes: Mapping[str, LearnerOutcome],
+    tested: _Tested,
+    beside: "_Beside",
+    of_modes: OfModes,
+) -> list[Statement]:
+    """Return what is determined, quantity by quantity."""
+    explanation, judged = tested.explanation, _judged(known.flows)
+    found = make_statements(
+        explanation,
+        frame.flows,
+        beside.rivals,
+        beside.structure,
+        tested.bands,
+        study.compare.use_normal_stresses,
+    )
+    if explanation.verdict != "no_signal":
+        apart = contested(outcomes, judged, frame.bands(tested.bands))
+        found = open_where_dense_is_wide(open_where_contested(found, apart), outcomes, judged)
+    found = open_where_modes_differ(found, of_modes.law, explanation.in_library, judged)
+    if chosen is not None:
+        found = with_other_constants(found, chosen.terms, tested.others, frame.model)
+    if known.along is not None and known.along.constants.moves_modes:
+        found = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in found]
+    return list(found)
 
 
 class _Beside(NamedTuple):
