@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass, field
 
+_FEW = 3
+"""Modes, each of which is told."""
+
 
 @dataclass(frozen=True)
 class StageParameter:
@@ -73,3 +76,16 @@ class ConstantByMode(StageParameter):
     degree: int
     evidence: tuple[float, ...]
     modes: tuple[ModeConstant, ...]
+
+    @property
+    def told(self) -> list[ModeConstant]:
+        """Modes with an interval, the fastest first; of many those known best and least."""
+        known = [mode for mode in self.modes if mode.ci95 is not None]
+        if len(known) > _FEW:
+            known = sorted(known, key=lambda mode: mode.width)[:: len(known) - 1]
+        return sorted(known, key=lambda mode: mode.relaxation_time_s)
+
+    @property
+    def open_times_s(self) -> list[float]:
+        """Relaxation times of the modes that are left open, the fastest first."""
+        return sorted(mode.relaxation_time_s for mode in self.modes if mode.ci95 is None)

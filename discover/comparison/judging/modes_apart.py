@@ -11,7 +11,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.constants import ConstantByMode
-from discover.words import percent_of, plainly
+from discover.words import listed, percent_of, plainly
 
 
 def with_intervals_of_modes(
@@ -123,7 +123,7 @@ def said_of_each_mode(term: str, constant: ConstantByMode | None, n_modes: int) 
     Parameters
     ----------
     term
-        Spelling of the only term.
+        Its spelling.
     constant
         What the runs say of each mode; None where that was not fitted.
     n_modes
@@ -132,16 +132,13 @@ def said_of_each_mode(term: str, constant: ConstantByMode | None, n_modes: int) 
     text = f"The coefficient of {term} is taken to be the same in all {n_modes} modes"
     if constant is None:
         return f"{text}, which was not tested."
-    known = [mode for mode in constant.modes if mode.ci95 is not None]
-    known.sort(key=lambda mode: mode.width)
-    if not known:
-        return f"{text}. These runs determine it in no single one."
-    ends = known if len(known) < 3 else [known[0], known[-1]]
     told = [
         f"{plainly(mode.ci95[0])} to {plainly(mode.ci95[1])} at {plainly(mode.relaxation_time_s)} s"
-        for mode in ends
+        for mode in constant.told
         if mode.ci95 is not None
     ]
-    text = f"{text}. If it may differ, these runs allow {' and '.join(told)}"
-    left = len(constant.modes) - len(known)
+    if not told:
+        return f"{text}. These runs determine it in no single one."
+    text = f"{text}. If it may differ, these runs allow {listed(told)}"
+    left = len(constant.open_times_s)
     return f"{text}, and leave it open in {left} of them." if left else f"{text}."

@@ -18,8 +18,6 @@ from discover.report.plots.style import (
 )
 from discover.report.wording import effect_title, interval, readable, significant
 
-_FEW = 3  # modes, each of which is told
-
 _DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
 
 
@@ -115,17 +113,13 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
 def _allowed(constant: ConstantByMode) -> str:
     """Return by how much modes may still differ where one constant serves for all."""
     said = "These data show no difference"
-    each = sorted(constant.modes, key=lambda mode: mode.relaxation_time_s)
-    known = [mode for mode in each if mode.ci95 is not None]
-    if not known:
-        return f"{said}, and determine it in no single mode."
-    if len(known) > _FEW:
-        # at which the least and the most is known
-        known = sorted(known, key=lambda mode: mode.width)[:: len(known) - 1]
     ranges = [
         f"{interval(mode.ci95)} in the mode of {significant(mode.relaxation_time_s, 2)} s"
-        for mode in known
+        for mode in constant.told
+        if mode.ci95 is not None
     ]
+    if not ranges:
+        return f"{said}, and determine it in no single mode."
     text = f"{said}, and allow {' and '.join(ranges)}"
-    left = [significant(mode.relaxation_time_s, 2) for mode in each if mode.ci95 is None]
+    left = [significant(time, 2) for time in constant.open_times_s]
     return f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."
