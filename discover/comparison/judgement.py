@@ -135,8 +135,8 @@ def judge(
     # of normal stresses that were fitted too a law by mode says nothing
     if not (chosen is None or is_silent or normal or study.compare.quick):
         say("constants that differ from mode to mode")
-        explained = at_first.in_library
-        of_modes = ask_of_modes(chosen, frame, explained, explanation, expectation, len(library))
+        explained, n_terms = at_first.in_library, len(library)
+        of_modes = ask_of_modes(chosen, frame, explained, explanation, expectation, n_terms, flows)
     if of_modes.alike is not None and explanation.in_library:
         outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
         tested = replace(tested, bands=holding_modes_apart(tested.bands, of_modes.alike))

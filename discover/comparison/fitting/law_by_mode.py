@@ -1,13 +1,13 @@
 """A law whose constants differ from mode to mode, beside the one law for all modes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
@@ -28,9 +28,11 @@ from discover.study.declared_model import DeclaredModel
 _WITH_A_NAME = {"sigma.sigma": "giesekus_mobility", "tr(sigma)*sigma": "ptt_linear"}
 """Terms that a named effect adds, whose range is the one that its law has."""
 
-_NAMED = ("giesekus_mobility", "ptt_linear", "ptt_exponential")
+_SLIP = "non_affine_motion"
+_OWN = ("giesekus_mobility", "ptt_linear", "ptt_exponential")
+_NAMED = (*((name,) for name in (*_OWN, _SLIP)), *((name, _SLIP) for name in _OWN))
 """What a rheologist lets differ from mode to mode: the constants of the classical laws in which
-modes of a spectrum are independent."""
+modes of a spectrum are independent, with slip of the network and without."""
 
 _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 """Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
@@ -78,7 +80,10 @@ class LawByMode:
     errors
         Relative errors of σ12 in runs that no fit saw, by name; None where it runs away.
     bands
-        What it predicts, by the key of the flow.
+        What it predicts, by the key of the flow; N2 is nan where terms without a name, which σ12
+        alone spoke for, leave it open.
+    refuted
+        Whether it explains the fitted runs, and runs held out speak against it.
     """
 
     constants: Mapping[str, ConstantByMode]
@@ -86,10 +91,11 @@ class LawByMode:
     gain: float
     errors: Mapping[str, float | None]
     bands: Mapping[str, PredictionBand] = field(default_factory=dict)
+    refuted: bool = False
 
     @property
     def explains(self) -> bool:
-        """Whether what it leaves is noise."""
+        """Whether what it leaves is noise, in runs held out too."""
         return self.left.verdict == "explained"
 
     @property
@@ -148,9 +154,10 @@ def fit_law_by_mode(
 ) -> LawByMode | None:
     """Return the best law with constants by mode; None where none differs from mode to mode.
 
-    The terms are those of the path of sparse regression up to three, and those of Giesekus and of
-    both laws of Phan-Thien and Tanner. Each constant has the degree in log λ that evidence asks
-    for, so that one constant for all modes stays where nothing speaks against it.
+    The terms are those of the path of sparse regression up to three, and those of Giesekus, of both
+    laws of Phan-Thien and Tanner and of Johnson and Segalman. Each constant has the degree in log λ
+    that evidence asks for, so that one constant for all modes stays where nothing speaks against
+    it.
 
     Parameters
     ----------
@@ -180,12 +187,13 @@ def fit_law_by_mode(
     fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
     if not any(one.degree for one in degrees.values()):
         return None
+    bands = _bands(problem, fit, degrees, model, flows)
     return LawByMode(
         _constants(problem, fit, degrees),
         _what_is_left(problem, fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
-        _bands(problem, fit, degrees, model, flows),
+        bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
     )
 
 
@@ -242,6 +250,12 @@ def _bands(
     return bands_by_mode(drawn, effects, inner, model.fluid, flows)
 
 
+def _without_n2(band: PredictionBand) -> PredictionBand:
+    known = np.where(np.arange(3) == QUANTITIES.index("N2"), np.nan, 1.0)
+    names = ("chosen", "low", "high", "rivals_low", "rivals_high")
+    return replace(band, **{name: known * getattr(band, name) for name in names})
+
+
 def _constants(
     problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree]
 ) -> dict[str, ConstantByMode]:
@@ -267,8 +281,8 @@ def _problem(
 
 
 def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Return the sets of effects to try: the named ones alone, and those of the path."""
-    sets: list[tuple[str, ...]] = [(name,) for name in _NAMED]
+    """Return the sets of effects to try: those of the classical laws, and those of the path."""
+    sets: list[tuple[str, ...]] = [*_NAMED]
     for row in path:
         terms = row["support"]
         if not 0 < len(terms) <= _MOST_TERMS or set(terms) & {*_OF_THE_SPECTRUM} or row["inner"]:

@@ -1,5 +1,6 @@
 """Whether the modes of a fluid share their constants, as far as the runs can tell."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +16,15 @@ from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.modes_apart import said_of_each_mode
 from discover.comparison.judging.statements import IN_NOISE
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.statistics.residual import Expectation
 
 _MOST_OUTSIDE = 0.1
 """Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
+
+_LAW = "constants_by_mode"
 
 _BY_MODES_APART = (
     "The runs held out do not follow coefficients that are the same in every mode. Those that "
@@ -54,6 +58,7 @@ def ask_of_modes(
     explanation: Explanation,
     expectation: Expectation,
     n_candidates: int,
+    flows: Sequence[Flow],
 ) -> OfModes:
     """Return what the runs say of each mode, and the law by mode where one for all is in doubt.
 
@@ -74,6 +79,8 @@ def ask_of_modes(
         What a complete law may leave.
     n_candidates
         Number of terms in the library.
+    flows
+        All flows, with what was recorded in them.
     """
     model, terms = frame.model, chosen.terms
     if len(model.modulus) < 2 or not model.law.linear_relaxation:
@@ -94,6 +101,7 @@ def ask_of_modes(
         elif alike is not None and _holds(frame, alike, explanation):
             said = _BY_MODES_APART
     law = _law_by_mode(chosen, frame, expectation, n_candidates)
+    law = None if law is None else _held_against_unseen(law, flows, expectation)
     return OfModes(alike, law, said if law is None else "")
 
 
@@ -130,3 +138,17 @@ def _law_by_mode(
     path = chosen.details.get("path", ())
     law = fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
     return None if law is None else replace(law, bands=frame.bands(law.bands))
+
+
+def _held_against_unseen(
+    law: LawByMode, flows: Sequence[Flow], expectation: Expectation
+) -> LawByMode:
+    """Return the law, which explains nothing where runs held out refute it."""
+    nothing = np.zeros(0)
+    predictions = {key: columns_of(band.chosen) for key, band in law.bands.items()}
+    outcome = LearnerOutcome(_LAW, (), 0.0, (nothing, nothing), predictions=predictions)
+    followed = [flow for flow in flows if flow.key in law.bands]
+    fitted = Explanation({_LAW: law.left}, expectation=expectation)
+    both = hold_against_unseen(fitted, {_LAW: outcome}, followed, law.bands, expectation, _LAW)
+    left = both.lack_of_fit[_LAW]
+    return replace(law, left=left, refuted=law.explains and left.verdict != "explained")

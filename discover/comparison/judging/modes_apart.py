@@ -105,8 +105,8 @@ def _text(statement: Statement, law: LawByMode, in_library: bool, flows: Sequenc
     quantity = statement.quantity
     bands = [law.bands[flow.key] for flow in flows if flow.key in law.bands]
     of_it = ""
-    if bands and not any(band.reason for band in bands):
-        half = 0.5 * max(band.widths()[quantity] for band in bands)
+    half = 0.5 * max((band.widths()[quantity] for band in bands), default=np.nan)
+    if np.isfinite(half):
         of = " of N1" if quantity == "N2" else ""
         of_it = f" If that is the fluid's, its {quantity} is known to ± {percent_of(half)}{of}."
     if in_library:

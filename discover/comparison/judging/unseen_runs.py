@@ -24,6 +24,7 @@ def hold_against_unseen(
     flows: Iterable[Flow],
     bands: Mapping[str, PredictionBand],
     expectation: Expectation,
+    banded: str = "tensor_sindy",
 ) -> Explanation:
     """Return what explains the training runs and is not refuted by measured runs held out.
 
@@ -36,9 +37,11 @@ def hold_against_unseen(
     flows
         All flows.
     bands
-        Of the sparse law, by the key of the flow.
+        Of one law, by the key of the flow.
     expectation
         What a complete law may leave.
+    banded
+        Whose law that is: the sparse one.
     """
     flows = list(flows)
     training = [flow for flow in flows if flow.kind == "training"]
@@ -52,7 +55,8 @@ def hold_against_unseen(
     found, outliers = dict(explanation.lack_of_fit), {}
     for name in explanation.by:
         outliers[name] = _outliers(outcomes[name], unseen, expectation)
-        columns = [_columns(outcomes[name], flow, bands.get(flow.key)) for flow in unseen]
+        own = bands if name == banded else None
+        columns = [_columns(outcomes[name], flow, own) for flow in unseen]
         reason = _refuted(
             outcomes[name], training, unseen, columns, found[name], expectation, outliers[name]
         )
@@ -161,10 +165,13 @@ def _residual(outcome: LearnerOutcome, flow: Flow) -> np.ndarray | None:
     return flow.even(record) * (predicted["sigma12"] - record)
 
 
-def _columns(outcome: LearnerOutcome, flow: Flow, band: PredictionBand | None) -> np.ndarray:
+def _columns(
+    outcome: LearnerOutcome, flow: Flow, bands: Mapping[str, PredictionBand] | None
+) -> np.ndarray:
     """Return changes of σ12 by one standard deviation each, shape (directions, n); (0, n): none."""
     even = flow.even(_measured(flow))
-    if outcome.learner == "tensor_sindy":
+    if bands is not None:
+        band = bands.get(flow.key)
         directions = None if band is None else band.directions
         return np.zeros((0, len(flow.times))) if directions is None else even * directions
     limits = outcome.bands.get(flow.key)

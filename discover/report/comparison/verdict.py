@@ -102,6 +102,13 @@ def _found(comparison: Comparison) -> str:
 def _by_mode(comparison: Comparison, law: LawByMode) -> str:
     """Return what constants that differ from mode to mode make of the data."""
     constants = ", ".join(by_mode_in_brief(name, one) for name, one in law.constants.items())
+    which = (
+        f"a law whose constants differ from mode to mode ({constants}; {law.n_constants} constants)"
+    )
+    if law.refuted:
+        return (
+            f"{which} leaves {percent(law.left.misfit)} and is not the fluid's: {law.left.reason}"
+        )
     left = f"{percent(law.left.misfit)}, which {'is noise' if law.explains else 'is not noise'}"
     missed = [error for error in law.errors.values() if error is not None]
     if len(missed) < len(law.errors):
@@ -112,10 +119,7 @@ def _by_mode(comparison: Comparison, law: LawByMode) -> str:
         )
         normal = [one for row in comparison.errors_by_mode().values() if (one := row.get("N1"))]
         unseen += f", their N1 by up to {percent(max(normal))}" if normal else ""
-    return (
-        f"a law whose constants differ from mode to mode ({constants}; {law.n_constants} "
-        f"constants) leaves {left}{unseen}"
-    )
+    return f"{which} leaves {left}{unseen}"
 
 
 def _rests(explanation: Explanation) -> str:
