@@ -1,5 +1,6 @@
 """The noise of a fit, as its residual shows it: a size for each run, one autocorrelation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,11 +41,16 @@ class NoiseModel:
         return self.variance[sequence] * matmul_toeplitz((first, first), columns)
 
 
-def noise_model(residuals: list[Float[np.ndarray, " _"]], n_parameters: int = 0) -> NoiseModel:
+def noise_model(
+    residuals: Sequence[Float[np.ndarray, " _"]],
+    n_parameters: int = 0,
+    sizes: Sequence[float] | None = None,
+) -> NoiseModel:
     """Return the noise model of residuals, its order chosen by BIC.
 
-    The autocovariance is pooled over the sequences, so that short runs share one correlation; the
-    Yule–Walker equations give the coefficients   [Brockwell & Davis 1991, Time Series, ch. 8].
+    The autocovariance is pooled over the sequences, so that short runs share one correlation, and
+    the variance of samples of one size; the Yule–Walker equations give the coefficients
+    [Brockwell & Davis 1991, Time Series, ch. 8].
 
     Parameters
     ----------
@@ -53,20 +59,27 @@ def noise_model(residuals: list[Float[np.ndarray, " _"]], n_parameters: int = 0)
         uneven the correlation is one by sample, not by time.
     n_parameters
         Number of fitted parameters, which the variance allows for.
+    sizes
+        Of what is taken for noise of one size in each sequence: where a long run has smaller
+        weights than a short one, its residuals are smaller and its noise is not. By default the
+        residuals are.
     """
+    sizes = [1.0] * len(residuals) if sizes is None else sizes
+    alike = [r / size for r, size in zip(residuals, sizes, strict=True)]
     total = sum(len(r) for r in residuals)
     shrink = total / max(total - n_parameters, 1)
     highest = min(_HIGHEST_ORDER, max(min((len(r) for r in residuals), default=1) // 4, 0))
     covariance = np.array(
         [
-            sum(float(r[: len(r) - k] @ r[k:]) for r in residuals if len(r) > k) / total
+            sum(float(r[: len(r) - k] @ r[k:]) for r in alike if len(r) > k) / total
             for k in range(highest + 1)
         ]
     )
     variance = np.array(
         [
-            (r @ r / len(r) if len(r) >= _FEWEST_FOR_OWN_VARIANCE else covariance[0]) * shrink
-            for r in residuals
+            (r @ r / len(r) if len(r) >= _FEWEST_FOR_OWN_VARIANCE else covariance[0])
+            * (size**2 * shrink)
+            for r, size in zip(alike, sizes, strict=True)
         ]
     )
     longest = max(len(r) for r in residuals)
