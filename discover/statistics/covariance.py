@@ -79,5 +79,5 @@ def least_squares_covariance(
     if shared is not None:
         common = scaled.T @ shared
         middle = middle + common @ common.T
-    sizes = np.outer(norms, norms)
-    return (inverse @ middle @ inverse + unseen) / sizes, inverse / sizes, noise
+    squares = np.outer(norms, norms)
+    return (inverse @ middle @ inverse + unseen) / squares, inverse / squares, noise
