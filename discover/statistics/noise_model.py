@@ -7,9 +7,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from scipy.signal import lfilter, lfiltic
+from scipy.stats import chi2
 
 _HIGHEST_ORDER = 12
 _FEWEST_FOR_OWN_VARIANCE = 30
+_FEWEST_TO_CONTRADICT = 8
+_CONTRADICTS = 0.01
+"""Probability of a variance so far from that of all sequences, from which on it is another."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +53,8 @@ def noise_model(
     """Return the noise model of residuals, its order chosen by BIC.
 
     The autocovariance is pooled over the sequences, so that short runs share one correlation, and
-    the variance of samples of one size; the Yule–Walker equations give the coefficients
-    [Brockwell & Davis 1991, Time Series, ch. 8].
+    the variance where nothing says that theirs is another; the Yule–Walker equations give the
+    coefficients   [Brockwell & Davis 1991, Time Series, ch. 8].
 
     Parameters
     ----------
@@ -69,17 +73,18 @@ def noise_model(
     total = sum(len(r) for r in residuals)
     shrink = total / max(total - n_parameters, 1)
     highest = min(_HIGHEST_ORDER, max(min((len(r) for r in residuals), default=1) // 4, 0))
+    pooled = sum(float(r @ r) for r in alike) / total
+    own = [_variance(r, pooled, n_parameters) for r in alike]
+    variance = np.array([v * (s**2 * shrink) for v, s in zip(own, sizes, strict=True)])
+    # a few loud samples would else decide on the correlation of all
+    alike = [
+        r if len(r) >= _FEWEST_FOR_OWN_VARIANCE or v == pooled else r * np.sqrt(pooled / v)
+        for r, v in zip(alike, own, strict=True)
+    ]
     covariance = np.array(
         [
             sum(float(r[: len(r) - k] @ r[k:]) for r in alike if len(r) > k) / total
             for k in range(highest + 1)
-        ]
-    )
-    variance = np.array(
-        [
-            (r @ r / len(r) if len(r) >= _FEWEST_FOR_OWN_VARIANCE else covariance[0])
-            * (size**2 * shrink)
-            for r, size in zip(alike, sizes, strict=True)
         ]
     )
     longest = max(len(r) for r in residuals)
@@ -96,6 +101,23 @@ def noise_model(
     weights = np.array([_sum_of_correlations(correlation, len(r)) for r in residuals])
     effective = total**2 / max(float(np.sum(weights)), 1.0)
     return NoiseModel(coefficients, correlation, variance, float(min(effective, total)))
+
+
+def _variance(values: Float[np.ndarray, " n"], pooled: float, n_parameters: int) -> float:
+    """Return the variance of a sequence: its own, or if it is short and no other, that of all.
+
+    The flow curve of a rheometer is quieter than its transients, or louder.
+    """
+    squares, n = float(values @ values), len(values)
+    free = n - n_parameters
+    if n >= _FEWEST_FOR_OWN_VARIANCE:
+        return squares / n
+    if free < _FEWEST_TO_CONTRADICT:
+        return pooled
+    low, high = chi2.ppf([0.5 * _CONTRADICTS, 1.0 - 0.5 * _CONTRADICTS], free)
+    # none at all is of a run that a caller left out
+    alike = squares == 0.0 or low * pooled <= squares <= high * pooled
+    return pooled if alike else squares / free
 
 
 def _coefficients(covariance: np.ndarray, total: int) -> np.ndarray:

@@ -57,7 +57,8 @@ def test_of_sensitivities_that_run_away_nothing_is_known_and_nothing_crashes():
     assert np.all(np.isfinite(covariance))
 
 
-def test_an_interval_from_a_short_run_does_not_shrink_beside_long_ones():
+@pytest.mark.parametrize("louder", [1.0, 0.1, 10.0])
+def test_an_interval_from_a_short_run_is_that_of_its_own_noise_beside_long_ones(louder):
     """Weighted by one over the root of its samples, as a run is in a fit of the loop."""
     lengths = (24, 400, 400)
     sizes = [1.0 / np.sqrt(n) for n in lengths]
@@ -68,8 +69,9 @@ def test_an_interval_from_a_short_run_does_not_shrink_beside_long_ones():
     for rows, size in zip(sequences[1:], sizes[1:], strict=True):
         columns[rows, 1] = size
     noise = [NOISE * size for size in sizes]
+    noise[0] *= louder
     rng = np.random.default_rng(0)
-    held = 0
+    held, widths = 0, []
     for _ in range(200):
         data = np.concatenate(
             [s * rng.standard_normal(n) for s, n in zip(noise, lengths, strict=True)]
@@ -78,9 +80,12 @@ def test_an_interval_from_a_short_run_does_not_shrink_beside_long_ones():
         covariance, *_ = least_squares_covariance(
             columns, data - columns @ found, sequences, sizes=sizes
         )
-        held += abs(found[0]) < 1.96 * np.sqrt(covariance[0, 0])
-    # 95 % of 200, less three standard deviations of a binomial number
-    assert held > 180
+        widths.append(np.sqrt(covariance[0, 0]))
+        held += abs(found[0]) < 1.96 * widths[-1]
+    # 95 % of 200, less three standard deviations of a binomial number, and what 24 samples leave
+    # open of the noise
+    assert held > 178
+    assert np.median(widths) == pytest.approx(louder * NOISE / np.sqrt(24), rel=0.1)
 
 
 def test_runs_of_one_length_keep_their_covariance_whatever_the_size_of_their_weights():
