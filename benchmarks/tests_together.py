@@ -8,8 +8,9 @@ right modes and solvent, and see all the records; a start-up at 3 1/s is kept fr
 
 Counted as false, under *explained* or *effects_added*: an effect with a name and a probability of a
 half or more that is neither there nor said to be an alias of what is; a constant outside three
-half-widths of its interval; another law where the library holds the right one; σ12, or N1 in a
-comparison, off by more than a tenth in the start-up that was not seen, and yet not undetermined.
+half-widths of its interval; another law where the library holds the right one; σ12, or in a
+comparison N1 or N2, off by more than a tenth in the start-up that was not seen, and yet not
+undetermined. Errors of N2 are over the size of N1.
 
     python benchmarks/tests_together.py --out tests_together
     python benchmarks/tests_together.py --out tests_together --together A,B --fluids pom

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from every_test_records import MATERIALS, MODULUS, SOLVENT, TESTS, TIME, Folder, followed
 from independent import FenePeterlin, Giesekus, Modes, PomPom, RoliePoly
-from independent.material import RateLaw
+from independent.material import RateLaw, Stresses, differences
 
 TOGETHER = {
     "A": ("start_up", "creep", "flow_curve"),
@@ -79,11 +79,11 @@ def write_records(path: Path, together: str, fluid: str, seed: int) -> None:
     folder.close()
 
 
-def unseen(fluid: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times in s, and σ12 and N1 in Pa without noise, of the start-up that no fit sees."""
+def unseen(fluid: str) -> tuple[np.ndarray, Stresses]:
+    """Return times in s, and stresses in Pa without noise, of the start-up that no fit sees."""
     times = np.linspace(0.05, 8.0, 80)
     stress = followed(FLUIDS[fluid].material, lambda t: UNSEEN_RATE, times)
-    return times, stress[:, 0, 1], stress[:, 0, 0] - stress[:, 1, 1]
+    return times, differences(list(stress))
 
 
 def declared_fluid(fluid: str):
