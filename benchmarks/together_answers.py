@@ -30,6 +30,9 @@ def of_loop(folder: Path, fluid: str) -> dict[str, Any]:
         for name, value in case.effects.get(stage.effect, {}).items():
             found = stage.parameters[name]
             _constant(row, name, value, found.value, found.ci95, loop.verdict == "effects_added")
+        for value, one in zip(case.by_mode.get(stage.effect, ()), _modes(stage), strict=False):
+            name = f"at {one.relaxation_time_s:g} s"
+            _constant(row, name, value, one.value, one.ci95, loop.verdict == "effects_added")
     if loop.verdict == "no_effect_needed" and case.effects:
         row["note"] = "nothing named"
     try:
@@ -66,6 +69,12 @@ def of_compare(folder: Path, fluid: str) -> dict[str, Any]:
     return row
 
 
+def _modes(stage) -> tuple:
+    """Return the constant of each mode, none where there is one of all."""
+    (*_, last) = stage.parameters.values()
+    return getattr(last, "modes", ())
+
+
 def _data(folder: Path):
     import discover as dc
 
@@ -83,7 +92,7 @@ def _inside(case: Case) -> bool:
 
 def _constant(row, name: str, value: float, found: float, interval, claimed: bool) -> None:
     """Add a constant to a row, and that it is false if it is off by three half-widths."""
-    low, high = interval
+    low, high = (np.nan, np.nan) if interval is None else interval
     row["constants"].append([name, value, found, low, high])
     away = max(low - value, value - high)
     if claimed and np.isfinite([low, high]).all() and away > high - low:

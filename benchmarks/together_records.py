@@ -30,6 +30,8 @@ class Case:
         What of it the loop has a name for, with the constants.
     terms
         What of it the library of degree 1 holds, with the coefficients.
+    by_mode
+        Of effects with a constant of each mode, what it is, in the order of the modes.
     whole
         Whether names or terms say all of it.
     modes
@@ -39,6 +41,7 @@ class Case:
     material: RateLaw
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
     terms: dict[str, float] = field(default_factory=dict)
+    by_mode: dict[str, tuple[float, ...]] = field(default_factory=dict)
     whole: bool = True
     modes: tuple[tuple[float, ...], tuple[float, ...]] = ((MODULUS,), (TIME,))
 
@@ -64,6 +67,7 @@ FLUIDS = {
     "modes": Case(
         Modes(Giesekus(0.1, 60.0, 3.0), Giesekus(0.5, 80.0, 0.4)),
         {"giesekus_mobility": {}},
+        by_mode={"giesekus_mobility": (0.1, 0.5)},
         modes=((60.0, 80.0), (3.0, 0.4)),
         whole=False,
     ),
