@@ -5,6 +5,8 @@ from pathlib import Path
 
 from together_records import FLUIDS, TOGETHER
 
+_ARITHMETIC = 1e-6
+
 
 def line(row: dict) -> str:
     """Return a row of the log."""
@@ -79,4 +81,7 @@ def _constants(row: dict) -> str:
 
 def _missed(row: dict) -> str:
     """Return the miss in the start-up that was not seen, in percent."""
-    return ", ".join(f"{name} {100 * miss:.2g} %" for name, miss in row["unseen"].items())
+    return ", ".join(
+        f"{name} {100 * miss if miss > _ARITHMETIC else 0.0:.2g} %"
+        for name, miss in row["unseen"].items()
+    )
