@@ -306,9 +306,21 @@ def covariance_and_noise(
 
     Parameters as in `uncertainty`.
     """
-    n_runs, n = residual.shape
     design = jacobian.reshape(len(jacobian), -1).T
-    rows = np.arange(n_runs * n).reshape(n_runs, n)
-    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
-    covariance, _, noise = least_squares_covariance(design, residual.ravel(), sequences)
+    sequences, sizes = sequences_of(batch)
+    covariance, _, noise = least_squares_covariance(
+        design, residual.ravel(), sequences, sizes=sizes
+    )
     return covariance, noise
+
+
+def sequences_of(batch: Batch) -> tuple[list[np.ndarray], list[float]]:
+    """Return the rows of each run in a flattened residual, and the size of noise alike in all.
+
+    Every run has a weight of one in all, however many samples share it; so where records are
+    equally noisy, residuals of a long run are the smaller ones.
+    """
+    seen = np.asarray(batch.weight) > 0
+    rows = np.arange(seen.size).reshape(seen.shape)
+    sequences = [row[kept] for row, kept in zip(rows, seen, strict=True)]
+    return sequences, [1.0 / np.sqrt(max(len(own), 1)) for own in sequences]

@@ -27,12 +27,15 @@ class FitProblem:
         Number of candidates, the price of choosing among which every effect must pay.
     prior
         What is known of some parameters.
+    alone
+        Rows of runs that are the only ones of their kind of test.
     """
 
     model: AugmentedModel
     batch: Batch
     n_candidates: int = 1
     prior: Prior = NO_PRIOR
+    alone: tuple[int, ...] = ()
 
     @property
     def weight(self) -> Float[np.ndarray, "runs n"]:

@@ -38,6 +38,7 @@ def least_squares_covariance(
     residual: Float[np.ndarray, " rows"],
     sequences: Sequence[Int[np.ndarray, " _"]],
     shared: Float[np.ndarray, "rows k"] | None = None,
+    sizes: Sequence[float] | None = None,
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
 
@@ -54,13 +55,16 @@ def least_squares_covariance(
         Rows of each sequence of observations, in the order of time.
     shared
         Z of errors Z u that all rows share, u of unit variance, beside the noise; None for none.
+    sizes
+        Of the noise of each sequence, if it is taken to be the same in all, as `noise_model` takes
+        them.
     """
     if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
         # of a law that runs away beside its fit: nothing is known of its constants
         told = [np.nan_to_num(residual[rows], posinf=0.0, neginf=0.0) for rows in sequences]
         nothing = np.full((columns.shape[1],) * 2, np.inf)
-        return nothing, nothing, noise_model(told, columns.shape[1])
-    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1])
+        return nothing, nothing, noise_model(told, columns.shape[1], sizes)
+    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1], sizes)
     # columns of like size, or the pseudo-inverse would drop what is merely small
     norms = np.linalg.norm(columns, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
@@ -75,5 +79,5 @@ def least_squares_covariance(
     if shared is not None:
         common = scaled.T @ shared
         middle = middle + common @ common.T
-    sizes = np.outer(norms, norms)
-    return (inverse @ middle @ inverse + unseen) / sizes, inverse / sizes, noise
+    squares = np.outer(norms, norms)
+    return (inverse @ middle @ inverse + unseen) / squares, inverse / squares, noise

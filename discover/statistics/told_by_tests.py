@@ -78,6 +78,7 @@ def told_by_tests(
     kinds: Sequence[str],
     numbers: Sequence[Sized],
     shared: Float[np.ndarray, "rows k"] | None = None,
+    sizes: Sequence[float] | None = None,
 ) -> tuple[Told, ...]:
     """Return what tests of each kind tell, at the fit to all; nothing where all are of one kind.
 
@@ -87,7 +88,7 @@ def told_by_tests(
 
     Parameters
     ----------
-    columns, residual, sequences, shared
+    columns, residual, sequences, shared, sizes
         As `least_squares_covariance` takes them.
     kinds
         The kind of test of each sequence.
@@ -99,12 +100,16 @@ def told_by_tests(
         return ()
 
     def halves(wanted: Sequence[str]) -> list[float]:
-        rows = [own for own, kind in zip(sequences, kinds, strict=True) if kind in wanted]
+        kept = [i for i, kind in enumerate(kinds) if kind in wanted]
+        rows = [sequences[i] for i in kept]
         at = np.concatenate(rows)
         ends = np.cumsum([len(own) for own in rows])
         places = np.split(np.arange(len(at)), ends[:-1])
         own = None if shared is None else shared[at]
-        covariance, _, noise = least_squares_covariance(columns[at], residual[at], places, own)
+        of_noise = None if sizes is None else [sizes[i] for i in kept]
+        covariance, _, noise = least_squares_covariance(
+            columns[at], residual[at], places, own, of_noise
+        )
         free = noise.effective_samples - columns.shape[1]
         if free < 1.0 or not np.all(np.isfinite(covariance)):
             return [np.inf] * len(numbers)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import kind_of_record
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
-from discover.forward.least_squares import Fit, jacobians
+from discover.forward.least_squares import Fit, jacobians, sequences_of
 from discover.statistics import Sized, Told, told_by_tests
 
 
@@ -39,8 +39,7 @@ def told_by_kinds(
     kinds = [kind_of_record(run) for run in runs]
     if len(set(kinds)) < 2 or not fit.free:
         return ()
-    rows = np.arange(np.size(fit.residual)).reshape(fit.residual.shape)
-    sequences = [row[seen] for row, seen in zip(rows, np.asarray(batch.weight) > 0, strict=True)]
+    sequences, sizes = sequences_of(batch)
     numbers = _constants(model, fit, effects)
     if held is not None:
         numbers += _predictions(model, fit, *held)
@@ -51,6 +50,7 @@ def told_by_kinds(
         kinds,
         numbers,
         shifts.reshape(len(shifts), -1).T if len(shifts) else None,
+        sizes,
     )
 
 

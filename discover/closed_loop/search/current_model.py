@@ -13,6 +13,7 @@ from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.scoring.refitting import Choice, refit
 from discover.closed_loop.search.state import SearchState
+from discover.dataset.run_table import kind_of_record
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
@@ -63,7 +64,9 @@ class CurrentModel(SearchState):
         self.batch, self.held_batch = batch, held_batch
         self.n_candidates, self.admitted = n_candidates, admitted
         self.tolerated = tolerated
-        self._problem = FitProblem(model, batch, n_candidates)
+        kinds = [kind_of_record(run) for run in tolerated.resolution.runs]
+        alone = tuple(i for i, kind in enumerate(kinds) if kinds.count(kind) == 1)
+        self._problem = FitProblem(model, batch, n_candidates, alone=alone)
 
     def candidate(self, effect: AbstractEffect) -> bool:
         """Whether an effect may be added."""

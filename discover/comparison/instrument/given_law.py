@@ -12,7 +12,7 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch, data_scales
-from discover.forward.least_squares import Fit, fit_batch, intervals
+from discover.forward.least_squares import Fit, fit_batch, intervals, sequences_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
 from discover.learners.result import LearnerResult
@@ -199,16 +199,13 @@ class ConstantsGivenLaw:
         fit, shifts, count = joint.fit, joint.shifts, len(self._constants.free)
         if len(fit.free) == count:
             return {"covariance": None, "modulus_errors": None}
-        n_runs, n = fit.residual.shape
-        rows = np.arange(n_runs * n).reshape(n_runs, n)
-        seen = np.asarray(self._batch.weight) > 0
-        sequences = [row[kept] for row, kept in zip(rows, seen, strict=True)]
+        sequences, sizes = sequences_of(self._batch)
         design = fit.jacobian.reshape(len(fit.free), -1).T
         by_moduli = None
         if shifts is not None and len(shifts):
             by_moduli = shifts.reshape(len(shifts), -1).T
         covariance, _, _ = least_squares_covariance(
-            design, fit.residual.ravel(), sequences, by_moduli
+            design, fit.residual.ravel(), sequences, by_moduli, sizes
         )
         found: dict[str, Any] = {"covariance": covariance[count:, count:].tolist()}
         found["modulus_errors"] = None

@@ -36,7 +36,9 @@ def left_out_parts(
 
     Runs are left out one after another. Of fewer than `FEWEST_FOLDS` runs each is left out in parts
     instead, stretches of equal length: to leave out one run of three would ask for an extrapolation
-    from the other two, which says little of a law, and one run alone would be all that there is.
+    from the other two, which says little of a law, and one run alone would be all that there is. So
+    does a run that is the only one of its kind of test (`FitProblem.alone`): what a flow curve says
+    of fast flow, slow start-ups cannot, and nothing in them could earn its place.
 
     A fit without some samples is one Gauss–Newton step from the fit with them, and they are then
     predicted with the whole nonlinear model. What cannot be predicted counts as missed by far.
@@ -49,7 +51,7 @@ def left_out_parts(
         The fit to all of it.
     """
     model, weighted = problem.model, problem.weight > 0
-    folds = _folds(weighted)
+    folds = _folds(weighted, problem.alone)
     at = list(fit.free)
     trials = []
     for left_out in folds:
@@ -102,13 +104,16 @@ FEWEST_FOLDS = 4
 _PARTS = 8
 
 
-def _folds(weighted: Bool[np.ndarray, "runs n"]) -> list[Bool[np.ndarray, "runs n"]]:
-    """Return which samples are left out together."""
+def _folds(
+    weighted: Bool[np.ndarray, "runs n"], alone: Sequence[int]
+) -> list[Bool[np.ndarray, "runs n"]]:
+    """Return which samples are left out together; parameters as in `left_out_parts`."""
     n_runs = len(weighted)
     parts = 1 if n_runs >= FEWEST_FOLDS else -(-_PARTS // n_runs)
     folds = []
     for run, seen in enumerate(weighted):
-        for part in np.array_split(np.flatnonzero(seen), parts):
+        own = _PARTS if run in alone and parts == 1 else parts
+        for part in np.array_split(np.flatnonzero(seen), own):
             if part.size:
                 left_out = np.zeros_like(weighted)
                 left_out[run, part] = True

@@ -1,0 +1,87 @@
+"""Answers on several tests together, as lines of a log and as tables of a page."""
+
+import json
+from pathlib import Path
+
+from together_records import FLUIDS, TOGETHER
+
+_ARITHMETIC = 1e-6
+
+
+def line(row: dict) -> str:
+    """Return a row of the log."""
+    named = "; ".join(
+        names[0] + (f" (or {len(names) - 1} more)" if len(names) > 1 else "")
+        for names in row["named"]
+    )
+    text = (
+        f"{row['together']} {row['fluid']:10s} {row['task']:10s} {row['verdict']:17s} "
+        f"{named or '-'} [{_constants(row)}] {_missed(row)} {row['seconds']:.0f} s"
+    )
+    if row.get("undetermined"):
+        text += f" open: {', '.join(row['undetermined'])}"
+    return "\n".join([text, *(f"    FALSE: {text}" for text in row["false"])])
+
+
+def tables(out: Path) -> str:
+    """Return a table for each command, of the answers that are there."""
+    parts = []
+    for task in ("compare", "close-loop"):
+        rows = {}
+        for kept in out.glob(f"*_{task}.json"):
+            row = json.loads(kept.read_text())
+            rows[row["together"], row["fluid"]] = row
+        lines = [f"| fluid | {' | '.join(TOGETHER)} |", "|---" * (1 + len(TOGETHER)) + "|"]
+        lines += [
+            f"| {fluid} | {' | '.join(_cell(rows.get((one, fluid))) for one in TOGETHER)} |"
+            for fluid in FLUIDS
+            if any((one, fluid) in rows for one in TOGETHER)
+        ]
+        seconds = sorted(row["seconds"] for row in rows.values())
+        false = sum(bool(row["false"]) for row in rows.values())
+        took = f"{seconds[0]:.0f} to {seconds[-1]:.0f} s of processor" if seconds else ""
+        parts.append(
+            f"{task}: {len(rows)} answers, {false} with something false; {took}\n\n"
+            + "\n".join(lines)
+        )
+    return "\n\n".join(parts)
+
+
+def _cell(row: dict | None) -> str:
+    """Return one answer as it stands in a table of a page."""
+    if row is None:
+        return ""
+    if row["verdict"] == "fault":
+        return "*fault*"
+    said = []
+    own = {*FLUIDS[row["fluid"]].effects, *FLUIDS[row["fluid"]].terms}
+    for names in row["named"]:
+        if names[0] in own:
+            said.append(f"`{names[0]}`")
+        elif own & set(names):
+            said.append(f"`{names[0]}` (or `{next(iter(own & set(names)))}`)")
+        elif row["task"] == "close-loop":
+            said.append(f"`{names[0]}`")
+    other = len(row["named"]) - len(said)
+    said += [f"{other} other term{'s' * (other > 1)}"] if other else []
+    text = ", ".join(said or ["nothing"])
+    text += f": {_constants(row)}" if row["constants"] else ""
+    parts = [text, "*unexplained*"] if row["verdict"] == "unexplained" else [text]
+    if row.get("undetermined"):
+        parts.append(f"open: {', '.join(row['undetermined'])}")
+    parts.append(_missed(row))
+    return "; ".join([*filter(None, parts), *(f"**{text}**" for text in row["false"])])
+
+
+def _constants(row: dict) -> str:
+    return ", ".join(
+        f"{value:.3g} ({low:.3g} to {high:.3g})" for _, _, value, low, high in row["constants"]
+    )
+
+
+def _missed(row: dict) -> str:
+    """Return the miss in the start-up that was not seen, in percent."""
+    return ", ".join(
+        f"{name} {100 * miss if miss > _ARITHMETIC else 0.0:.2g} %"
+        for name, miss in row["unseen"].items()
+    )
