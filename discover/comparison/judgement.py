@@ -15,6 +15,7 @@ from discover.comparison.fitting.law_by_mode import (
     coefficient_in_modes,
     fit_law_by_mode,
 )
+from discover.comparison.fitting.named_effects import NamedExplanation, fit_named_effects
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.declared_constants import (
@@ -24,12 +25,13 @@ from discover.comparison.judging.declared_constants import (
     with_other_gain,
 )
 from discover.comparison.judging.dense_library import (
+    DENSE,
     open_where_dense_is_wide,
     with_gain_in_dense,
     without_refuted_bands,
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
-from discover.comparison.judging.explanation import Explanation, explain
+from discover.comparison.judging.explanation import Explanation, explain, what_it_leaves
 from discover.comparison.judging.identifiability import (
     Rival,
     find_rivals,
@@ -37,6 +39,7 @@ from discover.comparison.judging.identifiability import (
 )
 from discover.comparison.judging.modes_apart import open_where_modes_differ, said_of_each_mode
 from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import NextMeasurement, next_measurement
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
@@ -48,6 +51,7 @@ from discover.comparison.judging.statements import (
 )
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
@@ -152,6 +156,12 @@ def judge(
     outcomes = with_gain_in_dense(with_small_strain_told(outcomes, explanation, others), others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
+    if DENSE in outcomes and not (silent_records or normal or study.compare.quick):
+        say("effects with a name beside the dense library")
+        named = _named(frames[DENSE], flows, expectation)
+        left = what_it_leaves(outcomes[DENSE], fitted, expectation, normal) if fitted else None
+        outcomes, told = with_named_effects(outcomes, flows, named, left)
+        refuted = [*refuted, *told]
     statements = make_statements(explanation, frame.flows, rivals, structure, own_bands, normal)
     if not silent_records:
         statements = open_where_contested(statements, contested(outcomes, judged, bands))
@@ -185,6 +195,16 @@ def judge(
         ),
         by_mode,
     )
+
+
+def _named(
+    frame: Frame, flows: Sequence[Flow], expectation: Expectation
+) -> Sequence[NamedExplanation]:
+    """Return what explains the runs and has a name; of a law that does not relax nothing is."""
+    if frame.made or not frame.model.law.linear_relaxation:
+        return ()
+    runs = frame.data.fit.runs, frame.data.held_out.runs
+    return fit_named_effects(frame.model, *runs, flows, expectation)
 
 
 class _Beside(NamedTuple):

@@ -16,7 +16,6 @@ from sklearn.linear_model import BayesianRidge
 
 import discover as dc
 from discover.closed_loop.explanations.bands.discrepancy import posterior
-from discover.closed_loop.explanations.bands.mixture import quantile
 from discover.closed_loop.explanations.probabilities import unexplained_probability
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -25,6 +24,7 @@ from discover.closed_loop.results.run_record import RunRecord
 from discover.errors import InputError
 from discover.report.predictions import loop_predictions
 from discover.statistics.lack_of_fit import LackOfFit
+from discover.statistics.mixed_normals import quantile
 from discover.statistics.whiteness import SIGNIFICANCE
 from discover.study import parse_study
 
