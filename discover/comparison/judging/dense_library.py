@@ -12,7 +12,9 @@ from discover.comparison.judging.statements import IN_NOISE, WIDEST, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.learners.tensor_dense.mixture import FITS
+from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import Expectation
+from discover.statistics.whiteness import SIGNIFICANCE
 from discover.words import percent_of
 
 DENSE = "tensor_dense"
@@ -113,10 +115,10 @@ def without_refuted_bands(
     left = None
     if training:
         left = what_it_leaves(dense, training, expectation, normal_stresses_used)
-    if left is not None and not left.misfit <= FITS * max(left.expected, _FLOOR):
+    if left is not None and (why := _why_refuted(left)):
         text = (
-            f"The dense library leaves {percent_of(left.misfit)} of the fitted runs where noise is "
-            f"{percent_of(left.expected)}, so none of its laws is the fluid's: they have no band."
+            f"The dense library leaves {percent_of(left.misfit)} of the fitted runs {why}, so none "
+            "of its laws is the fluid's: they have no band."
         )
         none = dict.fromkeys(dense.bands)
         return {**outcomes, DENSE: replace(dense, bands=none)}, [text]
@@ -133,6 +135,20 @@ def without_refuted_bands(
                 "the dense library's band of σ12, so its laws have none there."
             )
     return {**outcomes, DENSE: replace(dense, bands=bands)}, said
+
+
+def _why_refuted(left: LackOfFit) -> str:
+    """Return why laws that leave this of the fitted runs are not the fluid's; empty if they may be.
+
+    Those of a library of 64 terms that leave a pattern, however small, lack something that no term
+    makes up for. Below the floor nothing was fitted.
+    """
+    if not left.misfit <= FITS * max(left.expected, _FLOOR):
+        return f"where noise is {percent_of(left.expected)}"
+    patterned = left.probability is not None and left.probability <= SIGNIFICANCE
+    if left.verdict == "unexplained" and patterned and left.misfit > FITS * _FLOOR:
+        return f"with {left.pattern}"
+    return ""
 
 
 def misses(limits: Limits, flow: Flow, noise: float) -> float:
