@@ -18,7 +18,7 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, KinematicEffect, named_effects
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
-from discover.forward.least_squares import Fit, jacobians, uncertainty
+from discover.forward.least_squares import Fit, fit_batch, jacobians, uncertainty
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.inference.evidence import WINDOW, price
 from discover.inference.problem import FitProblem, effect_of
@@ -99,6 +99,7 @@ def fit_named_effects(
     unseen: Sequence[Run],
     flows: Sequence[Flow],
     expectation: Expectation,
+    effects: Sequence[AbstractEffect] | None = None,
 ) -> tuple[NamedExplanation, ...]:
     """Return the sets of at most two named effects that explain the runs, the most probable first.
 
@@ -115,8 +116,10 @@ def fit_named_effects(
         Of which those in shear, at a given rate and with σ12 recorded are predicted.
     expectation
         What a complete law may leave.
+    effects
+        Candidates; by default all with a name that may be behind these runs.
     """
-    effects = _admitted(fitted)
+    effects = _admitted(fitted) if effects is None else effects
     declared = ForwardDeclared(
         model.law,
         model.modulus,
@@ -190,7 +193,7 @@ def _best_fits(problem: FitProblem, sets: Sequence[tuple[str, ...]]) -> dict[tup
             owners.append(names)
             starts.append(start)
             free.append([at for name in names for at in model.positions(name)])
-    fits = problem.fits(starts, free, max_steps=_MOST_STEPS, rivals=True)
+    fits = fit_batch(model, problem.batch, starts, free, max_steps=_MOST_STEPS, rivals=True)
     best: dict[tuple[str, ...], Fit] = {}
     for names, fit in zip(owners, fits, strict=True):
         if fit.usable and (names not in best or fit.cost < best[names].cost):
