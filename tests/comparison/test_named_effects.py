@@ -14,6 +14,7 @@ from discover.comparison.fitting.named_effects import BEYOND, NamedExplanation, 
 from discover.comparison.judging.dense_library import (
     DENSE,
     NAMED_ALONE,
+    NAMED_BESIDE,
     open_where_dense_is_wide,
     without_refuted_bands,
 )
@@ -125,6 +126,7 @@ def test_the_dense_band_of_a_law_of_the_library_stays_and_holds_what_has_a_name_
     outcomes, said = with_named_effects({DENSE: own}, [flow], found, found[0].left)
     assert said == []
     assert outcomes[DENSE].details[NAMED_ALONE] == []
+    assert outcomes[DENSE].details[NAMED_BESIDE] == [flow.key]
     for quantity, (low, high) in outcomes[DENSE].bands[flow.key].items():
         assert np.all(low <= own.bands[flow.key][quantity][0])
         assert np.all(high >= own.bands[flow.key][quantity][1])

@@ -19,6 +19,9 @@ from discover.words import percent_of
 
 DENSE = "tensor_dense"
 
+NAMED_BESIDE = "flows_with_named_effects"
+"""Detail of the dense library: keys of the flows whose band is that of effects with a name too."""
+
 NAMED_ALONE = "flows_of_named_effects_alone"
 """Detail of the dense library: keys of the flows whose band holds none of its own laws."""
 

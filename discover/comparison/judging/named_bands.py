@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.fitting.named_effects import NamedExplanation
-from discover.comparison.judging.dense_library import DENSE, NAMED_ALONE, misses
+from discover.comparison.judging.dense_library import DENSE, NAMED_ALONE, NAMED_BESIDE, misses
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.statistics.lack_of_fit import LackOfFit
@@ -44,8 +44,9 @@ def with_named_effects(
     if dense is None or not dense.bands or not found:
         return dict(outcomes), []
     beaten = left is not None and found[0].far_better_than(left.misfit)
-    bands, predictions, alone = dict(dense.bands), dict(dense.predictions), []
-    took_part = False
+    bands, predictions = dict(dense.bands), dict(dense.predictions)
+    beside: list[str] = []
+    alone: list[str] = []
     for flow in flows:
         if flow.key not in bands:
             continue
@@ -56,18 +57,19 @@ def with_named_effects(
         if named is None:
             bands[flow.key] = own
             continue
-        took_part = True
         if own is None:
             alone.append(flow.key)
             bands[flow.key], predictions[flow.key] = named
         else:
+            beside.append(flow.key)
             bands[flow.key] = {
                 q: (np.minimum(own[q][0], low), np.maximum(own[q][1], high))
                 for q, (low, high) in named[0].items()
             }
-    details = {**dense.details, "named_effects": _rows(found), NAMED_ALONE: alone}
+    of_names = {"named_effects": _rows(found), NAMED_BESIDE: beside, NAMED_ALONE: alone}
+    details = {**dense.details, **of_names}
     changed = replace(dense, bands=bands, predictions=predictions, details=details)
-    said = _said(found, left, beaten, took_part, bool(alone))
+    said = [_said(found, left if beaten else None)] if alone else []
     return {**outcomes, DENSE: changed}, said
 
 
@@ -102,25 +104,16 @@ def _rows(found: Sequence[NamedExplanation]) -> list[dict[str, object]]:
     ]
 
 
-def _said(
-    found: Sequence[NamedExplanation],
-    left: LackOfFit | None,
-    beaten: bool,
-    took_part: bool,
-    alone: bool,
-) -> list[str]:
-    if not took_part:
-        return []
+def _said(found: Sequence[NamedExplanation], beaten: LackOfFit | None) -> str:
+    """Return that the band is that of named effects, and what the laws that they beat leave."""
     names = listed([one.title for one in found[:_TOLD]])
-    if beaten and left is not None:
-        return [
-            f"The dense library leaves {percent_of(left.misfit)} of the fitted runs and "
+    if beaten is not None:
+        return (
+            f"The dense library leaves {percent_of(beaten.misfit)} of the fitted runs and "
             f"{found[0].title} {percent_of(found[0].left.misfit)}, so its band is that of what has "
             f"a name and explains the runs: {names}."
-        ]
-    if alone:
-        return [
-            "Where none of the dense library's own laws is left, its band is that of what has a "
-            f"name and explains the runs: {names}."
-        ]
-    return []
+        )
+    return (
+        "Where none of the dense library's own laws is left, its band is that of what has a name "
+        f"and explains the runs: {names}."
+    )
