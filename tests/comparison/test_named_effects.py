@@ -10,7 +10,13 @@ from independent.fene_p import FenePeterlin
 from independent.instruments import Instrument
 from independent.thixotropic import Thixotropic
 
-from discover.comparison.fitting.named_effects import BEYOND, NamedExplanation, fit_named_effects
+from discover.comparison.fitting.named_effects import (
+    BEYOND,
+    NamedExplanation,
+    _admitted,
+    _sets,
+    fit_named_effects,
+)
 from discover.comparison.judging.dense_library import (
     DENSE,
     NAMED_ALONE,
@@ -23,6 +29,7 @@ from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.effects import make_effect
 from discover.laws import make_law
 from discover.protocols import start_up
@@ -56,12 +63,13 @@ def recorded(material, rate, instrument=None, seed=None):
     return Run(f"{rate:g}.csv", times, start_up(rate), np.full(81, rate), stress), exact
 
 
-def explained(material, instrument=None):
+def explained(material, instrument=None, known=KNOWN, candidates=CANDIDATES):
     """What explains two start-ups, and the truth of a third with the flow in which it is held."""
     runs = [recorded(material, rate, instrument, seed=1)[0] for rate in FITTED]
     unseen, exact = recorded(material, UNSEEN, instrument, seed=1)
     flow = as_flow(unseen)
-    found = fit_named_effects(KNOWN, runs, [unseen], [flow], Expectation(), CANDIDATES)
+    flows = [flow, replace(flow, kind="test", name="a test")]
+    found = fit_named_effects(known, runs, [unseen], flows, Expectation(), candidates)
     return found, flow, exact
 
 
@@ -112,6 +120,37 @@ def test_the_band_of_what_has_a_name_holds_stresses_of_a_run_that_no_fit_saw(
     half = 0.5 * np.sqrt(np.mean((limits["N1"][1] - limits["N1"][0]) ** 2))
     assert half < 0.05 * np.sqrt(np.mean(exact["N1"] ** 2))
     assert found[0].title in said[0]
+
+
+def test_errors_of_the_moduli_move_n1_behind_a_gain_that_takes_them_up_in_the_record():
+    error = 0.05
+    spectrum = RelaxationSpectrum(np.ones(1), np.ones(1), 0.0, 0.0, {}, np.array([[error**2]]))
+    known, gain = replace(KNOWN, spectrum=spectrum), make_effect("stress_gain")
+    found, flow, exact = explained(UpperConvectedMaxwell(), Instrument(gain=0.1), known, [gain])
+    assert found[0].effects == ("stress_gain",)
+    of_flow = found[0].predicted[flow.key]
+    # N1 of a Maxwell fluid is in proportion to its modulus
+    assert of_flow["N1"][1] == pytest.approx(error * exact["N1"], rel=0.02, abs=0.01)
+    assert np.max(of_flow["sigma12"][1]) < 0.01 * np.max(exact["sigma12"])
+    # a flow without a run of the data set is predicted alike
+    for quantity, (mean, _) in found[0].predicted["a test"].items():
+        np.testing.assert_allclose(mean, of_flow[quantity][0], atol=1e-9)
+
+
+def test_what_shapes_the_command_is_no_candidate_where_the_rate_was_measured():
+    run, _ = recorded(UpperConvectedMaxwell(), 1.0)
+    names = {effect.name for effect in _admitted([run])}
+    assert names - {e.name for e in _admitted([replace(run, rate_is_measured=True)])} == {
+        name for name in names if getattr(make_effect(name), "shapes_command", False)
+    }
+    assert "rate_rise_time" in names
+
+
+def test_sets_hold_two_effects_at_the_most_and_one_of_the_instrument():
+    instrument = {"transducer_lag", "rate_rise_time"}
+    sets = _sets(CANDIDATES)
+    assert len(sets) == len(set(sets)) == 1 + 4 + 1 + 2 * 2
+    assert all(len(names) <= 2 and len(instrument & {*names}) <= 1 for names in sets)
 
 
 def test_a_structure_that_has_no_name_among_the_candidates_is_explained_by_nothing():
