@@ -20,6 +20,7 @@ from discover.forward import AugmentedModel, Batch, data_scales, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, fit_batch, jacobians, uncertainty
 from discover.forward.modulus_errors import modulus_shifts, response
+from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.inference.evidence import WINDOW, price
 from discover.inference.problem import FitProblem, effect_of
 from discover.protocols.protocol import recording
@@ -111,7 +112,9 @@ def fit_named_effects(
     model
         The known part, whose law relaxes by itself.
     fitted, unseen
-        Runs without what a known instrument did: those fitted, and others of the data set.
+        Runs without what a known instrument did: those fitted, and others of the data set. The
+        instants of steps that their samples do not tell are fitted along, for those that laws of
+        the library like best take a lag for a later step.
     flows
         Of which those in shear, at a given rate and with σ12 recorded are predicted.
     expectation
@@ -129,14 +132,21 @@ def fit_named_effects(
         parameters=tuple(model.parameters.items()),
         modulus_covariance=model.modulus_covariance,
     )
+    dated = [[with_rate_steps(run) for run in runs] for runs in (fitted, unseen)]
+    declared, fitted, unseen = with_places(declared, *dated)
     forward = AugmentedModel(declared, effects, data_scales(fitted))
     problem = FitProblem(forward, make_batch(fitted), len(effects))
     best = _best_fits(problem, _sets(effects))
     if not best:
         return ()
     independent = problem.independent_samples(min(best.values(), key=problem.cost))
-    worth = {names: problem.worth(fit, names, independent) for names, fit in best.items()}
-    looked_at = sorted(best, key=worth.__getitem__)[:_LOOKED_AT]
+
+    def worth_of(names: tuple[str, ...]) -> float:
+        return problem.worth(best[names], names, independent)
+
+    _to_the_end(problem, best, sorted(best, key=worth_of)[:_LOOKED_AT])
+    looked_at = sorted(best, key=worth_of)[:_LOOKED_AT]
+    worth = {names: worth_of(names) for names in looked_at}
     found: dict[tuple[str, ...], LackOfFit] = {}
     for names in looked_at:
         if found and worth[names] > worth[next(iter(found))] + BEYOND:
@@ -144,8 +154,6 @@ def fit_named_effects(
         left = _what_is_left(problem, best[names], fitted, expectation)
         if left.verdict == "explained" and not _at_an_end(forward, best[names], names):
             found[names] = left
-    keys, runs = _to_predict(fitted, unseen, flows)
-    batch = make_batch(runs) if runs and found else None
     return tuple(
         NamedExplanation(
             names,
@@ -153,7 +161,7 @@ def fit_named_effects(
             worth[names],
             independent,
             price(len(best[names].free), len(names), independent, len(effects)),
-            {} if batch is None else _predicted(problem, best[names], batch, runs, keys),
+            _predicted(problem, best[names], fitted, unseen, flows),
         )
         for names, left in found.items()
     )
@@ -192,13 +200,35 @@ def _best_fits(problem: FitProblem, sets: Sequence[tuple[str, ...]]) -> dict[tup
                 start[at] = np.clip(factor * model.first_trial[at], model.low[at], model.high[at])
             owners.append(names)
             starts.append(start)
-            free.append([at for name in names for at in model.positions(name)])
+            of_names = [at for name in names for at in model.positions(name)]
+            free.append([*model.free_positions, *of_names])
     fits = fit_batch(model, problem.batch, starts, free, max_steps=_MOST_STEPS, rivals=True)
     best: dict[tuple[str, ...], Fit] = {}
     for names, fit in zip(owners, fits, strict=True):
         if fit.usable and (names not in best or fit.cost < best[names].cost):
             best[names] = fit
     return best
+
+
+def _to_the_end(
+    problem: FitProblem, best: dict[tuple[str, ...], Fit], sets: Sequence[tuple[str, ...]]
+) -> None:
+    """Fit some sets to the end, each also with the instants of steps that the first has.
+
+    What answers late and a step that comes later may be taken for one another on the way.
+    """
+    at, first = problem.model.instants, best[sets[0]].theta
+    starts = []
+    for names in sets:
+        as_first = best[names].theta.copy()
+        as_first[at] = first[at]
+        starts += [best[names].theta, as_first] if at.stop > at.start else [best[names].theta]
+    owners = [names for names in sets for _ in range(len(starts) // len(sets))]
+    free = [best[names].free for names in owners]
+    fits = fit_batch(problem.model, problem.batch, starts, free)
+    for names, fit in zip(owners, fits, strict=True):
+        if fit.usable and fit.cost < best[names].cost:
+            best[names] = fit
 
 
 def _what_is_left(
@@ -247,13 +277,22 @@ def _to_predict(
 
 
 def _predicted(
-    problem: FitProblem, fit: Fit, batch: Batch, runs: Sequence[Run], keys: Sequence[str]
+    problem: FitProblem,
+    fit: Fit,
+    fitted: Sequence[Run],
+    unseen: Sequence[Run],
+    flows: Sequence[Flow],
 ) -> dict[str, dict[str, Distribution]]:
     """Return means and deviations, to first order in the constants; of flows that can be followed.
 
     Constants are moved by each of their independent deviations, and no farther than their range.
+    In runs held out the rate steps when their own record says.
     """
     model, at = problem.model, list(fit.free)
+    keys, runs = _to_predict(fitted, with_own_instants(model, fit.theta, unseen), flows)
+    if not runs:
+        return {}
+    batch = make_batch(runs)
     covariance, quantile = np.zeros((0, 0)), float(ndtri(_TAIL))
     if at:
         covariance, quantile = uncertainty(problem.batch, fit.residual, fit.jacobian)
