@@ -58,6 +58,7 @@ from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.progress import Progress
 from discover.statistics.residual import Expectation
+from discover.study.data import StudyData
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
@@ -106,6 +107,7 @@ def judge(
     frames: Mapping[str, Frame],
     seed: int,
     say: Callable[[str], None],
+    undated: StudyData | None = None,
 ) -> Judgement:
     """Return what is to be believed of what each learner found.
 
@@ -119,6 +121,8 @@ def judge(
         Of the draws.
     say
         Called with what is going on.
+    undated
+        The data before instants of steps of the rate were fitted; by default those at hand.
     """
     flows, normal = known.flows, study.compare.use_normal_stresses
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
@@ -158,7 +162,10 @@ def judge(
     bands, silent_records = following.bands, explanation.verdict == "no_signal"
     if DENSE in outcomes and not (silent_records or normal or study.compare.quick):
         say("effects with a name beside the dense library")
-        named = _named(frames[DENSE], flows, expectation)
+        frame_of_dense = frames[DENSE]
+        # what a known instrument did is taken out of the data at hand alone
+        data = frame_of_dense.data if known.effects or undated is None else undated
+        named = _named(frame_of_dense, data, flows, expectation)
         left = what_it_leaves(outcomes[DENSE], fitted, expectation, normal) if fitted else None
         outcomes, told = with_named_effects(outcomes, flows, named, left)
         refuted = [*refuted, *told]
@@ -198,12 +205,12 @@ def judge(
 
 
 def _named(
-    frame: Frame, flows: Sequence[Flow], expectation: Expectation
+    frame: Frame, data: StudyData, flows: Sequence[Flow], expectation: Expectation
 ) -> Sequence[NamedExplanation]:
     """Return what explains the runs and has a name; of a law that does not relax nothing is."""
     if frame.made or not frame.model.law.linear_relaxation:
         return ()
-    runs = frame.data.fit.runs, frame.data.held_out.runs
+    runs = data.fit.runs, data.held_out.runs
     return fit_named_effects(frame.model, *runs, flows, expectation)
 
 

@@ -28,8 +28,8 @@ def with_named_effects(
     """Return the outcomes, dense bands with what explains the runs and has a name, and sentences.
 
     The band of a flow is the hull of two: that of the library's laws, unless a named explanation
-    leaves so much less of the fitted runs that they count no longer, and that of the named
-    explanations, weighted by their evidence, unless σ12 of a run held out lies outside of it.
+    leaves so much less of the fitted runs that they count no longer, and the hull
+    of the bands of the named explanations, unless σ12 of a run held out lies outside of it.
 
     Parameters
     ----------
