@@ -104,7 +104,8 @@ def fit_named_effects(
 ) -> tuple[NamedExplanation, ...]:
     """Return the sets of at most two named effects that explain the runs, the most probable first.
 
-    One of the two at the most is the instrument's. Those that are less probable than the first by
+    One of the two at the most is the instrument's. So are sets that are more probable than one that
+    explains them. Those that are less probable than the first by
     more than Occam's window are left out, and those with a constant at the end of its range.
 
     Parameters
@@ -147,23 +148,32 @@ def fit_named_effects(
     _to_the_end(problem, best, sorted(best, key=worth_of)[:_LOOKED_AT])
     looked_at = sorted(best, key=worth_of)[:_LOOKED_AT]
     worth = {names: worth_of(names) for names in looked_at}
-    found: dict[tuple[str, ...], LackOfFit] = {}
-    for names in looked_at:
-        if found and worth[names] > worth[next(iter(found))] + BEYOND:
-            break
-        left = _what_is_left(problem, best[names], fitted, expectation)
-        if left.verdict == "explained" and not _at_an_end(forward, best[names], names):
-            found[names] = left
+    left = {
+        names: _what_is_left(problem, best[names], fitted, expectation)
+        for names in looked_at
+        if not _at_an_end(forward, best[names], names)
+    }
+    first = next((names for names, one in left.items() if one.verdict == "explained"), None)
+    if first is None:
+        return ()
+    # what is more probable than one that leaves noise is not refuted by a pattern, which correlated
+    # noise may have by chance
+    found = {
+        names: one
+        for names, one in left.items()
+        if worth[names] < worth[first]
+        or (one.verdict == "explained" and worth[names] <= worth[first] + BEYOND)
+    }
     return tuple(
         NamedExplanation(
             names,
-            left,
+            one,
             worth[names],
             independent,
             price(len(best[names].free), len(names), independent, len(effects)),
             _predicted(problem, best[names], fitted, unseen, flows),
         )
-        for names, left in found.items()
+        for names, one in found.items()
     )
 
 

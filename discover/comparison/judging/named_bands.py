@@ -46,6 +46,7 @@ def with_named_effects(
     if dense is None or not dense.bands or not found:
         return dict(outcomes), []
     beaten = left is not None and found[0].far_better_than(left.misfit)
+    noise = max(one.left.noise for one in found)
     bands, predictions = dict(dense.bands), dict(dense.predictions)
     beside: list[str] = []
     alone: list[str] = []
@@ -54,7 +55,7 @@ def with_named_effects(
             continue
         own = None if beaten else bands[flow.key]
         named = _band(found, flow)
-        if named is not None and misses(named[0], flow, found[0].left.noise):
+        if named is not None and misses(named[0], flow, noise):
             named = None
         if named is None:
             bands[flow.key] = own
