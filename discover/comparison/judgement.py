@@ -8,6 +8,7 @@ from discover.comparison.at_once import at_once
 from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
 from discover.comparison.fitting.further_laws import fit_further_laws
 from discover.comparison.fitting.law_by_mode import LawByMode
+from discover.comparison.fitting.named_effects import fit_named_effects
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
@@ -18,12 +19,13 @@ from discover.comparison.judging.declared_constants import (
     with_other_gain,
 )
 from discover.comparison.judging.dense_library import (
+    DENSE,
     open_where_dense_is_wide,
     with_gain_in_dense,
     without_refuted_bands,
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
-from discover.comparison.judging.explanation import Explanation, explain
+from discover.comparison.judging.explanation import Explanation, explain, what_it_leaves
 from discover.comparison.judging.identifiability import (
     Rival,
     find_rivals,
@@ -35,6 +37,7 @@ from discover.comparison.judging.modes_apart import (
     with_intervals_of_modes,
 )
 from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import (
     NextMeasurement,
     bands_of_law,
@@ -57,6 +60,7 @@ from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.progress import Progress
 from discover.statistics.residual import Expectation
+from discover.study.data import StudyData
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
@@ -105,6 +109,7 @@ def judge(
     frames: Mapping[str, Frame],
     seed: int,
     say: Callable[[str], None],
+    undated: StudyData | None = None,
 ) -> Judgement:
     """Return what is to be believed of what each learner found.
 
@@ -118,6 +123,8 @@ def judge(
         Of the draws.
     say
         Called with what is going on.
+    undated
+        The data before instants of steps of the rate were fitted; by default those at hand.
     """
     flows, normal = known.flows, study.compare.use_normal_stresses
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
@@ -144,6 +151,12 @@ def judge(
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
     outcomes = with_gain_in_dense(outcomes, tested.others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
+    if DENSE in outcomes and not (is_silent or normal or study.compare.quick):
+        say("effects with a name beside the dense library")
+        # what a known instrument did is taken out of the data at hand alone
+        data = None if known.effects else undated
+        outcomes, told = _beside_named(outcomes, frames[DENSE], data, flows, expectation)
+        refuted = [*refuted, *told]
     bands = frame.bands(tested.bands)
     statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
     warnings = [
@@ -164,6 +177,27 @@ def judge(
         () if is_silent else tuple(warnings),
         of_modes.law,
     )
+
+
+def _beside_named(
+    outcomes: Mapping[str, LearnerOutcome],
+    frame: Frame,
+    data: StudyData | None,
+    flows: Sequence[Flow],
+    expectation: Expectation,
+) -> tuple[dict[str, LearnerOutcome], list[str]]:
+    """Return the outcomes, the dense library's bands beside what explains the runs and has a name.
+
+    Of a law that does not relax by itself, and behind a known instrument, nothing is tried.
+    """
+    if frame.made or not frame.model.law.linear_relaxation:
+        return dict(outcomes), []
+    data = frame.data if data is None else data
+    runs = data.fit.runs, data.held_out.runs
+    named = fit_named_effects(frame.model, *runs, flows, expectation)
+    fitted = [flow for flow in flows if flow.kind == "training"]
+    left = what_it_leaves(outcomes[DENSE], fitted, expectation, False) if fitted else None
+    return with_named_effects(outcomes, flows, named, left)
 
 
 def _judged(flows: Sequence[Flow]) -> list[Flow]:

@@ -83,6 +83,7 @@ def compare(
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     pipkin = itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers)
     library = study_library(study) if library is None else library
+    undated = data
     data, of_steps = with_step_instants(declared, data, library)
     known = known_part(declared, data, library, options.high_deborah, list(pipkin), fit_constants)
     if sweep and (known.along is not None or declared.effects):
@@ -122,7 +123,7 @@ def compare(
     def say(text: str) -> None:
         progress(text, done / n_parts)
 
-    found = judge(study, known, library, own, frames, learning.seed, say)
+    found = judge(study, known, library, own, frames, learning.seed, say, undated)
     distillations = distilled(study, data.truth, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(

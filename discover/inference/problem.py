@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
 from discover.inference.evidence import criterion, evidence
-from discover.statistics.residual import judged_cost, summarise
+from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics.residual import Expectation, judged_cost, summarise
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,23 @@ class FitProblem:
     def cost(self, fit: Fit) -> float:
         """Return the sum over the runs that judge of the squared relative errors."""
         return judged_cost(fit.residual, self.weight)
+
+    def lack_of_fit(self, fit: Fit, runs: Sequence[Run], expectation: Expectation) -> LackOfFit:
+        """Return whether what a fit leaves of the runs is noise.
+
+        Parameters
+        ----------
+        fit
+            The fit.
+        runs
+            Those of the batch, in its order.
+        expectation
+            What a complete law may leave.
+        """
+        rows = zip(fit.residual, self.weight, strict=True)
+        residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
+        even = [1.0 / run.sizes(run.recorded) for run in runs]
+        return lack_of_fit(residuals, [run.recorded for run in runs], expectation, None, even)
 
     def evidence(self, before: Fit, after: Fit, effective: float, n_effects: int = 1) -> float:
         """Return the evidence for what one fit has more than another; see `evidence`."""

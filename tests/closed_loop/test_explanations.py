@@ -10,13 +10,10 @@ from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 from independent.johnson_segalman import JohnsonSegalman
 from independent.maxwell import UpperConvectedMaxwell
-from scipy.optimize import brentq
-from scipy.stats import norm
 from sklearn.linear_model import BayesianRidge
 
 import discover as dc
 from discover.closed_loop.explanations.bands.discrepancy import posterior
-from discover.closed_loop.explanations.bands.mixture import quantile
 from discover.closed_loop.explanations.probabilities import unexplained_probability
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -173,17 +170,6 @@ def test_held_out_runs_that_are_missed_by_far_leave_little_to_what_was_found():
     far = judgement(0.6, "explained", structured=True, missed=8.0, carries=False)
     assert 0.5 <= unexplained_probability(near, 50.0) < unexplained_probability(far, 50.0)
     assert unexplained_probability(far, 50.0) > 0.95
-
-
-def test_a_quantile_of_mixed_distributions_is_that_of_scipy():
-    mean = np.array([0.0, 3.0])[:, None, None]
-    deviation, share = np.array([1.0, 0.5])[:, None, None], np.array([0.7, 0.3])[:, None, None]
-
-    def missing(x):
-        return 0.7 * norm.cdf(x) + 0.3 * norm.cdf((x - 3.0) / 0.5) - 0.975
-
-    found = quantile(mean, deviation, share, 0.975)[0, 0]
-    assert found == pytest.approx(brentq(missing, 0.0, 10.0), abs=1e-9)
 
 
 def test_the_width_of_the_prior_is_that_of_scikit_learn():

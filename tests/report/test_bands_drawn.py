@@ -6,6 +6,7 @@ import pytest
 from matplotlib.path import Path
 
 from discover.comparison.comparison import Comparison
+from discover.comparison.judging.dense_library import NAMED_ALONE, NAMED_BESIDE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
@@ -18,15 +19,18 @@ EMPTY = (np.zeros(0), np.zeros(0))
 
 
 @pytest.mark.parametrize(
-    ("learner", "label"),
+    ("learner", "detail", "label"),
     [
-        ("tensor_dense", "95 % of the dense library's laws"),
-        ("tbnn_ude", "networks that fit as well"),
+        ("tensor_dense", None, "95 % of the dense library's laws"),
+        ("tensor_dense", NAMED_BESIDE, "95 % of the dense library's laws, and of named effects"),
+        ("tensor_dense", NAMED_ALONE, "95 % of the named effects that explain the runs"),
+        ("tbnn_ude", None, "networks that fit as well"),
     ],
 )
-def test_the_band_of_a_learner_is_shaded_under_its_name(learner, label):
+def test_the_band_of_a_learner_is_shaded_under_its_name(learner, detail, label):
     bands = {FLOW.key: {"N1": (0.0 * TIMES, TIMES)}}
-    outcomes = {learner: LearnerOutcome(learner, (), 1.0, EMPTY, bands=bands)}
+    details = {} if detail is None else {detail: [FLOW.key]}
+    outcomes = {learner: LearnerOutcome(learner, (), 1.0, EMPTY, details, bands=bands)}
     comparison = Comparison("", "", "", [FLOW], {}, outcomes, None, None, (), ())
     drawing, panel = plt.subplots()
     _draw_band(panel, comparison, FLOW, "N1", TIMES >= 0)

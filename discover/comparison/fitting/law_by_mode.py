@@ -21,7 +21,7 @@ from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
 from discover.learners import RecoveredTerm
-from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 
@@ -190,7 +190,7 @@ def fit_law_by_mode(
     bands = _bands(problem, fit, degrees, model, flows)
     return LawByMode(
         _constants(problem, fit, degrees),
-        _what_is_left(problem, fit, fitted, expectation),
+        problem.lack_of_fit(fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
         bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
@@ -324,15 +324,6 @@ def _worth_of(law: SparseLaw, problem: FitProblem, runs: Sequence[Run], effectiv
     )
     cost = sum(float(np.mean(one**2)) for one in off)
     return problem.criterion(cost, range(law.n_constants), law.terms, effective)
-
-
-def _what_is_left(
-    problem: FitProblem, fit: Fit, runs: Sequence[Run], expectation: Expectation
-) -> LackOfFit:
-    rows = zip(fit.residual, problem.weight, strict=True)
-    residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
-    even = [1.0 / run.sizes(run.recorded) for run in runs]
-    return lack_of_fit(residuals, [run.recorded for run in runs], expectation, None, even)
 
 
 def _errors(model: AugmentedModel, fit: Fit, runs: Sequence[Run]) -> dict[str, float | None]:

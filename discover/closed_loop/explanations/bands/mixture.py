@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from scipy.stats import t as student
 
 from discover.closed_loop.explanations.bands.discrepancy import discrepancy, signatures
@@ -15,8 +15,8 @@ from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
+from discover.statistics.mixed_normals import quantile
 
-_HALVINGS = 40
 _TAILS = (0.025, 0.975)
 
 
@@ -127,14 +127,3 @@ def _limits(part: list[tuple[np.ndarray, np.ndarray, float]], batch: Batch) -> n
     deviation = np.maximum(deviation, np.finfo(float).tiny)
     share = share[:, None, None] / np.sum(share)
     return np.where(seen, np.array([quantile(mean, deviation, share, p) for p in _TAILS]), 0.0)
-
-
-def quantile(mean, deviation, share, level: float) -> Float[np.ndarray, "runs n"]:
-    """Return a quantile of mixed normal distributions, by halving an interval that holds it."""
-    low = np.min(mean - 8.0 * deviation, axis=0)
-    high = np.max(mean + 8.0 * deviation, axis=0)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        below = np.sum(share * ndtr((middle - mean) / deviation), axis=0) < level
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return 0.5 * (low + high)
