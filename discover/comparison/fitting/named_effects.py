@@ -12,6 +12,7 @@ from itertools import combinations, product
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
+from scipy.stats import chi2
 
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
@@ -308,8 +309,10 @@ def _predicted(
         changes = [0.5 * (up - down) for up, down in zip(moved[::2], moved[1::2], strict=True)]
         variance = np.sum(np.square(changes), axis=0) if changes else np.zeros_like(mean)
         variance = variance + _of_moduli(problem, fit, batch, mean)
-    # tails of as few independent samples as there are
-    deviation = np.sqrt(variance) * quantile / float(ndtri(_TAIL))
+    # tails of as few independent samples as there are, and a band that holds the curve as a whole,
+    # wherever in their joint region the constants lie   [Scheffé 1953, Biometrika 40, 87]
+    whole = np.sqrt(chi2.ppf(2.0 * _TAIL - 1.0, max(len(at), 1)))
+    deviation = np.sqrt(variance) * quantile * whole / float(ndtri(_TAIL)) ** 2
     found: dict[str, dict[str, Distribution]] = {}
     for i, key in enumerate(keys):
         rows = {q: i + j * len(keys) for j, q in enumerate(QUANTITIES)}
