@@ -25,7 +25,7 @@ from discover.comparison.judging.dense_library import (
     without_refuted_bands,
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
-from discover.comparison.judging.explanation import Explanation, explain, what_it_leaves
+from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import (
     Rival,
     find_rivals,
@@ -155,8 +155,7 @@ def judge(
         say("effects with a name beside the dense library")
         # what a known instrument did is taken out of the data at hand alone
         data = None if known.effects else undated
-        outcomes, told = _beside_named(outcomes, frames[DENSE], data, flows, expectation)
-        refuted = [*refuted, *told]
+        outcomes = _beside_named(outcomes, frames[DENSE], data, flows, expectation)
     bands = frame.bands(tested.bands)
     statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
     warnings = [
@@ -185,19 +184,17 @@ def _beside_named(
     data: StudyData | None,
     flows: Sequence[Flow],
     expectation: Expectation,
-) -> tuple[dict[str, LearnerOutcome], list[str]]:
+) -> dict[str, LearnerOutcome]:
     """Return the outcomes, the dense library's bands beside what explains the runs and has a name.
 
     Of a law that does not relax by itself, and behind a known instrument, nothing is tried.
     """
     if frame.made or not frame.model.law.linear_relaxation:
-        return dict(outcomes), []
+        return dict(outcomes)
     data = frame.data if data is None else data
     runs = data.fit.runs, data.held_out.runs
     named = fit_named_effects(frame.model, *runs, flows, expectation)
-    fitted = [flow for flow in flows if flow.kind == "training"]
-    left = what_it_leaves(outcomes[DENSE], fitted, expectation, False) if fitted else None
-    return with_named_effects(outcomes, flows, named, left)
+    return with_named_effects(outcomes, flows, named)
 
 
 def _judged(flows: Sequence[Flow]) -> list[Flow]:

@@ -11,7 +11,6 @@ from independent.instruments import Instrument
 from independent.thixotropic import Thixotropic
 
 from discover.comparison.fitting.named_effects import (
-    BEYOND,
     NamedExplanation,
     _admitted,
     _sets,
@@ -19,13 +18,10 @@ from discover.comparison.fitting.named_effects import (
 )
 from discover.comparison.judging.dense_library import (
     DENSE,
-    NAMED_ALONE,
     NAMED_BESIDE,
-    open_where_dense_is_wide,
     without_refuted_bands,
 )
 from discover.comparison.judging.named_bands import with_named_effects
-from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run
@@ -111,15 +107,11 @@ def test_the_band_of_what_has_a_name_holds_stresses_of_a_run_that_no_fit_saw(
 ):
     found, flow, exact = explained(material, instrument)
     assert {one.effects for one in found} == names
-    # laws of the library that miss the fitted runs by twice the noise, with a false N1
-    wrong = dense(flow, {q: 1.5 * curve for q, curve in exact.items()}, 0.01)
-    left = replace(found[0].left, misfit=2.0 * NOISE)
-    outcomes, said = with_named_effects({DENSE: wrong}, [flow], found, left)
-    limits = outcomes[DENSE].bands[flow.key]
+    # laws of the library that fit, with a false N1
+    wrong = dense(flow, exact | {"N1": 1.5 * exact["N1"]}, 0.01)
+    assert holds(wrong.bands[flow.key], exact)["N1"] < 0.5
+    limits = with_named_effects({DENSE: wrong}, [flow], found)[DENSE].bands[flow.key]
     assert min(holds(limits, exact).values()) > 0.9
-    half = 0.5 * np.sqrt(np.mean((limits["N1"][1] - limits["N1"][0]) ** 2))
-    assert half < 0.05 * np.sqrt(np.mean(exact["N1"] ** 2))
-    assert found[0].title in said[0]
 
 
 def test_errors_of_the_moduli_move_n1_behind_a_gain_that_takes_them_up_in_the_record():
@@ -162,9 +154,7 @@ def test_the_dense_band_of_a_law_of_the_library_stays_and_holds_what_has_a_name_
     found, flow, exact = explained(Giesekus(0.3))
     assert found[0].effects == ("giesekus_mobility",)
     own = dense(flow, exact, 0.2)
-    outcomes, said = with_named_effects({DENSE: own}, [flow], found, found[0].left)
-    assert said == []
-    assert outcomes[DENSE].details[NAMED_ALONE] == []
+    outcomes = with_named_effects({DENSE: own}, [flow], found)
     assert outcomes[DENSE].details[NAMED_BESIDE] == [flow.key]
     for quantity, (low, high) in outcomes[DENSE].bands[flow.key].items():
         assert np.all(low <= own.bands[flow.key][quantity][0])
@@ -176,7 +166,7 @@ def explanation(flow, curves, deviation=0.01, misfit=NOISE):
     """One that explains the runs, written by hand."""
     left = LackOfFit("explained", misfit, misfit, 0.0, 1.0)
     spread = {q: (c, np.full(len(c), deviation)) for q, c in curves.items()}
-    return NamedExplanation(("wall_slip",), left, 0.0, 100.0, 10.0, {flow.key: spread})
+    return NamedExplanation(("wall_slip",), left, 0.0, {flow.key: spread})
 
 
 def test_what_has_a_name_and_misses_the_held_out_record_is_in_no_band():
@@ -184,37 +174,17 @@ def test_what_has_a_name_and_misses_the_held_out_record_is_in_no_band():
     flow = as_flow(unseen)
     wrong = explanation(flow, {q: 1.2 * curve for q, curve in exact.items()})
     own = dense(flow, exact)
-    outcomes, said = with_named_effects({DENSE: own}, [flow], [wrong], wrong.left)
+    outcomes = with_named_effects({DENSE: own}, [flow], [wrong])
     np.testing.assert_equal(outcomes[DENSE].bands, own.bands)
-    assert said == []
 
 
-@pytest.mark.parametrize(("misfit", "stays"), [(1.05 * NOISE, True), (1.3 * NOISE, False)])
-def test_laws_of_the_library_leave_the_band_where_what_has_a_name_leaves_far_less(misfit, stays):
-    unseen, exact = recorded(UpperConvectedMaxwell(), UNSEEN, seed=1)
-    flow = as_flow(unseen)
-    named = explanation(flow, exact)
-    assert named.far_better_than(misfit) != stays
-    # 2 n ln(misfit ratio) against price and window, by hand
-    assert (200.0 * np.log(misfit / NOISE) - 10.0 > BEYOND) != stays
-    own = dense(flow, {q: c + 1.0 for q, c in exact.items()})
-    left = replace(named.left, misfit=misfit)
-    outcomes, _ = with_named_effects({DENSE: own}, [flow], [named], left)
-    high = outcomes[DENSE].bands[flow.key]["N1"][1]
-    assert np.all(high == own.bands[flow.key]["N1"][1]) == stays
-
-
-def test_a_quantity_is_not_determined_where_only_what_has_a_name_is_in_the_band():
+def test_what_has_a_name_makes_no_band_where_the_laws_of_the_library_have_none():
     unseen, exact = recorded(UpperConvectedMaxwell(), UNSEEN, seed=1)
     flow = as_flow(unseen)
     none = replace(dense(flow, exact), bands={flow.key: None})
-    outcomes, said = with_named_effects({DENSE: none}, [flow], [explanation(flow, exact)], None)
-    assert outcomes[DENSE].details[NAMED_ALONE] == [flow.key]
-    assert "wall slip" in said[0]
-    np.testing.assert_allclose(outcomes[DENSE].predictions[flow.key]["N1"], exact["N1"], atol=1e-6)
-    claim = [Statement("N1", IN_LIBRARY, "Then its band is narrow.")]
-    (after,) = open_where_dense_is_wide(claim, outcomes, [flow])
-    assert after.undetermined
+    outcomes = with_named_effects({DENSE: none}, [flow], [explanation(flow, exact)])
+    assert outcomes[DENSE].bands == {flow.key: None}
+    assert outcomes[DENSE].details[NAMED_BESIDE] == []
 
 
 @pytest.mark.parametrize(("pattern", "refuted"), [(0.0, False), (1.0, True)])

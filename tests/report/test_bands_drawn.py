@@ -6,7 +6,7 @@ import pytest
 from matplotlib.path import Path
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import NAMED_ALONE, NAMED_BESIDE
+from discover.comparison.judging.dense_library import NAMED_BESIDE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
@@ -23,7 +23,6 @@ EMPTY = (np.zeros(0), np.zeros(0))
     [
         ("tensor_dense", None, "95 % of the dense library's laws"),
         ("tensor_dense", NAMED_BESIDE, "95 % of the dense library's laws, and of named effects"),
-        ("tensor_dense", NAMED_ALONE, "95 % of the named effects that explain the runs"),
         ("tbnn_ude", None, "networks that fit as well"),
     ],
 )

@@ -22,7 +22,7 @@ from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, fit_batch, jacobians, uncertainty
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
-from discover.inference.evidence import WINDOW, price
+from discover.inference.evidence import WINDOW
 from discover.inference.problem import FitProblem, effect_of
 from discover.protocols.protocol import recording
 from discover.statistics import LackOfFit, root_of
@@ -63,10 +63,6 @@ class NamedExplanation:
         What they leave of the fitted runs.
     criterion
         Twice the negative logarithm of its weight, but for a constant.
-    independent
-        Number of independent samples that the criterion counts, alike for all.
-    price
-        What the constants, and the choice of the effects, cost in it.
     predicted
         By the key of the flow, then of `QUANTITIES`: σ12 as recorded, N1 and N2 of the fluid.
     """
@@ -74,25 +70,7 @@ class NamedExplanation:
     effects: tuple[str, ...]
     left: LackOfFit
     criterion: float
-    independent: float
-    price: float
     predicted: Mapping[str, Mapping[str, Distribution]]
-
-    def far_better_than(self, misfit: float) -> bool:
-        """Return whether it leaves so much less of the runs that another counts no longer.
-
-        Parameters
-        ----------
-        misfit
-            Relative misfit that the other leaves, which pays no price here.
-        """
-        gained = 2.0 * self.independent * np.log(misfit / self.left.misfit)
-        return bool(gained - self.price > BEYOND)
-
-    @property
-    def title(self) -> str:
-        """The effects in words."""
-        return " with ".join(name.replace("_", " ") for name in self.effects) or "the declared law"
 
 
 def fit_named_effects(
@@ -170,8 +148,6 @@ def fit_named_effects(
             names,
             one,
             worth[names],
-            independent,
-            price(len(best[names].free), len(names), independent, len(effects)),
             _predicted(problem, best[names], fitted, unseen, flows),
         )
         for names, one in found.items()

@@ -22,9 +22,6 @@ DENSE = "tensor_dense"
 NAMED_BESIDE = "flows_with_named_effects"
 """Detail of the dense library: keys of the flows whose band is that of effects with a name too."""
 
-NAMED_ALONE = "flows_of_named_effects_alone"
-"""Detail of the dense library: keys of the flows whose band holds none of its own laws."""
-
 _FLOOR = 1e-3
 """Relative misfit that the dense library takes no data to go below."""
 
@@ -206,7 +203,7 @@ def _held(
     widest = 0.0
     for flow in flows:
         width = dense.half_widths(flow).get(quantity)
-        if width is None or flow.key in dense.details.get(NAMED_ALONE, ()):
+        if width is None:
             return _opened(statement, f"in {flow.title} no law of the dense library has a band")
         if not width < WIDEST:
             text = (

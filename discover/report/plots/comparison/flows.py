@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import NAMED_ALONE, NAMED_BESIDE
+from discover.comparison.judging.dense_library import NAMED_BESIDE
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
@@ -191,11 +191,7 @@ _FITTING_AS_WELL = {
 }
 
 
-_WITH_NAMES = {
-    NAMED_BESIDE: "95 % of the dense library's laws, and of named effects",
-    NAMED_ALONE: "95 % of the named effects that explain the runs",
-}
-"""The same where effects with a name are in the band, by the detail that lists the flows."""
+_WITH_NAMES = "95 % of the dense library's laws, and of named effects"
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
@@ -208,8 +204,8 @@ def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, 
         outcome = comparison.outcomes.get(name)
         limits = None if outcome is None else outcome.bands.get(flow.key)
         if outcome is not None and limits is not None:
-            for detail, other in _WITH_NAMES.items():
-                label = other if flow.key in outcome.details.get(detail, ()) else label
+            if flow.key in outcome.details.get(NAMED_BESIDE, ()):
+                label = _WITH_NAMES
             low, high = limits[quantity]
             shade_between(
                 panel,
