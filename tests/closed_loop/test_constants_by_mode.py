@@ -18,7 +18,8 @@ from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
-from discover.inference.by_mode import _at_upper_end, _Constant
+from discover.inference.by_mode import _at_upper_end
+from discover.inference.varying_constant import VaryingConstant
 from discover.protocols import in_flow, start_up
 from discover.report.plots.by_mode import by_mode_picture
 
@@ -96,7 +97,7 @@ def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
     law = FreeParameter("q", 5.0, 1.0, 100.0)
     places = np.array([0.0, -1.0, -2.0])
     fit = SimpleNamespace(theta=np.array([5.0, 0.0, 25.0]))  # link 25 s² at the mean's −3
-    constant = _Constant(law, 0, 1, places)
+    constant = VaryingConstant(law, 0, 1, places)
     values = constant.of_modes(fit)
     assert values[0] == pytest.approx(5.0)
     assert list(_at_upper_end(values, law)) == [False, True, True]
