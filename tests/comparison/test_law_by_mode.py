@@ -337,3 +337,8 @@ def test_networks_that_slip_and_whose_junctions_are_lost_by_mode_are_found_with_
     truth = {"N1": seen.N1, "N2": seen.N2}
     for quantity in ("N1", "N2"):
         assert off(law.bands["held_out/at 3"], truth, quantity) < 2.0 * IN_INTEGRATION
+
+
+def test_control_without_a_run_held_out_none_is_said_to_miss_one_coefficient():
+    # runs left out in turn may speak against a law too
+    assert asked((0.02, 0.05, 0.1), MOBILITIES, []).said == ""

@@ -15,14 +15,10 @@ from discover.comparison.fitting.law_by_mode import (
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.modes_apart import said_of_each_mode
-from discover.comparison.judging.statements import IN_NOISE
-from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.judging.unseen_runs import hold_against_unseen, misses
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.statistics.residual import Expectation
-
-_MOST_OUTSIDE = 0.1
-"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
 
 _LAW = "constants_by_mode"
 
@@ -108,17 +104,15 @@ def ask_of_modes(
 def _holds(frame: Frame, alike: CoefficientsInModes, explanation: Explanation) -> bool:
     """Return whether every run held out lies in the band of coefficients that differ by mode."""
     noise = explanation.lack_of_fit["tensor_sindy"].noise
-    return all(_inside(flow, alike, noise) for flow in frame.flows if flow.kind == "held_out")
+    held_out = [flow for flow in frame.flows if flow.kind == "held_out"]
+    return bool(held_out) and all(_inside(flow, alike, noise) for flow in held_out)
 
 
 def _inside(flow: Flow, alike: CoefficientsInModes, noise: float) -> bool:
     band = alike.bands.get(flow.key)
     if band is None or band.reason:
         return False
-    record = np.asarray(flow.reference["sigma12"])
-    allowed = IN_NOISE * noise * np.sqrt(np.mean(record**2))
-    low, high = band.rivals_low[:, 0], band.rivals_high[:, 0]
-    return float(np.mean(np.abs(record - np.clip(record, low, high)) > allowed)) <= _MOST_OUTSIDE
+    return not misses({"sigma12": (band.rivals_low[:, 0], band.rivals_high[:, 0])}, flow, noise)
 
 
 def _law_by_mode(

@@ -8,7 +8,8 @@ import numpy as np
 from discover.comparison.judging.declared_constants import OtherConstant, other_gain
 from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.judging.identifiability import SEPARATED
-from discover.comparison.judging.statements import IN_NOISE, WIDEST, Statement
+from discover.comparison.judging.statements import WIDEST, Statement
+from discover.comparison.judging.unseen_runs import misses
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.learners.tensor_dense.mixture import FITS
@@ -24,9 +25,6 @@ NAMED_BESIDE = "flows_with_named_effects"
 
 _FLOOR = 1e-3
 """Relative misfit that the dense library takes no data to go below."""
-
-_OUTSIDE = 0.1
-"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
 
 
 def open_where_dense_is_wide(
@@ -149,27 +147,6 @@ def _why_refuted(left: LackOfFit) -> str:
     if left.verdict == "unexplained" and patterned and left.misfit > FITS * _FLOOR:
         return f"with {left.pattern}"
     return ""
-
-
-def misses(limits: Limits, flow: Flow, noise: float) -> float:
-    """Return the share of a held-out record that a band of σ12 misses, zero where it holds it.
-
-    Parameters
-    ----------
-    limits
-        The band in the flow.
-    flow
-        Any; only the record of a run held out says something.
-    noise
-        Relative noise of the records.
-    """
-    record = flow.reference.get("sigma12")
-    if flow.kind != "held_out" or flow.is_truth or record is None:
-        return 0.0
-    record = np.asarray(record)
-    allowed = IN_NOISE * noise * np.sqrt(np.mean(record**2))
-    share = float(np.mean(np.abs(record - np.clip(record, *limits["sigma12"])) > allowed))
-    return share if share > _OUTSIDE else 0.0
 
 
 def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Flow]) -> Statement:

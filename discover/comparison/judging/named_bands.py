@@ -7,7 +7,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from discover.comparison.fitting.named_effects import NamedExplanation
-from discover.comparison.judging.dense_library import DENSE, NAMED_BESIDE, misses
+from discover.comparison.judging.dense_library import DENSE, NAMED_BESIDE
+from discover.comparison.judging.unseen_runs import misses
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.judging.statements import IN_NOISE
 from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import LackOfFit, noise_model
 from discover.statistics.lack_of_fit import what_is_left
@@ -16,6 +17,9 @@ from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.words import percent_of
 
 _HALF_BAND = 1.96  # standard deviations
+
+_OUTSIDE = 0.1
+"""Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
 
 
 def hold_against_unseen(
@@ -63,6 +67,27 @@ def hold_against_unseen(
         if reason:
             found[name] = found[name].refuted(reason)
     return replace(explanation, lack_of_fit=found, outliers=outliers)
+
+
+def misses(limits: Limits, flow: Flow, noise: float) -> float:
+    """Return the share of a held-out record that a band of σ12 misses, zero where it holds it.
+
+    Parameters
+    ----------
+    limits
+        The band in the flow.
+    flow
+        Any; only the record of a run held out says something.
+    noise
+        Relative noise of the records.
+    """
+    record = flow.reference.get("sigma12")
+    if flow.kind != "held_out" or flow.is_truth or record is None:
+        return 0.0
+    record = np.asarray(record)
+    allowed = IN_NOISE * noise * np.sqrt(np.mean(record**2))
+    share = float(np.mean(np.abs(record - np.clip(record, *limits["sigma12"])) > allowed))
+    return share if share > _OUTSIDE else 0.0
 
 
 def _held_against_folds(
