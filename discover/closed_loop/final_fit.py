@@ -30,6 +30,7 @@ from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
+from discover.inference.varying_constant import fits_of_one_degree_more
 
 
 @dataclass(frozen=True)
@@ -202,5 +203,6 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
-    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, search.prior)
+    wider = fits_of_one_degree_more(model, batch, fit, search.degrees, search.prior)
+    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, wider)
     return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart})

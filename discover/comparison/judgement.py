@@ -53,7 +53,7 @@ from discover.comparison.judging.statements import (
 )
 from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.flows import DRAWN, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
@@ -239,7 +239,7 @@ def _tested(
     fluid, bands, others = frame.model.fluid, {}, []
     if chosen is not None and at_first.in_library:
         # where a quantity is said to be determined, its band says how well
-        keys = {flow.key for flow in flows if flow.kind in ("training", "test", "held_out")}
+        keys = {flow.key for flow in flows if flow.kind in DRAWN}
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands take it that the law, or a rival, is the fluid's
         bands = bands_of_law(chosen, rivals, fluid, banded, seed)
@@ -253,7 +253,7 @@ def _tested(
     # outliers are no noise of the next experiment
     misfit = left.misfit if left.outliers else None
     options = study.compare.next
-    following = next_measurement(chosen, rivals, fluid, bands, options, seed, misfit)
+    following = next_measurement(chosen, rivals, fluid, options, seed, misfit)
     return _Tested(explanation, bands, others, following)
 
 

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, jacobians, uncertainty
+from discover.forward.least_squares import Fit, jacobians, uncertainty
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.inference.degrees import Degree
 from discover.inference.varying_constant import varying_constants
@@ -30,7 +30,7 @@ def constants_by_mode(
     fit: Fit,
     bounds: Mapping[int, tuple[float, float]],
     degrees: Mapping[str, Degree],
-    prior: Prior = NO_PRIOR,
+    wider: Mapping[str, Fit],
 ) -> dict[str, ConstantByMode]:
     """Return the constants by mode of a final fit.
 
@@ -45,8 +45,8 @@ def constants_by_mode(
         95 % interval of each fitted parameter, by position.
     degrees
         Degree of each constant by mode.
-    prior
-        What is known of some parameters.
+    wider
+        From `fits_of_one_degree_more`.
     """
     found = {}
     times = model.declared.relaxation_time * np.exp(fit.theta[1])
@@ -54,12 +54,11 @@ def constants_by_mode(
         of = degrees[name]
         low, high, half = constant.band(batch, fit, of.degree)
         mean = bounds[constant.at]
-        wider = constant.with_one_degree_more(model, batch, fit, of, prior)
-        if wider is not None:
-            more = constant.band(batch, wider, of.degree + 1)
+        if name in wider:
+            more = constant.band(batch, wider[name], of.degree + 1)
             low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
             half = np.maximum(half, more[2])
-            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider, of.degree + 1)
+            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider[name], of.degree + 1)
             mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
         own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)

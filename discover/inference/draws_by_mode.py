@@ -39,7 +39,12 @@ class ConstantsDrawn:
 
 
 def draw_constants(
-    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree], n_draws: int, seed: int = 0
+    problem: FitProblem,
+    fit: Fit,
+    degrees: Mapping[str, Degree],
+    wider: Mapping[str, Fit],
+    n_draws: int,
+    seed: int = 0,
 ) -> ConstantsDrawn | None:
     """Return constants by mode drawn about a fit, on the scale of their link.
 
@@ -53,23 +58,22 @@ def draw_constants(
         What is fitted to what, and the final fit.
     degrees
         Degree of each constant by mode.
+    wider
+        From `fits_of_one_degree_more`.
     n_draws
         About each fit.
     seed
         Of the draws.
     """
-    model, batch = problem.model, problem.batch
-    constants = varying_constants(model, fit, degrees)
+    constants = varying_constants(problem.model, fit, degrees)
     if not constants:
         return None
     fits = [(fit, dict(degrees))]
-    for name, constant in constants.items():
+    for name, more in wider.items():
         of = degrees[name]
-        wider = constant.with_one_degree_more(model, batch, fit, of, problem.prior)
-        if wider is not None:
-            fits.append((wider, {**degrees, name: replace(of, degree=of.degree + 1)}))
+        fits.append((more, {**degrees, name: replace(of, degree=of.degree + 1)}))
     rng = np.random.default_rng(seed)
-    groups = [_about(batch, one, constants, of, n_draws, rng) for one, of in fits]
+    groups = [_about(problem.batch, one, constants, of, n_draws, rng) for one, of in fits]
     drawn = [group for group in groups if group is not None]
     if len(drawn) < len(groups):
         return None

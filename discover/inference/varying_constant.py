@@ -99,28 +99,6 @@ class VaryingConstant:
             half = quantile * np.sqrt(np.clip(variance, 0.0, None))
         return self.of_modes(fit, -half), self.of_modes(fit, half), half
 
-    def with_one_degree_more(
-        self, model: AugmentedModel, batch: Batch, fit: Fit, of: Degree, prior: Prior = NO_PRIOR
-    ) -> Fit | None:
-        """Return the fit with the next coefficient free too; None where there is none.
-
-        Evidence for the lower degree does not say that the next coefficient is zero.
-
-        Parameters
-        ----------
-        model, batch, fit
-            The model, the fitted runs and the fit.
-        of
-            The degree of the constant in it.
-        prior
-            What is known of some parameters.
-        """
-        if of.degree + 1 >= len(of.evidence):
-            return None
-        free = (*fit.free, self.start + of.degree)
-        wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
-        return wider if wider.usable else None
-
 
 def varying_constants(
     model: AugmentedModel, fit: Fit, degrees: Mapping[str, Degree]
@@ -142,4 +120,37 @@ def varying_constants(
         if at in fit.free:
             start = declared.by_mode_slices[name].start
             found[name] = VaryingConstant(law, at, start, places)
+    return found
+
+
+def fits_of_one_degree_more(
+    model: AugmentedModel,
+    batch: Batch,
+    fit: Fit,
+    degrees: Mapping[str, Degree],
+    prior: Prior = NO_PRIOR,
+) -> dict[str, Fit]:
+    """Return the fits in which one constant has its next coefficient too, by its name.
+
+    Evidence for the lower degree does not say that the next coefficient is zero. A constant of the
+    highest degree has none, nor has one whose fit is not usable.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    degrees
+        Degree of each constant by mode.
+    prior
+        What is known of some parameters.
+    """
+    found = {}
+    for name, constant in varying_constants(model, fit, degrees).items():
+        of = degrees[name]
+        if of.degree + 1 >= len(of.evidence):
+            continue
+        free = (*fit.free, constant.start + of.degree)
+        wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
+        if wider.usable:
+            found[name] = wider
     return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -90,6 +91,24 @@ class DeclaredModel:
     def fluid(self) -> Fluid:
         """The declared fluid."""
         return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)
+
+    def without_effects(self, **options: Any) -> ForwardDeclared:
+        """Return the declared fluid as forward models take it, with nothing of it to be fitted.
+
+        Parameters
+        ----------
+        **options
+            Other attributes of `discover.forward.DeclaredModel`.
+        """
+        return ForwardDeclared(
+            self.law,
+            self.modulus,
+            self.relaxation_time,
+            self.solvent_viscosity,
+            law_name=self.law_name,
+            parameters=tuple(self.parameters.items()),
+            **options,
+        )
 
 
 def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:

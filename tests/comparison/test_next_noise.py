@@ -17,5 +17,5 @@ def test_outliers_are_no_noise_of_the_next_experiment(whole, without_outliers, e
     history = (np.zeros(0), np.zeros(0))
     outcome = LearnerOutcome("tensor_sindy", (), 0.0, history, details={"misfit": whole})
     fluid = Fluid.dimensionless(make_law("ucm"))
-    found = next_measurement(outcome, [], fluid, {}, NextExperiment(), misfit=without_outliers)
+    found = next_measurement(outcome, [], fluid, NextExperiment(), misfit=without_outliers)
     assert found.noise == expected

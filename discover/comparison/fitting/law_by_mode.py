@@ -11,7 +11,6 @@ from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, intervals
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.by_mode import constants_by_mode
@@ -20,6 +19,7 @@ from discover.inference.degrees import Degree, choose_degrees
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
+from discover.inference.varying_constant import fits_of_one_degree_more
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
@@ -187,9 +187,9 @@ def fit_law_by_mode(
     fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
     if not any(one.degree for one in degrees.values()):
         return None
-    bands = _bands(problem, fit, degrees, model, flows)
+    constants, bands = _told(problem, fit, degrees, model, flows)
     return LawByMode(
-        _constants(problem, fit, degrees),
+        constants,
         problem.lack_of_fit(fit, fitted, expectation),
         _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
         _errors(forward, fit, held_out),
@@ -226,28 +226,31 @@ def coefficients_in_modes(
     fit, degrees = _fitted(problem, [*names])
     if not fit.usable:
         return None
-    constants = _constants(problem, fit, degrees)
+    constants, bands = _told(problem, fit, degrees, model, flows)
     if set(constants) != set(names):
         return None
-    bands = _bands(problem, fit, degrees, model, flows)
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
 
 
-def _bands(
+def _told(
     problem: FitProblem,
     fit: Fit,
     degrees: Mapping[str, Degree],
     model: DeclaredModel,
     flows: Sequence[Flow],
-) -> dict[str, PredictionBand]:
-    drawn = draw_constants(problem, fit, degrees, _DRAWS)
-    if drawn is None:
-        return {}
+) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
+    """Return the constants of a fit by name, and its bands by the key of the flow."""
     forward = problem.model
+    wider = fits_of_one_degree_more(forward, problem.batch, fit, degrees)
+    bounds = intervals(forward, problem.batch, fit)
+    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, wider)
+    drawn = draw_constants(problem, fit, degrees, wider, _DRAWS)
+    if drawn is None:
+        return constants, {}
     found = (effect_of(forward, name) for name in drawn.names)
     effects = [effect for effect in found if isinstance(effect, ConstitutiveEffect)]
     inner = {name: fit.theta[forward.positions(name)[1:]] for name in drawn.names}
-    return bands_by_mode(drawn, effects, inner, model.fluid, flows)
+    return constants, bands_by_mode(drawn, effects, inner, model.fluid, flows)
 
 
 def _without_n2(band: PredictionBand) -> PredictionBand:
@@ -256,26 +259,11 @@ def _without_n2(band: PredictionBand) -> PredictionBand:
     return replace(band, **{name: known * getattr(band, name) for name in names})
 
 
-def _constants(
-    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree]
-) -> dict[str, ConstantByMode]:
-    bounds = intervals(problem.model, problem.batch, fit)
-    return constants_by_mode(problem.model, problem.batch, fit, bounds, degrees)
-
-
 def _problem(
     model: DeclaredModel, names: Sequence[str], fitted: Sequence[Run], n_candidates: int
 ) -> FitProblem:
     effects = {name: make_effect(name) for name in names}
-    declared = ForwardDeclared(
-        model.law,
-        model.modulus,
-        model.relaxation_time,
-        model.solvent_viscosity,
-        law_name=model.law_name,
-        parameters=tuple(model.parameters.items()),
-        by_mode=tuple(effects),
-    )
+    declared = model.without_effects(by_mode=tuple(effects))
     forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
     return FitProblem(forward, make_batch(fitted), n_candidates)
 

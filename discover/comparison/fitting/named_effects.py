@@ -14,11 +14,10 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import chi2
 
-from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, KinematicEffect, named_effects
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.forward import DeclaredModel as ForwardDeclared
 from discover.forward.least_squares import Fit, fit_batch, jacobians, uncertainty
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
@@ -44,7 +43,7 @@ _TAIL = 0.975
 _ARITHMETIC = 3e-4
 """Of the rms of σ12 or N1: what two integrators may differ by."""
 
-BEYOND = 2.0 * float(np.log(WINDOW))
+_BEYOND = 2.0 * float(np.log(WINDOW))
 """Difference of the criterion beyond which what is less probable counts no longer."""
 
 Distribution = tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]
@@ -83,9 +82,9 @@ def fit_named_effects(
 ) -> tuple[NamedExplanation, ...]:
     """Return the sets of at most two named effects that explain the runs, the most probable first.
 
-    One of the two at the most is the instrument's. So are sets that are more probable than one that
-    explains them. Those that are less probable than the first by
-    more than Occam's window are left out, and those with a constant at the end of its range.
+    One of the two at the most is the instrument's. A set that is more probable than one that
+    explains the runs is returned too. Left out are those less probable than the first of these by
+    more than Occam's window, and those with a constant at the end of its range.
 
     Parameters
     ----------
@@ -103,15 +102,7 @@ def fit_named_effects(
         Candidates; by default all with a name that may be behind these runs.
     """
     effects = _admitted(fitted) if effects is None else effects
-    declared = ForwardDeclared(
-        model.law,
-        model.modulus,
-        model.relaxation_time,
-        model.solvent_viscosity,
-        law_name=model.law_name,
-        parameters=tuple(model.parameters.items()),
-        modulus_covariance=model.modulus_covariance,
-    )
+    declared = model.without_effects(modulus_covariance=model.modulus_covariance)
     dated = [[with_rate_steps(run) for run in runs] for runs in (fitted, unseen)]
     declared, fitted, unseen = with_places(declared, *dated)
     forward = AugmentedModel(declared, effects, data_scales(fitted))
@@ -141,7 +132,7 @@ def fit_named_effects(
         names: one
         for names, one in left.items()
         if worth[names] < worth[first]
-        or (one.verdict == "explained" and worth[names] <= worth[first] + BEYOND)
+        or (one.verdict == "explained" and worth[names] <= worth[first] + _BEYOND)
     }
     return tuple(
         NamedExplanation(
@@ -235,7 +226,7 @@ def _to_predict(
     """Return the keys of the flows, and of each quantity in turn the runs that record it."""
     runs, keys, shown = {run.name: run for run in (*fitted, *unseen)}, [], []
     for flow in flows:
-        if flow.kind not in ("training", "held_out", "test") or not flow.in_shear:
+        if flow.kind not in DRAWN or not flow.in_shear:
             continue
         if not flow.records_shear_stress or flow.protocol.control != "rate":
             continue

@@ -7,15 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.flows import DRAWN, Flow
 from discover.effects import ConstitutiveEffect
 from discover.equations import AugmentedLaw
 from discover.identify.rivals.bands import PredictionBand, bands_of_predictions
 from discover.identify.side_by_side.many_laws import predict_laws
 from discover.inference.draws_by_mode import ConstantsDrawn
 from discover.laws.multimode import Fluid
-
-_SHOWN = ("training", "held_out", "test")
 
 _AT_A_TIME = 512
 """Modes followed side by side: every length is one more program, and more take more memory."""
@@ -46,7 +44,7 @@ def bands_by_mode(
     flows
         All flows of the comparison.
     """
-    shown = [f for f in flows if f.kind in _SHOWN and f.protocol.control != "stress"]
+    shown = [f for f in flows if f.kind in DRAWN and f.protocol.control != "stress"]
     if not shown:
         return {}
     times = [flow.times for flow in shown]

@@ -160,19 +160,16 @@ def next_measurement(
     outcome: LearnerOutcome,
     rivals: Iterable[Any],
     declared: Fluid,
-    bands: Mapping[str, PredictionBand],
     options: NextExperiment,
     seed: int = 0,
     misfit: float | None = None,
 ) -> NextMeasurement:
-    """Return proposals for the law that sparse regression chose, beside its bands.
+    """Return proposals for the law that sparse regression chose; its bands are none yet.
 
     Parameters
     ----------
     outcome, rivals, declared, seed
         As in `bands_of_law`.
-    bands
-        What that returns.
     options
         What the user could run.
     misfit
@@ -194,7 +191,7 @@ def next_measurement(
         )
     names = (chosen.name, *(law.name for law in others))
     oscillations = [p for p in proposals if p.experiment.pipkin is not None]
-    return NextMeasurement(names, proposals[:_SHOWN], bands, noise, oscillations)
+    return NextMeasurement(names, proposals[:_SHOWN], noise=noise, oscillations=oscillations)
 
 
 def _with_sampled_rates(

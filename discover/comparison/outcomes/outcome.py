@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Real
 
 from discover.comparison.outcomes.constant import Constant
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, Stresses, predict
+from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
@@ -166,7 +166,6 @@ class LearnerOutcome(TermTables):
         )
 
 
-_BANDS = ("training", "held_out", "test")
 _STRAIN_STEP = 0.2
 
 
@@ -179,7 +178,7 @@ def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, 
     ]
     bands: dict[str, Limits | None] = {}
     for flow in flows:
-        if flow.kind not in _BANDS:
+        if flow.kind not in DRAWN:
             continue
         predicted = [predict(member, flow) for member in fluids]
         told = [p for p in predicted if p is not None]
@@ -194,7 +193,7 @@ def _weighted_bands(
     weighted: WeightedLaws, fluid: Fluid, flows: list[Flow]
 ) -> tuple[dict[str, Stresses], dict[str, Limits | None]]:
     """Return the middle of the band of every flow, and its limits."""
-    shown = [flow for flow in flows if flow.kind in _BANDS]
+    shown = [flow for flow in flows if flow.kind in DRAWN]
     if not shown:
         return {}, {}
     protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
