@@ -30,6 +30,7 @@ from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
+from discover.inference.profile import profiled
 from discover.inference.varying_constant import fits_of_one_degree_more
 
 
@@ -152,12 +153,15 @@ class FinalConstants:
         What that does to constants; None if nothing.
     by_mode
         Constants that may differ from mode to mode, by name.
+    possible
+        Constants far from the fit that these data do not exclude; see `profiled`.
     """
 
     bounds: Bounds
     unknown: Float[np.ndarray, "runs n"] | None
     coarse: CoarseRates | None
     by_mode: Mapping[str, ConstantByMode]
+    possible: Sequence[Float[np.ndarray, " p"]] = ()
 
     @property
     def rates_known(self) -> bool:
@@ -200,9 +204,22 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     """
     search, model, batch, fit = final.search, final.model, final.batch, final.fit
     bounds = intervals(model, batch, fit, final.shifts)
+    profile = profiled(search.problem, fit, bounds, _constants(final))
+    bounds = profile.bounds
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
     wider = fits_of_one_degree_more(model, batch, fit, search.degrees, search.prior)
     by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, wider)
-    return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart})
+    return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart}, profile.possible)
+
+
+def _constants(final: FinalFit) -> list[int]:
+    """Return positions of fitted constants, without what varies them and the instants of steps."""
+    model, instants = final.model, final.model.instants
+    varying = {at for name in model.declared.by_mode_slices for at in model.varying(name)}
+    return [
+        at
+        for at in final.fit.free
+        if at not in varying and not instants.start <= at < instants.stop
+    ]

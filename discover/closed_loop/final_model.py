@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,9 +17,10 @@ from discover.closed_loop.search import Search
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import AugmentedLaw, Equation, StatePart, law_parts
 from discover.errors import InputError
-from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
+from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch, DeclaredModel
 from discover.forward.least_squares import Fit
-from discover.inference.constants import ConstantByMode, StageParameter
+from discover.inference.constants import ConstantByMode, StageParameter, ToldTogether
+from discover.inference.told_together import product_or_ratio
 from discover.laws import Fluid
 
 Bounds = Mapping[int, tuple[float, float]]
@@ -31,6 +33,7 @@ def stage_of(
     bounds: tuple[Bounds, Bounds],
     error: ErrorPair,
     by_mode: ConstantByMode | None,
+    possible: Sequence[np.ndarray] = (),
 ) -> Stage:
     """Return one effect of the final model, as a stage of the way to it.
 
@@ -46,6 +49,8 @@ def stage_of(
         Errors once this effect was added.
     by_mode
         Its constant in each mode, where that differs.
+    possible
+        Constants far from the fit that the runs do not exclude.
     """
     model, fit = search.model, search.fit
     effect = next(e for e in model.effects if e.name == name)
@@ -58,6 +63,8 @@ def stage_of(
     if by_mode is not None:
         first = effect.parameters[0].name
         parameters[first] = with_shared_interval(by_mode, parameters[first])
+    places = dict(zip(parameters, model.positions(name), strict=True))
+    left_open = tuple(name for name, parameter in parameters.items() if parameter.is_open)
     return Stage(
         effect=name,
         kind=effect.kind,
@@ -72,7 +79,39 @@ def stage_of(
         equation=effect.equation,
         source=effect.source,
         check=effect.check,
+        left_open=left_open,
+        told_together=told_together(
+            search.batch, fit, possible, {name: parameters[name] for name in left_open}, places
+        ),
     )
+
+
+def told_together(
+    batch: Batch,
+    fit: Fit,
+    possible: Sequence[np.ndarray],
+    parameters: Mapping[str, StageParameter],
+    places: Mapping[str, int],
+) -> tuple[ToldTogether, ...]:
+    """Return products and ratios that the runs tell of constants that they leave open.
+
+    Parameters
+    ----------
+    batch, fit, possible
+        The fitted runs, the fit, and constants far from it that the runs do not exclude.
+    parameters, places
+        Constants of an effect that are left open, and where all of them stand.
+    """
+    found = []
+    for first, second in combinations(parameters, 2):
+        told = product_or_ratio(batch, fit, possible, places[first], places[second])
+        if told is not None:
+            is_ratio, value, ends = told
+            of_first, of_second = parameters[first].unit, parameters[second].unit
+            joined = " ".join(filter(None, (of_first, of_second)))
+            unit = f"{of_first or 1}/{of_second}" if is_ratio and of_second else joined
+            found.append(ToldTogether((first, second), is_ratio, value, ends, unit))
+    return tuple(found)
 
 
 def with_shared_interval(by_mode: ConstantByMode, shared: StageParameter) -> ConstantByMode:

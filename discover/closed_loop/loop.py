@@ -161,7 +161,10 @@ def run_loop(
         error_after=final.error_after,
         noise_floor=judgement.left.noise,
         stages=tuple(
-            stage_of(search, name, (bounds, over_all), final.error_at(i), by_mode.get(name))
+            stage_of(
+                search, name, (bounds, over_all), final.error_at(i), by_mode.get(name),
+                constants.possible,
+            )
             for i, name in enumerate(final.active, start=1)
         ),
         remaining=_remaining(

@@ -5,6 +5,10 @@ from dataclasses import dataclass, field
 _FEW = 3
 """Modes, each of which is told."""
 
+_OPEN = 100.0
+"""Factor above the value from which on an interval tells nothing: two decades, beyond which records
+tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."""
+
 
 @dataclass(frozen=True)
 class StageParameter:
@@ -26,6 +30,37 @@ class StageParameter:
     ci95: tuple[float, float]
     unit: str
     ci95_given_effects: tuple[float, float] | None = field(default=None, kw_only=True)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether these data leave it open: the interval goes on for two decades above it."""
+        return self.ci95[1] > _OPEN * abs(self.value)
+
+
+@dataclass(frozen=True)
+class ToldTogether:
+    """A product or a ratio that these data tell of two constants that they leave open.
+
+    Attributes
+    ----------
+    constants
+        Names of the two.
+    is_ratio
+        Whether it is the first over the second.
+    value, ci95, unit
+        As of a constant.
+    """
+
+    constants: tuple[str, str]
+    is_ratio: bool
+    value: float
+    ci95: tuple[float, float]
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """The two names with what joins them."""
+        return (" / " if self.is_ratio else " × ").join(self.constants)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """What a closed loop added or found declared, stage by stage, and without each run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.inference.constants import ConstantByMode, StageParameter
+from discover.inference.constants import ConstantByMode, StageParameter, ToldTogether
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 
@@ -28,6 +28,10 @@ class Stage:
         Lowering of the information criterion.
     equation, source, check
         What it adds, where that comes from, and how to confirm it in the laboratory.
+    left_open
+        Names of constants that the runs do not tell.
+    told_together
+        What they tell of two of these.
     """
 
     effect: str
@@ -39,6 +43,8 @@ class Stage:
     equation: str
     source: str
     check: str
+    left_open: tuple[str, ...] = field(default=(), kw_only=True)
+    told_together: tuple[ToldTogether, ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -134,9 +134,11 @@ def stage_row(stage: Stage, number: int) -> dict[str, Any]:
                 "value": p.value,
                 "ci95": p.ci95,
                 "unit": p.unit,
+                "left_open": name in stage.left_open,
             }
             for name, p in stage.parameters.items()
         ],
+        "together": stage.told_together,
         "aliases": ", ".join(map(effect_title, stage.aliases)),
         "source": stage.source,
         "check": stage.check,

@@ -76,13 +76,9 @@ def _loop_found(result: LoopResult) -> str:
     lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
     parts = []
     for i, stage in enumerate(result.stages):
-        values = ", ".join(
-            f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
-            + f" (95 % {interval(p.ci95)})"
-            for name, p in stage.parameters.items()
-        )
         parts.append(
-            f"{lead if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
+            f"{lead if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, "
+            + _values(stage)
         )
     verdict = _LOOP[result.verdict]
     if result.verdict == "unexplained":
@@ -99,6 +95,24 @@ def _loop_found(result: LoopResult) -> str:
     if result.laws:
         parts.append(_law_chosen(result.laws))
     return sentence([verdict, *parts])
+
+
+def _values(stage: Stage) -> str:
+    """Return the constants of an effect, and which of them these data leave open."""
+    told = [
+        f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+        + f" (95 % {interval(p.ci95)})"
+        for name, p in stage.parameters.items()
+        if name not in stage.left_open
+    ]
+    for one in stage.told_together:
+        value = f"{estimate(one.value, one.ci95)} {one.unit}".rstrip()
+        told.append(f"{one.name.replace('_', ' ')} = {value} (95 % {interval(one.ci95)})")
+    if stage.left_open:
+        names = listed([name.replace("_", " ") for name in stage.left_open])
+        alone = " alone" if stage.told_together else ""
+        told.append(f"{names}{alone} not determined by these data")
+    return ", ".join(told)
 
 
 def _law_chosen(laws: Sequence[LawFit]) -> str:
