@@ -210,6 +210,7 @@ def _remaining(
     summary = summarise(final.fit.residual, np.asarray(final.batch.weight))
     return {
         "structured": judgement.structured,
+        "only_states": judgement.only_states,
         "error": final.error_after.fit,
         "noise_floor": left.noise,
         "noise_unsure": left.noise_unsure,

@@ -45,7 +45,6 @@ from discover.comparison.judging.next_measurement import (
 )
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
-    ONLY_STATES,
     Statement,
     claimed,
     make_statements,
@@ -59,6 +58,7 @@ from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.progress import Progress
+from discover.protocols.kinematics import ONLY_STATES
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
 from discover.study.schema import Study

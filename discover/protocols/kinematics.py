@@ -35,6 +35,12 @@ FOLLOWED: tuple[Control, ...] = ("rate", "steady")
 STATES: tuple[Control, ...] = ("steady", "oscillation")
 """Controls of which each sample is a state of its own, and time only counts them."""
 
+ONLY_STATES = (
+    "Only steady or periodic states were measured, which do not tell how they are reached: another "
+    "law, or a structure that flow breaks down, can give the same states and another transient."
+)
+"""Said of a law that was fitted to nothing else."""
+
 KINDS: tuple[FlowKind, ...] = ("shear", "uniaxial", "planar", "biaxial")
 """Flows by name; the first is the default everywhere."""
 

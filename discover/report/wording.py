@@ -31,6 +31,12 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
     return FIGURE_SYMBOLS[found.pop()]
 
 
+A_TRANSIENT = (
+    "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
+    "alone do not tell a law from another, or from a structure that flow breaks down."
+)
+"""What to measure where nothing but states was."""
+
 _LEARNERS = {
     "tensor_sindy": "Sparse regression",
     "tbnn_ude": "The neural network",

@@ -11,10 +11,11 @@ import pytest
 from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.statements import IN_LIBRARY, ONLY_STATES, Statement
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.dataset.repeats import Repeats
 from discover.learners import RecoveredTerm
 from discover.protocols.control import steady_rates
+from discover.protocols.kinematics import ONLY_STATES
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows

@@ -35,6 +35,8 @@ class Judgement:
         Runs with too few samples to judge by, where others have more.
     missed, unseen
         How many times what can be asked the runs held out are missed, and how many there are.
+    only_states
+        Whether nothing but steady or periodic states was measured.
     worst
         The run that is missed most.
     description
@@ -52,6 +54,7 @@ class Judgement:
     description: str
     missed: float = 0.0
     unseen: int = 0
+    only_states: bool = False
 
 
 def judge(
@@ -113,6 +116,7 @@ def judge(
         text,
         unseen.error / unseen.asked if unseen.asked > 0.0 else 0.0,
         sum(record.held_out for record in records),
+        not any(record.is_transient for record in records),
     )
 
 

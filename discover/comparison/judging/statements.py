@@ -16,6 +16,7 @@ from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.identify import Structure
 from discover.identify.exact.relations import spell_briefly
 from discover.identify.rivals.bands import PredictionBand
+from discover.protocols.kinematics import ONLY_STATES
 from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
@@ -35,12 +36,6 @@ _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
-ONLY_STATES = (
-    "Only steady or periodic states were measured, which do not tell how they are reached: another "
-    "law, or a structure that flow breaks down, can give the same states and another transient."
-)
-"""Said of a law that was fitted to nothing else."""
-
 _IN_TRANSIENTS = "σ12 in transients"
 _UNTESTED = (
     "One run was fitted and none held out, so no other flow tested the law, and {} is not "

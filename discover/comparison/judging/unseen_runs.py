@@ -157,7 +157,9 @@ def _refuted(
         return ""
     fitted = [row for flow in training if (row := _residual(outcome, flow)) is not None]
     known = [_record(flow) for flow in training]
-    against = Unseen(residuals, records, columns, noise_model(fitted).correlation)
+    # stresses and strains beside one another: each run says how its own noise is correlated
+    alike = [row / (_size(row) or 1.0) for row in fitted]
+    against = Unseen(residuals, records, columns, noise_model(alike).correlation)
     told = all(len(column) for column in columns)  # how uncertain the constants are
     if told and refutes(against, fitted, known, expectation):
         return (

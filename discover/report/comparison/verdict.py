@@ -19,6 +19,7 @@ from discover.identify.exact.relations import spell_briefly
 from discover.protocols.kinematics import in_words as quantities_in_words
 from discover.report.plots.by_mode import by_mode_in_brief
 from discover.report.wording import (
+    A_TRANSIENT,
     SYMBOLS,
     estimate,
     interval,
@@ -394,7 +395,7 @@ def _next(comparison: Comparison) -> str:
         )
     following = comparison.next_measurement
     if only_states(comparison.flows):
-        return _A_TRANSIENT
+        return A_TRANSIENT
     if following.proposals:
         return _proposal(following)
     if not any(flow.in_shear for flow in comparison.flows_of("training")):
@@ -407,12 +408,6 @@ def _next(comparison: Comparison) -> str:
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
         f"a shear rate above {significant(max(rates), 3)}{unit}."
     )
-
-
-_A_TRANSIENT = (
-    "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
-    "alone do not tell a law from another, or from a structure that flow breaks down."
-)
 
 
 def _proposal(following: NextMeasurement) -> str:

@@ -10,8 +10,10 @@ from discover.closed_loop.results.stages import Stage
 from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates, of_json
 from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
+from discover.protocols.kinematics import ONLY_STATES
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
+    A_TRANSIENT,
     FIGURE_SYMBOLS,
     effect_title,
     effects_title,
@@ -37,6 +39,8 @@ _LOOP = {
     "unexplained": "What is left still has structure that no candidate explains",
     "no_signal": "The records hold no signal that a law could be told from",
 }
+
+_UNTESTED = "Fitted, not tested: the declared model lacked something, and adding it fits the data"
 
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
 
@@ -81,6 +85,8 @@ def _loop_found(result: LoopResult) -> str:
             + _values(stage)
         )
     verdict = _LOOP[result.verdict]
+    if result.verdict == "effects_added" and _is_untested(result):
+        verdict = _UNTESTED
     if result.verdict == "unexplained":
         if (coarse := _coarse(result)) is not None and coarse.hides:
             verdict = _UNKNOWN_RATE
@@ -95,6 +101,12 @@ def _loop_found(result: LoopResult) -> str:
     if result.laws:
         parts.append(_law_chosen(result.laws))
     return sentence([verdict, *parts])
+
+
+def _is_untested(result: LoopResult) -> bool:
+    """Return whether nothing was measured that could refute what was fitted."""
+    alone = len(result.records) == 1 and not result.folds
+    return alone or bool(result.remaining.get("only_states"))
 
 
 def _values(stage: Stage) -> str:
@@ -171,6 +183,8 @@ def _loop_sure(result: LoopResult) -> str:
         )
     if before.held_out is None:
         parts.append("no run was held out to judge by")
+    if result.verdict == "effects_added" and result.remaining.get("only_states"):
+        sentences.append(ONLY_STATES)
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
     if steps := result.remaining.get("step_instants"):
@@ -242,6 +256,8 @@ def _loop_next(result: LoopResult) -> str:
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
+    if result.verdict == "effects_added" and result.remaining.get("only_states"):
+        return A_TRANSIENT
     if result.verdict in _EXPLAINED and (told := _telling_test(result)):
         return told
     doubtful = _most_doubtful(result.stages)
