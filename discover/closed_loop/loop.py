@@ -12,7 +12,12 @@ from discover.closed_loop.candidates import (
     require_possible,
     require_present,
 )
-from discover.closed_loop.explanations import BEAM_WIDTH, explain, over_explanations
+from discover.closed_loop.explanations import (
+    BEAM_WIDTH,
+    explain,
+    is_untested,
+    over_explanations,
+)
 from discover.closed_loop.final_fit import FinalConstants, FinalFit, final_constants, final_fit
 from discover.closed_loop.final_model import (
     augmented_fluid,
@@ -218,6 +223,7 @@ def _remaining(
         "noise_known": judgement.noise_known,
         "carries_over": judgement.carries_over,
         "without_fluid": verdict.silence is not None,
+        "untested": is_untested(final.fit, final.fitted, final.held_out),
         "not_judging": list(judgement.not_judging),
         "linear_error": final.model.declared.linear_error,
         "autocorrelation": float(np.mean(summary.autocorrelation)),

@@ -3,12 +3,13 @@
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
 from discover.closed_loop.explanations.proposed_tests import next_tests
-from discover.closed_loop.explanations.report import explain, with_band
+from discover.closed_loop.explanations.report import explain, is_untested, with_band
 
 __all__ = [
     "BEAM_WIDTH",
     "Carried",
     "explain",
+    "is_untested",
     "next_tests",
     "over_explanations",
     "search_and_carry",

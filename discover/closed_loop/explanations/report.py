@@ -14,9 +14,29 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
+from discover.dataset.repeats import is_one_flow
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics.residual import summarise
+
+
+_NEVER_TRIED = 0.5
+"""Share of the explanations where nothing was asked of them but the one flow that they were fitted
+to: the next trial of what was never tried succeeds with probability (0 + 1)/(0 + 2), by Laplace's
+rule of succession."""
+
+
+def is_untested(fit: Fit, fitted: Sequence[Run], held_out: Sequence[Run]) -> bool:
+    """Return whether what was fitted was never asked of another flow than the one it was fitted to.
+
+    Parameters
+    ----------
+    fit
+        The final fit; a model of which nothing was fitted was tested by any run.
+    fitted, held_out
+        The runs.
+    """
+    return bool(fit.free) and not held_out and is_one_flow(fitted)
 
 
 def explain(
@@ -58,7 +78,10 @@ def explain(
     def limits_of(one: Carried) -> dict[str, str]:
         return names_of_limits(model, batch, runs[0], one.fit, one.effects)
 
-    return explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
+    found = explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
+    if not is_untested(fit, *runs):
+        return found
+    return found.doubted(1.0 - _NEVER_TRIED * (1.0 - found.unexplained_probability))
 
 
 def with_band(

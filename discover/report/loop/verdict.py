@@ -38,6 +38,13 @@ _LOOP = {
     "no_signal": "The records hold no signal that a law could be told from",
 }
 
+_UNTESTED = {
+    "effects_added": "Fitted, not tested: with what is added the declared model describes the one "
+    "flow that was measured",
+    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model describes "
+    "the one flow that was measured",
+}
+
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
 
 _UNKNOWN_RATE = "What the rate did between its samples hides all that could tell what is missing"
@@ -85,6 +92,8 @@ def _loop_found(result: LoopResult) -> str:
             f"{lead if i == 0 else ''}{KINDS[stage.kind]}: {effect_title(stage.effect)}, {values}"
         )
     verdict = _LOOP[result.verdict]
+    if _untested(result):
+        verdict = _UNTESTED[result.verdict]
     if result.verdict == "unexplained":
         if (coarse := _coarse(result)) is not None and coarse.hides:
             verdict = _UNKNOWN_RATE
@@ -155,7 +164,13 @@ def _loop_sure(result: LoopResult) -> str:
             f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
             "for noise, and an effect that varies slowly would look the same"
         )
-    if before.held_out is None:
+    if _untested(result):
+        none = percent(result.explanations.unexplained_probability)
+        parts.append(
+            "one flow was fitted and none held out, so no other flow tested what was found: that "
+            f"none of the explanations listed is right has a probability of {none}"
+        )
+    elif before.held_out is None:
         parts.append("no run was held out to judge by")
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
@@ -230,6 +245,8 @@ def _loop_next(result: LoopResult) -> str:
         )
     if result.verdict in _EXPLAINED and (told := _telling_test(result)):
         return told
+    if _untested(result):
+        return "Fit another run, or hold one out: at another rate, or of another test."
     doubtful = _most_doubtful(result.stages)
     if doubtful is not None and result.verdict != "unexplained":
         check = doubtful.check.rstrip(". ")
@@ -261,6 +278,11 @@ def _loop_next(result: LoopResult) -> str:
 
 
 _EXPLAINED = ("effects_added", "no_effect_needed")
+
+
+def _untested(result: LoopResult) -> bool:
+    """Return whether what explains the records was asked of no other flow than one."""
+    return result.verdict in _EXPLAINED and bool(result.remaining.get("untested"))
 
 
 def _telling_test(result: LoopResult) -> str:
