@@ -1,14 +1,14 @@
 """Data sets that an outside evaluator might make: what is claimed of them, against what is true.
 
-Made by `independent` and scipy alone, which share nothing with the software under test; the software
-gets a data folder and a study file and no more. The rules, written before the first run:
+Made by `independent` and scipy alone, which share nothing with the software under test; it gets a
+data folder and a study file and no more. The rules, written before the first run:
 
 1. **No fluid**: any verdict but `unexplained` and `no_signal` is false. A refusal is as good.
-2. **Any verdict that claims to explain** (`explained`, `effects_added`, `no_effect_needed`) is false
-   where what is predicted misses the record without its noise by more than half the noise in the
-   runs fitted, or by more than the noise in the run held out.
-3. **Names**: under such a verdict of the loop every effect named, and every one with a probability of
-   one half or more, is there, or its list of aliases holds one that is.
+2. **Any verdict that claims to explain** (`explained`, `effects_added`, `no_effect_needed`) is
+   false where what is predicted misses the record without its noise by more than half the noise in
+   the runs fitted, or by more than the noise in the run held out.
+3. **Names**: under such a verdict of the loop every effect with a probability of one half or more is
+   there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others.
 5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
 6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more

@@ -1,4 +1,4 @@
-"""What an evaluator might hand over, and what is true of it. See `hostile_fluids.py` for the rules."""
+"""What an evaluator might hand over, and what is true of it. Rules are in `hostile_fluids.py`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -126,6 +126,13 @@ class Case:
     held_out: tuple[str, ...] = ("held.csv",)
 
 
+@dataclass(frozen=True)
+class _Strange:
+    truth: str
+    fluid: Material
+    same_as: tuple[str, ...] = ()
+
+
 def recorded(material: Material = UCM, flows: Sampled = FLOWS, **faults):
     """Return the maker of runs at a given rate on one instrument."""
     instrument = Instrument(**faults)
@@ -167,10 +174,14 @@ def stress_of(function: Callable[[dict[str, np.ndarray]], np.ndarray], silent: b
 
 
 def fractured(columns: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the stress behind an edge that loses a third of the area at once, over a strain of 1."""
+    """Return the stress behind an edge that loses a third of its area over a strain of 1."""
     time, rate = columns["time_s"], np.abs(columns["shear_rate_1_s"])
-    strain = np.concatenate([[rate[0] * time[0]], rate[0] * time[0] + np.cumsum(
-        (rate[1:] + rate[:-1]) / 2 * np.diff(time))])
+    strain = np.concatenate(
+        [
+            [rate[0] * time[0]],
+            rate[0] * time[0] + np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(time)),
+        ]
+    )
     return columns["stress_Pa"] * (1 - 0.33 / (1 + np.exp(-(strain - 5.0) / 0.4)))
 
 
@@ -218,6 +229,8 @@ SLOW: Sampled = {
     "held.csv": (start_up(2.0), _GROWTH),
 }
 SLOW_ALONE = {name: flow for name, flow in SLOW.items() if name != "held.csv"}
+ALL: Sampled = {name: flow for name, flow in FLOWS.items() if name != "held.csv"}
+TWO: Sampled = {name: FLOWS[name] for name in ("slow.csv", "fast.csv")}
 ONE: Sampled = {"only.csv": (start_up(2.0), _GROWTH)}
 ONE_HELD: Sampled = {**ONE, "held.csv": FLOWS["held.csv"]}
 
@@ -444,6 +457,20 @@ SAMPLING = {
     "one_run_ucm_fitted": Case("Maxwell, one start-up, constants fitted", recorded(UCM, ONE),
                                held_out=(), model=FITTED, terms={}),
 }  # fmt: skip
+NONE_HELD = {
+    f"{which}_{name}": Case(
+        f"{material.truth}, {which} runs, none held out", recorded(material.fluid, flows),
+        outside=True, same_as=material.same_as, held_out=(),
+    )
+    for which, flows in (("three", ALL), ("two", TWO))
+    for name, material in {
+        "pom_pom": _Strange("pom-pom", POM_POM),
+        "k_bkz": _Strange("K-BKZ", KBKZ(0.25, **SCALE)),
+        "elastoplastic": _Strange("Hébraud–Lequeux", Elastoplastic()),
+        "white_metzner": _Strange("White–Metzner", WhiteMetzner(0.5, **SCALE)),
+        "heated": _Strange("Maxwell that warms", Heated(), ("viscous_heating",)),
+    }.items()
+}  # fmt: skip
 _CREEP = {"model": wrong(solvent_viscosity_Pa_s=5.0)}
 TESTS = {
     "alternation_giesekus": Case("Giesekus in steady alternation, at a phase",
@@ -473,5 +500,5 @@ TESTS = {
 }  # fmt: skip
 
 CASES: dict[str, Case] = {
-    **EMPTY, **FLUIDS, **FAULTS, **SAMPLING, **TESTS, **DECLARED, **NOISY
+    **EMPTY, **FLUIDS, **FAULTS, **SAMPLING, **NONE_HELD, **TESTS, **DECLARED, **NOISY
 }  # fmt: skip

@@ -186,8 +186,10 @@ def wandering(size: float):
 
     def put(stress, lot):
         walk = np.cumsum(lot.standard_normal(len(stress))) / np.sqrt(len(stress))
-        return stress + size * rms(stress) * walk + 0.003 * rms(stress) * lot.standard_normal(
-            len(stress)
+        return (
+            stress
+            + size * rms(stress) * walk
+            + 0.003 * rms(stress) * lot.standard_normal(len(stress))
         )
 
     return put

@@ -63,11 +63,14 @@ def of_loop(case: Case, said: dict, rows, clean: Records, found: dict) -> None:
     if said["verdict"] == "effects_added":
         for stage in said["stages"]:
             if not true & {stage["effect"], *stage["aliases"]}:
-                found["falsehoods"].append(f"{stage['effect']} is named and not there")
+                likely = said["inclusion"].get(stage["effect"], 0.0)
+                text = f"{stage['effect']} is named, at {likely:.2f}, and not there"
+                found["falsehoods" if likely >= 0.5 else "notes"].append(text)
             for name, value in case.planted.get(stage["effect"], {}).items():
                 _interval(name, stage["parameters"][name], value, found)
     for name, probability in said["inclusion"].items():
-        if probability >= 0.5 and name not in true | twins:
+        named = any(stage["effect"] == name for stage in said["stages"])
+        if probability >= 0.5 and name not in true | twins and not named:
             text = f"{name} has a probability of {probability:.2f}"
             found["falsehoods" if found["verdict"] in CONFIDENT else "notes"].append(text)
     if said["verdict"] == "unexplained" and not case.outside and case.fluid:

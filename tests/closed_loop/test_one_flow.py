@@ -14,7 +14,7 @@ BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 
 
 def giesekus(rate: float) -> np.ndarray:
-    """Return σ12/G of a Giesekus fluid, α = 0.3, λ = 1 s, in start-up; written out by components."""
+    """Return σ12/G of a Giesekus fluid in start-up, α = 0.3, λ = 1 s, by components."""
 
     def change(t, s):
         first, second, shear = s

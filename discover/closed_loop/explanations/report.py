@@ -19,7 +19,6 @@ from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics.residual import summarise
 
-
 _NEVER_TRIED = 0.5
 """Share of the explanations where nothing was asked of them but the one flow that they were fitted
 to: the next trial of what was never tried succeeds with probability (0 + 1)/(0 + 2), by Laplace's

@@ -41,8 +41,8 @@ _LOOP = {
 _UNTESTED = {
     "effects_added": "Fitted, not tested: with what is added the declared model describes the one "
     "flow that was measured",
-    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model describes "
-    "the one flow that was measured",
+    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model "
+    "describes the one flow that was measured",
 }
 
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
