@@ -379,6 +379,18 @@ DECLARED = {
     ),
     "time_high_ucm": Case("Maxwell, time told 10 % high", recorded(),
                           model=wrong(relaxation_time_s=1.1), same_as=_TIMES),
+    "constants_fitted": Case("Giesekus, modulus and time fitted", recorded(GIESEKUS), model=FITTED,
+                             **_SHEAR),
+    "constants_fitted_ucm": Case("Maxwell, modulus and time fitted", recorded(), model=FITTED,
+                                 terms={}),
+    "law_fitted": Case(
+        "Giesekus told, its mobility fitted", recorded(GIESEKUS), terms={},
+        model={**KNOWN, "law": "giesekus", "parameters": {"alpha": "fit"}},
+    ),
+    "law_and_constants_fitted": Case(
+        "Giesekus told, all fitted", recorded(GIESEKUS), terms={},
+        model={**FITTED, "law": "giesekus", "parameters": {"alpha": "fit"}},
+    ),
     "wrong_law": Case(
         "linear PTT told as Giesekus", recorded(PhanThienTanner(0.3, "linear", **SCALE)),
         model={**KNOWN, "law": "giesekus", "parameters": {"alpha": "fit"}},
