@@ -12,7 +12,12 @@ from discover.closed_loop.candidates import (
     require_possible,
     require_present,
 )
-from discover.closed_loop.explanations import BEAM_WIDTH, explain, over_explanations
+from discover.closed_loop.explanations import (
+    BEAM_WIDTH,
+    explain,
+    over_explanations,
+    why_untested,
+)
 from discover.closed_loop.final_fit import FinalConstants, FinalFit, final_constants, final_fit
 from discover.closed_loop.final_model import (
     augmented_fluid,
@@ -210,7 +215,6 @@ def _remaining(
     summary = summarise(final.fit.residual, np.asarray(final.batch.weight))
     return {
         "structured": judgement.structured,
-        "only_states": judgement.only_states,
         "error": final.error_after.fit,
         "noise_floor": left.noise,
         "noise_unsure": left.noise_unsure,
@@ -222,6 +226,7 @@ def _remaining(
         "noise_known": judgement.noise_known,
         "carries_over": judgement.carries_over,
         "without_fluid": verdict.silence is not None,
+        "untested": why_untested(final.fit, final.fitted, final.held_out),
         "not_judging": list(judgement.not_judging),
         "linear_error": final.model.declared.linear_error,
         "autocorrelation": float(np.mean(summary.autocorrelation)),

@@ -71,6 +71,25 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
     return Repeats(names, float(np.sqrt(np.mean(squares))))
 
 
+def is_one_flow(runs: Sequence[Run]) -> bool:
+    """Return whether all runs are one test of one flow, repeated or not.
+
+    Steady or periodic states are a flow each, so a table of them is none.
+
+    Parameters
+    ----------
+    runs
+        Runs; one that is there several times, with other quantities, counts once.
+    """
+    named = {run.name: run for run in runs}
+    if any(run.protocol.control in STATES for run in runs):
+        return False
+    if len(named) == 1:
+        return True
+    found = repeats_among([*named.values()])
+    return found is not None and len(found.groups) == 1 and len(found.groups[0]) == len(named)
+
+
 def _same_test(one: Run, other: Run) -> bool:
     if one.protocol.flow != other.protocol.flow or one.quantity != other.quantity:
         return False

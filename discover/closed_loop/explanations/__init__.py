@@ -4,6 +4,7 @@ from discover.closed_loop.explanations.bands.wider_intervals import over_explana
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
+from discover.closed_loop.explanations.untested import why_untested
 
 __all__ = [
     "BEAM_WIDTH",
@@ -12,5 +13,6 @@ __all__ = [
     "next_tests",
     "over_explanations",
     "search_and_carry",
+    "why_untested",
     "with_band",
 ]

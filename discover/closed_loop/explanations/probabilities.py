@@ -86,9 +86,7 @@ def unexplained_probability(judgement: Judgement, effective_samples: float) -> f
     noise   [Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62]. The odds are even where the verdict
     turns: at the level of the test, at the misfit, and at the error of the runs held out that are
     tolerated. So something is always left for what no dictionary holds, some 11 % where nothing
-    speaks for it. Where nothing but states was measured, half of the rest is for laws that reach
-    the same states otherwise: a viscosity η₀/(1 + q γ̇) is that of a structure that flow breaks
-    down, and as well one of White and Metzner.
+    speaks for it.
 
     Parameters
     ----------
@@ -105,9 +103,7 @@ def unexplained_probability(judgement: Judgement, effective_samples: float) -> f
     if not (explained and probability <= SIGNIFICANCE):
         logarithm -= np.log(_least_bayes_factor(probability))
     if not judgement.structured:
-        untold = judgement.only_states and judgement.verdict == "effects_added"
-        none = _probability(min(logarithm, 0.0))
-        return 0.5 * (1.0 + none) if untold else none
+        return _probability(min(logarithm, 0.0))
     tolerated = max(STRUCTURE * left.expected, np.finfo(float).tiny)
     size = effective_samples * np.log(max(left.misfit, tolerated) / tolerated)
     unseen = judgement.unseen * 2.0 * np.log(max(judgement.missed / CARRIED, 1.0))

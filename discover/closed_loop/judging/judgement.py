@@ -35,8 +35,6 @@ class Judgement:
         Runs with too few samples to judge by, where others have more.
     missed, unseen
         How many times what can be asked the runs held out are missed, and how many there are.
-    only_states
-        Whether nothing but steady or periodic states was measured.
     worst
         The run that is missed most.
     description
@@ -54,7 +52,6 @@ class Judgement:
     description: str
     missed: float = 0.0
     unseen: int = 0
-    only_states: bool = False
 
 
 def judge(
@@ -116,7 +113,6 @@ def judge(
         text,
         unseen.error / unseen.asked if unseen.asked > 0.0 else 0.0,
         sum(record.held_out for record in records),
-        not any(record.is_transient for record in records),
     )
 
 

@@ -40,7 +40,16 @@ _LOOP = {
     "no_signal": "The records hold no signal that a law could be told from",
 }
 
-_UNTESTED = "Fitted, not tested: the declared model lacked something, and adding it fits the data"
+_UNTESTED = {
+    "effects_added": "Fitted, not tested: with what is added the declared model describes",
+    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model "
+    "describes",
+}
+
+_MEASURED = {
+    "one_flow": "the one flow that was measured",
+    "states": "the states that were measured",
+}
 
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
 
@@ -85,8 +94,8 @@ def _loop_found(result: LoopResult) -> str:
             + _values(stage)
         )
     verdict = _LOOP[result.verdict]
-    if result.verdict == "effects_added" and _is_untested(result):
-        verdict = _UNTESTED
+    if untested := _untested(result):
+        verdict = f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
     if result.verdict == "unexplained":
         if (coarse := _coarse(result)) is not None and coarse.hides:
             verdict = _UNKNOWN_RATE
@@ -101,12 +110,6 @@ def _loop_found(result: LoopResult) -> str:
     if result.laws:
         parts.append(_law_chosen(result.laws))
     return sentence([verdict, *parts])
-
-
-def _is_untested(result: LoopResult) -> bool:
-    """Return whether nothing was measured that could refute what was fitted."""
-    alone = len(result.records) == 1 and not result.folds
-    return alone or bool(result.remaining.get("only_states"))
 
 
 def _values(stage: Stage) -> str:
@@ -181,10 +184,20 @@ def _loop_sure(result: LoopResult) -> str:
             f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
             "for noise, and an effect that varies slowly would look the same"
         )
-    if before.held_out is None:
+    none = percent(result.explanations.unexplained_probability)
+    nothing = f"that none of the explanations listed is right has a probability of {none}"
+    untested = _untested(result)
+    if untested == "one_flow":
+        parts.append(
+            "one flow was fitted and none held out, so no other flow tested what was found: "
+            f"{nothing}"
+        )
+    elif before.held_out is None:
         parts.append("no run was held out to judge by")
-    if result.verdict == "effects_added" and result.remaining.get("only_states"):
+    if untested == "states":
         sentences.append(ONLY_STATES)
+        if result.stages:
+            parts.append(nothing)
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
     if steps := result.remaining.get("step_instants"):
@@ -256,10 +269,13 @@ def _loop_next(result: LoopResult) -> str:
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
-    if result.verdict == "effects_added" and result.remaining.get("only_states"):
+    untested = _untested(result)
+    if untested == "states":
         return A_TRANSIENT
     if result.verdict in _EXPLAINED and (told := _telling_test(result)):
         return told
+    if untested:
+        return "Fit another run, or hold one out: at another rate, or of another test."
     doubtful = _most_doubtful(result.stages)
     if doubtful is not None and result.verdict != "unexplained":
         check = doubtful.check.rstrip(". ")
@@ -291,6 +307,11 @@ def _loop_next(result: LoopResult) -> str:
 
 
 _EXPLAINED = ("effects_added", "no_effect_needed")
+
+
+def _untested(result: LoopResult) -> str:
+    """Return why nothing tested what explains the records, `Untested`; empty where it was."""
+    return str(result.remaining.get("untested") or "") if result.verdict in _EXPLAINED else ""
 
 
 def _telling_test(result: LoopResult) -> str:
