@@ -35,8 +35,16 @@ def of_loop(folder: Path, material: str, base) -> dict:
         row["named"].append([stage.effect, *stage.aliases])
         if loop.verdict == "effects_added" and not names & planted.keys():
             row["false"].append(f"{stage.effect} is not there")
-        for name, value in planted.get(stage.effect, {}).items():
-            found = stage.parameters[name]
+        true = planted.get(stage.effect, {})
+        told = [
+            (name, value, stage.parameters[name])
+            for name, value in true.items()
+            if name not in stage.left_open
+        ]
+        for one in stage.told_together if true else ():
+            first, second = (true[name] for name in one.constants)
+            told.append((one.name, first / second if one.is_ratio else first * second, one))
+        for name, value, found in told:
             row["constants"].append([name, value, found.value, *found.ci95])
             low, high = found.ci95
             away = max(low - value, value - high)
