@@ -7,6 +7,7 @@ import numpy as np
 
 from discover.closed_loop.explanations.bands.mixture import mixed_bands
 from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.flows_left import flows_left, share_left
 from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.probabilities import explanations_of
 from discover.closed_loop.judging.before_after import errors_of, record_runs
@@ -14,28 +15,30 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
-from discover.dataset.repeats import is_one_flow
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics.residual import summarise
 
-_NEVER_TRIED = 0.5
-"""Share of the explanations where nothing was asked of them but the one flow that they were fitted
-to: the next trial of what was never tried succeeds with probability (0 + 1)/(0 + 2), by Laplace's
-rule of succession."""
 
-
-def is_untested(fit: Fit, fitted: Sequence[Run], held_out: Sequence[Run]) -> bool:
-    """Return whether what was fitted was never asked of another flow than the one it was fitted to.
+def is_untested(
+    model: AugmentedModel,
+    fit: Fit,
+    effects: Sequence[str],
+    runs: tuple[Sequence[Run], Sequence[Run]],
+) -> bool:
+    """Return whether no flow was left to test what was fitted.
 
     Parameters
     ----------
-    fit
-        The final fit; a model of which nothing was fitted was tested by any run.
-    fitted, held_out
-        The runs.
+    model
+        With all candidates.
+    fit, effects
+        The final fit, and the effects in it.
+    runs
+        The runs that were fitted, and those held out.
     """
-    return bool(fit.free) and not held_out and is_one_flow(fitted)
+    fitted, held_out = runs
+    return bool(fit.free) and not held_out and flows_left(model, fitted, effects, True) == 0
 
 
 def explain(
@@ -77,10 +80,16 @@ def explain(
     def limits_of(one: Carried) -> dict[str, str]:
         return names_of_limits(model, batch, runs[0], one.fit, one.effects)
 
-    found = explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
-    if not is_untested(fit, *runs):
-        return found
-    return found.doubted(1.0 - _NEVER_TRIED * (1.0 - found.unexplained_probability))
+    def believed(one: Carried) -> float:
+        free = bool(one.fit.free)
+        # runs held out are the test, and judge; so does any run a model of which nothing was fitted
+        if runs[1] or not free:
+            return 1.0
+        return share_left(flows_left(model, runs[0], one.effects, free))
+
+    return explanations_of(
+        model, carried, errors, judgement, effective, unlisted, limits_of, believed
+    )
 
 
 def with_band(

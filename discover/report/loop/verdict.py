@@ -39,10 +39,10 @@ _LOOP = {
 }
 
 _UNTESTED = {
-    "effects_added": "Fitted, not tested: with what is added the declared model describes the one "
-    "flow that was measured",
+    "effects_added": "Fitted, not tested: with what is added the declared model describes what was "
+    "measured",
     "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model "
-    "describes the one flow that was measured",
+    "describes what was measured",
 }
 
 _UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
@@ -167,8 +167,8 @@ def _loop_sure(result: LoopResult) -> str:
     if _untested(result):
         none = percent(result.explanations.unexplained_probability)
         parts.append(
-            "one flow was fitted and none held out, so no other flow tested what was found: that "
-            f"none of the explanations listed is right has a probability of {none}"
+            "no run was held out, and no more flows were measured than what was fitted takes, so "
+            f"none tested it: that something else is right has a probability of {none}"
         )
     elif before.held_out is None:
         parts.append("no run was held out to judge by")
@@ -281,8 +281,9 @@ _EXPLAINED = ("effects_added", "no_effect_needed")
 
 
 def _untested(result: LoopResult) -> bool:
-    """Return whether what explains the records was asked of no other flow than one."""
-    return result.verdict in _EXPLAINED and bool(result.remaining.get("untested"))
+    """Return whether no flow was left to test what explains the records."""
+    untested = bool(result.remaining.get("untested")) and not result.folds
+    return result.verdict in _EXPLAINED and untested
 
 
 def _telling_test(result: LoopResult) -> str:
