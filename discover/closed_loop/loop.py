@@ -226,7 +226,9 @@ def _remaining(
         "noise_known": judgement.noise_known,
         "carries_over": judgement.carries_over,
         "without_fluid": verdict.silence is not None,
-        "untested": why_untested(final.fit, final.fitted, final.held_out),
+        "untested": why_untested(
+            final.model, final.fit, final.active, (final.fitted, final.held_out)
+        ),
         "not_judging": list(judgement.not_judging),
         "linear_error": final.model.declared.linear_error,
         "autocorrelation": float(np.mean(summary.autocorrelation)),

@@ -12,6 +12,7 @@ from discover.comparison.fitting.named_effects import fit_named_effects
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
+from discover.comparison.judging.constants_in_bands import with_fitted_constants
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
     other_constants,
@@ -243,6 +244,7 @@ def _tested(
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands take it that the law, or a rival, is the fluid's
         bands = bands_of_law(chosen, rivals, fluid, banded, seed)
+        bands = with_fitted_constants(bands, known.fitted, chosen, frame.model, frame.flows)
         others = other_constants(chosen.terms, frame.model)
         bands = bands if normal else with_other_gain(bands, others)
     seen = frame.bands(bands)
@@ -283,8 +285,6 @@ def _statements(
     found = open_where_modes_differ(found, of_modes.law, explanation.in_library, judged)
     if chosen is not None:
         found = with_other_constants(found, chosen.terms, tested.others, frame.model)
-    if known.along is not None and known.along.constants.moves_modes:
-        found = [replace(s, text=f"{s.text} {_MODES_NOT_IN_BANDS}") for s in found]
     return list(found)
 
 
@@ -343,11 +343,6 @@ def _of_modes(
     error = expectation.linear_error
     said = left_open_by_modes(path, len(chosen.terms), misfit, error, network)
     return (said,) if said else ()
-
-
-_MODES_NOT_IN_BANDS = (
-    "A factor on the modes was fitted along, and its interval is in no band of N1 or N2."
-)
 
 
 def _classical(study: Study, known: Known, independent: float | None) -> Sequence[ClassicalFit]:

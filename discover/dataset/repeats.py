@@ -71,23 +71,21 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
     return Repeats(names, float(np.sqrt(np.mean(squares))))
 
 
-def is_one_flow(runs: Sequence[Run]) -> bool:
-    """Return whether all runs are one test of one flow, repeated or not.
+def count_flows(runs: Sequence[Run]) -> int:
+    """Return how many different flows were measured.
 
-    Steady or periodic states are a flow each, so a table of them is none.
+    A test that was repeated is one flow. Each steady or periodic state of a table is one.
 
     Parameters
     ----------
     runs
         Runs; one that is there several times, with other quantities, counts once.
     """
-    named = {run.name: run for run in runs}
-    if any(run.protocol.control in STATES for run in runs):
-        return False
-    if len(named) == 1:
-        return True
-    found = repeats_among([*named.values()])
-    return found is not None and len(found.groups) == 1 and len(found.groups[0]) == len(named)
+    named = [*{run.name: run for run in runs}.values()]
+    repeats = repeats_among(named)
+    again = 0 if repeats is None else sum(len(group) - 1 for group in repeats.groups)
+    states = sum(len(run) - 1 for run in named if run.protocol.control in STATES)
+    return len(named) - again + states
 
 
 def _same_test(one: Run, other: Run) -> bool:

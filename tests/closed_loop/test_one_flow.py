@@ -1,11 +1,12 @@
-"""What one flow alone tells was tested by no other flow, and the loop says so."""
+"""What as many flows as constants tell was tested by no flow, and the loop says so."""
 
 import numpy as np
 import pytest
+from independent import KBKZ, start_up
 from scipy.integrate import solve_ivp
 
 import discover as dc
-from discover.dataset.repeats import is_one_flow
+from discover.dataset.repeats import count_flows
 from discover.protocols.control import steady_rates
 from discover.report.loop.verdict import loop_verdict
 
@@ -47,7 +48,7 @@ def test_a_name_that_one_flow_alone_tells_is_less_likely_than_not(repeated):
     assert max(loop.explanations.inclusion.values()) < 0.5
     found, sure, following = loop_verdict(loop)
     assert found.startswith("Fitted, not tested")
-    assert "One flow was fitted and none held out" in sure
+    assert "no more flows were measured than what was fitted takes" in sure
     assert "explains the data" not in found
     assert following
 
@@ -60,6 +61,23 @@ def test_a_name_that_two_flows_tell_is_believed():
     assert "Fitted, not tested" not in loop_verdict(loop)[0]
 
 
+def test_two_effects_that_two_flows_of_another_fluid_show_are_less_likely_than_not():
+    # an integral law of K-BKZ is neither a structure nor a drift, and two start-ups do not say so
+    runs = []
+    for seed, rate in enumerate((0.5, 2.0)):
+        times = np.linspace(0.1, 8.0, 80)
+        stress = KBKZ(0.25, modulus=100.0).respond(start_up(rate), times).sigma12
+        size = np.sqrt(np.mean(stress**2))
+        noise = size * np.random.default_rng([0, seed]).normal(0, 0.01, len(times))
+        rates = np.full(len(times), rate)
+        runs.append(dc.Run(f"at_{rate:g}", times, dc.start_up(rate), rates, stress + noise))
+    data = dc.Dataset("k_bkz", tuple(runs))
+    loop = dc.close_loop(data, BASE, effects=["thixotropy", "stress_drift"], max_effects=2)
+    assert {stage.effect for stage in loop.stages} == {"thixotropy", "stress_drift"}
+    assert max(loop.explanations.inclusion.values()) < 0.5
+    assert loop_verdict(loop)[0].startswith("Fitted, not tested")
+
+
 def test_a_declared_law_with_nothing_fitted_is_tested_by_any_flow():
     shear = 100.0 * 2.0 * (1.0 - np.exp(-TIMES))
     stress = shear * (1 + np.random.default_rng(0).normal(0, 0.01, len(TIMES)))
@@ -70,11 +88,9 @@ def test_a_declared_law_with_nothing_fitted_is_tested_by_any_flow():
 
 
 def test_the_points_of_a_flow_curve_are_flows_of_their_own():
-    assert is_one_flow([run("only", 1.0, 0)])
-    assert is_one_flow([run("once", 1.0, 0), run("again", 1.0, 1)])
-    assert not is_one_flow([run("slow", 1.0, 0), run("fast", 2.0, 1)])
+    assert count_flows([run("only", 1.0, 0)]) == 1
+    assert count_flows([run("once", 1.0, 0), run("again", 1.0, 1)]) == 1
+    assert count_flows([run("slow", 1.0, 0), run("fast", 2.0, 1)]) == 2
     rates = np.geomspace(0.1, 10.0, 12)
-    curve = dc.Run(
-        "curve", np.arange(12.0), steady_rates(rates), rates, 100.0 * rates / (1 + rates)
-    )
-    assert not is_one_flow([curve])
+    curve = dc.Run("curve", np.arange(12.0), steady_rates(rates), rates, 100.0 * rates)
+    assert count_flows([curve]) == 12

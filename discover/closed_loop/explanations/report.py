@@ -9,7 +9,7 @@ from discover.closed_loop.explanations.bands.mixture import mixed_bands
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.probabilities import explanations_of
-from discover.closed_loop.explanations.untested import NEVER_TRIED, why_untested
+from discover.closed_loop.explanations.untested import share_believed
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations
@@ -59,10 +59,12 @@ def explain(
     def limits_of(one: Carried) -> dict[str, str]:
         return names_of_limits(model, batch, runs[0], one.fit, one.effects)
 
-    found = explanations_of(model, carried, errors, judgement, effective, unlisted, limits_of)
-    if why_untested(fit, *runs) is None:
-        return found
-    return found.doubted(1.0 - NEVER_TRIED * (1.0 - found.unexplained_probability))
+    def believed(one: Carried) -> float:
+        return share_believed(model, one.fit, one.effects, runs)
+
+    return explanations_of(
+        model, carried, errors, judgement, effective, unlisted, limits_of, believed
+    )
 
 
 def with_band(

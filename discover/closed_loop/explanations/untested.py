@@ -1,36 +1,75 @@
-"""Fits that nothing tested: of one flow, or of states alone."""
+"""How far what was measured tested an explanation, where no run is held out to do it.
+
+A constant takes a flow to show itself. Flows beyond those that the constants of an explanation take
+were a trial that it passed. Of something that passed all of m trials the next succeeds with
+probability (m + 1)/(m + 2), by Laplace's rule of succession: one half, where nothing was tried.
+
+States do not tell how they are reached, so however many of them there are, they are no trial: a
+viscosity η₀/(1 + q γ̇) is that of a structure that flow breaks down, and as well one of White and
+Metzner.
+"""
 
 from collections.abc import Sequence
 from typing import Literal
 
 from discover.dataset import Run
-from discover.dataset.repeats import is_one_flow
+from discover.dataset.repeats import count_flows
+from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES
 
-Untested = Literal["one_flow", "states"]
-"""Why nothing tested a fit: there is one flow, or there are steady or periodic states alone."""
+Untested = Literal["flows", "states"]
+"""Why nothing tested a fit: no flow was left to, or there are steady or periodic states alone."""
 
-NEVER_TRIED = 0.5
-"""Share of the explanations where nothing tested them: the next trial of what was never tried
-succeeds with probability (0 + 1)/(0 + 2), by Laplace's rule of succession."""
+Runs = tuple[Sequence[Run], Sequence[Run]]
+"""The runs that were fitted, and those held out."""
 
 
-def why_untested(fit: Fit, fitted: Sequence[Run], held_out: Sequence[Run]) -> Untested | None:
+def why_untested(
+    model: AugmentedModel, fit: Fit, effects: Sequence[str], runs: Runs
+) -> Untested | None:
     """Return why nothing that was measured could have refuted what was fitted; None if it could.
-
-    States do not tell how they are reached: a viscosity η₀/(1 + q γ̇) is that of a structure that
-    flow breaks down, and as well one of White and Metzner.
 
     Parameters
     ----------
-    fit
-        The final fit; a model of which nothing was fitted was tested by any run.
-    fitted, held_out
+    model
+        With all candidates.
+    fit, effects
+        A fit, and the effects in it. One in which nothing was fitted was tested by any run.
+    runs
         The runs.
     """
     if not fit.free:
         return None
-    if all(run.protocol.control in STATES for run in (*fitted, *held_out)):
+    if _are_states(runs):
         return "states"
-    return "one_flow" if not held_out and is_one_flow(fitted) else None
+    return None if runs[1] or _flows_left(model, effects, runs[0]) else "flows"
+
+
+def share_believed(model: AugmentedModel, fit: Fit, effects: Sequence[str], runs: Runs) -> float:
+    """Return how far an explanation is to be believed, by the flows that tested it.
+
+    Runs held out are a test by themselves, and the verdict tells what they say.
+
+    Parameters
+    ----------
+    model, fit, effects, runs
+        As in `why_untested`.
+    """
+    if not fit.free or (runs[1] and not _are_states(runs)):
+        return 1.0
+    left = 0 if _are_states(runs) else _flows_left(model, effects, runs[0])
+    return (left + 1) / (left + 2)
+
+
+def _are_states(runs: Runs) -> bool:
+    return all(run.protocol.control in STATES for part in runs for run in part)
+
+
+def _flows_left(model: AugmentedModel, effects: Sequence[str], fitted: Sequence[Run]) -> int:
+    """Return how many flows there are beyond those that the constants of some effects take.
+
+    Constants of the declared model, which any flow shows, take one flow together.
+    """
+    taken = sum(len(model.positions(name)) for name in effects)
+    return max(count_flows(fitted) - max(taken, 1), 0)

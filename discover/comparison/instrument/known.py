@@ -37,6 +37,8 @@ class Known:
         Of the instrument.
     high_deborah, pipkin
         As in `comparison_flows`.
+    fitted
+        Names of the constants of the declared law and of its modes that were to be fitted.
     """
 
     before: Frame
@@ -45,6 +47,7 @@ class Known:
     effects: tuple[KnownEffect, ...] = ()
     high_deborah: tuple[float, ...] = ()
     pipkin: Sequence[tuple[float, float]] = ()
+    fitted: tuple[str, ...] = ()
 
     def frame(self, outcome: LearnerOutcome) -> Frame:
         """Return where a learner worked, by the constants that it ended with."""
@@ -96,7 +99,7 @@ def known_part(
         model = declared if fit_constants is None else fit_constants(declared, data.fit)
         require_numbers(model)
         flows = comparison_flows(data, high_deborah, pipkin)
-        return Known(Frame(model, data, flows), None, flows)
+        return Known(Frame(model, data, flows), None, flows, fitted=declared.free)
     model = absorbed(fixed_with_the_law(declared, data.fit.runs))
     effects = model.effects
     if model.free_constants:
@@ -108,11 +111,13 @@ def known_part(
             effects,
             high_deborah,
             pipkin,
+            declared.free,
         )
         return replace(known, before=known.frame_of(along.constants.raw(along.before.alone.theta)))
     free_of_it, _ = corrected(data, effects)
     flows = corrected_flows(data, free_of_it, high_deborah, pipkin)
-    return Known(Frame(replace(model, effects=()), free_of_it, flows), None, flows, effects)
+    frame = Frame(replace(model, effects=()), free_of_it, flows)
+    return Known(frame, None, flows, effects, fitted=declared.free)
 
 
 def corrected_flows(

@@ -47,7 +47,7 @@ _UNTESTED = {
 }
 
 _MEASURED = {
-    "one_flow": "the one flow that was measured",
+    "flows": "what was measured",
     "states": "the states that were measured",
 }
 
@@ -185,12 +185,12 @@ def _loop_sure(result: LoopResult) -> str:
             "for noise, and an effect that varies slowly would look the same"
         )
     none = percent(result.explanations.unexplained_probability)
-    nothing = f"that none of the explanations listed is right has a probability of {none}"
+    nothing = f"that something else is right has a probability of {none}"
     untested = _untested(result)
-    if untested == "one_flow":
+    if untested == "flows":
         parts.append(
-            "one flow was fitted and none held out, so no other flow tested what was found: "
-            f"{nothing}"
+            "no run was held out, and no more flows were measured than what was fitted takes, so "
+            f"none tested it: {nothing}"
         )
     elif before.held_out is None:
         parts.append("no run was held out to judge by")
@@ -311,7 +311,8 @@ _EXPLAINED = ("effects_added", "no_effect_needed")
 
 def _untested(result: LoopResult) -> str:
     """Return why nothing tested what explains the records, `Untested`; empty where it was."""
-    return str(result.remaining.get("untested") or "") if result.verdict in _EXPLAINED else ""
+    asked = result.verdict not in _EXPLAINED or result.folds
+    return "" if asked else str(result.remaining.get("untested") or "")
 
 
 def _telling_test(result: LoopResult) -> str:

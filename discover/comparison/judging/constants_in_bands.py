@@ -1,0 +1,162 @@
+"""Bands that hold for constants of the declared model that were fitted to the same runs.
+
+The draws of a sparse law vary its coefficients. Where a modulus, a relaxation time or a constant of
+the declared law was fitted too, what the runs leave open of it moves the predictions as well, and
+where no term was found nothing else does: a band of no width would say that they are exact.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+from discover.laws.expansion import law_of_terms
+from discover.laws.multimode import Fluid
+from discover.laws.registry import make_law
+from discover.statistics import least_squares_covariance, root_of
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+
+_STEP = 1e-3
+"""Of a difference, relative; of what is near zero, of `_SMALL`."""
+
+_SMALL = 1e-2
+_HALF_BAND = 1.96
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """The law found, with constants of the declared model and coefficients that can be moved."""
+
+    declared: DeclaredModel
+    terms: Mapping[str, float]
+    inner: Mapping[str, float]
+    names: tuple[str, ...]
+
+    @property
+    def start(self) -> Float[np.ndarray, " q"]:
+        """Logarithms of factors on the modes, constants of the law, and coefficients."""
+        law = self.declared.parameters
+        constants = [0.0 if name in MODE_CONSTANTS else law[name] for name in self.names]
+        return np.array([*constants, *self.terms.values()])
+
+    def fluid(self, values: Float[np.ndarray, " q"]) -> Fluid:
+        """Return the fluid with other values."""
+        own = dict(zip(self.names, map(float, values), strict=False))
+        modulus, time = (np.exp(own.pop(name, 0.0)) for name in MODE_CONSTANTS)
+        known = self.declared
+        law = make_law(known.law_name, {**known.parameters, **own}) if own else known.law
+        coefficients = [float(value) for value in values[len(self.names) :]]
+        found = law_of_terms(
+            list(self.terms), coefficients, self.inner, known.law.linear_relaxation, law
+        )
+        return Fluid(
+            found, known.modulus * modulus, known.relaxation_time * time, known.solvent_viscosity
+        )
+
+
+def with_fitted_constants(
+    bands: Mapping[str, PredictionBand],
+    names: Sequence[str],
+    chosen: LearnerOutcome,
+    declared: DeclaredModel,
+    flows: Sequence[Flow],
+) -> dict[str, PredictionBand]:
+    """Return bands no narrower than what constants and coefficients together leave open.
+
+    To first order, from the covariance of both that the fitted runs give.
+
+    Parameters
+    ----------
+    bands
+        Of the sparse law, by the key of the flow.
+    names
+        Of the declared constants that were fitted: of the modes, or of the law.
+    chosen
+        The sparse learner's outcome.
+    declared
+        The known part, with the values that the constants ended with.
+    flows
+        The flows in which the law is simulated, those fitted among them.
+    """
+    kept = tuple(n for n in names if n in MODE_CONSTANTS or n in declared.parameters)
+    training = [flow for flow in flows if flow.kind == "training"]
+    if not kept or not bands or not training:
+        return dict(bands)
+    terms = {term.term: term.coefficient for term in chosen.terms}
+    inner = {name: value for term in chosen.terms for name, value in term.inner.items()}
+    law = _Moved(declared, terms, inner, kept)
+    told = {flow.key: _derivatives(law, flow) for flow in flows if flow.key in bands}
+    told |= {flow.key: _derivatives(law, flow) for flow in training if flow.key not in told}
+    root = _root(training, told)
+    if root is None:
+        return dict(bands)
+    found = dict(bands)
+    for key, band in bands.items():
+        slopes = told.get(key)
+        if slopes is not None:
+            found[key] = _wider(band, np.einsum("qr,qnc->rnc", root, slopes[1]))
+    return found
+
+
+def _derivatives(
+    law: _Moved, flow: Flow
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]] | None:
+    """Return predictions in a flow and their derivatives; None where one runs away."""
+    start = law.start
+    rows, steps = [start], []
+    for i, value in enumerate(start):
+        of_factor = i < len(law.names) and law.names[i] in MODE_CONSTANTS
+        step = _STEP * (1.0 if of_factor else max(abs(value), _SMALL))
+        for sign in (1.0, -1.0):
+            moved = start.copy()
+            moved[i] += sign * step
+            rows.append(moved)
+        steps.append(step)
+    found = [predict(law.fluid(row), flow) for row in rows]
+    columns = [np.stack([one[q] for q in QUANTITIES], axis=-1) for one in found if one is not None]
+    if len(columns) < len(rows) or not np.all(np.isfinite(columns)):
+        return None
+    up, down = np.array(columns[1::2]), np.array(columns[2::2])
+    return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
+
+
+def _root(training: Sequence[Flow], told: Mapping[str, tuple | None]) -> np.ndarray | None:
+    """Return a root of the covariance of constants and coefficients that the fitted runs give."""
+    design, residual, sequences, sizes, at = [], [], [], [], 0
+    for flow in training:
+        slopes = told[flow.key]
+        if slopes is None or flow.measured is None:
+            return None
+        record = np.asarray(flow.measured, dtype=float)
+        even = flow.even(record)
+        # a run counts once, however many samples share it
+        weight = even / (float(np.linalg.norm(even * record)) or 1.0)
+        predicted, derivatives = slopes
+        residual.append(weight * (predicted[:, 0] - record))
+        design.append((weight * derivatives[..., 0]).T)
+        sequences.append(np.arange(at, at + len(record)))
+        sizes.append(1.0 / np.sqrt(len(record)))
+        at += len(record)
+    covariance, _, _ = least_squares_covariance(
+        np.concatenate(design), np.concatenate(residual), sequences, sizes=sizes
+    )
+    return root_of(covariance) if np.all(np.isfinite(covariance)) else None
+
+
+def _wider(band: PredictionBand, directions: Float[np.ndarray, "r n 3"]) -> PredictionBand:
+    """Return a band that holds what moves along all of these directions, each of unit variance."""
+    half = _HALF_BAND * np.sqrt(np.sum(directions**2, axis=0))
+    low, high = band.chosen - half, band.chosen + half
+    # np.minimum keeps what is not a number: no band stays no band
+    return replace(
+        band,
+        low=np.minimum(band.low, low),
+        high=np.maximum(band.high, high),
+        rivals_low=np.minimum(band.rivals_low, low),
+        rivals_high=np.maximum(band.rivals_high, high),
+        directions=directions[..., 0],
+    )
