@@ -43,6 +43,8 @@ from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
 
+pytestmark = pytest.mark.usefixtures("optimised")
+
 MODULI, RELAXATION_TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
 TIMES = np.geomspace(0.02, 20.0, 60)
 FITTED, UNSEEN = (0.3, 1.0, 5.0), (3.0,)
