@@ -15,8 +15,6 @@ from discover.study.in_memory import declared_fluid
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
-pytestmark = pytest.mark.usefixtures("optimised")
-
 MODULUS, TIME, EXTENSIBILITY = 2.0, 0.03, 16.0
 LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
 
