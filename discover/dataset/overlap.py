@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -84,8 +85,13 @@ class _Pair:
     def off(self, shift: float, rows: np.ndarray) -> np.ndarray:
         """Return what log values of the warmer lie above the colder, shape (k, n)."""
         # a sample may leave the overlap by a little
-        spline = PchipInterpolator(self.fixed_x, self.fixed, axis=1)
-        return self.moving[:, rows] - spline(self.moving_x[rows] + self.along * shift)
+        moved = self.moving_x[rows] + self.along * shift
+        return self.moving[:, rows] - self._through_fixed(moved)
+
+    @cached_property
+    def _through_fixed(self) -> PchipInterpolator:
+        """The curve through the colder, made once for all shifts that are tried."""
+        return PchipInterpolator(self.fixed_x, self.fixed, axis=1)
 
 
 def lay_over(

@@ -9,11 +9,11 @@ so there no spline swings; in noise both predict as badly.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline, PchipInterpolator, make_interp_spline
 
+from discover.programs import on_device
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
 _FEWEST = 6
@@ -98,8 +98,8 @@ def another_between_samples(
     other_knots, other = _knots(read, known, another=True)
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([knots[:first], other_knots])),
-        table_rates=jnp.asarray(np.concatenate([rates[:first], other])),
+        table_times=on_device(np.concatenate([knots[:first], other_knots])),
+        table_rates=on_device(np.concatenate([rates[:first], other])),
     )
 
 

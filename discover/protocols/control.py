@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.programs import on_device
 from discover.protocols.kinematics import STATES, Control
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
@@ -43,7 +44,7 @@ def oscillations(
         steady_rates(strains * np.asarray(frequencies, dtype=float)),
         control="oscillation",
         modulus="storage_modulus",
-        table_strains=jnp.asarray(strains),
+        table_strains=on_device(strains),
     )
 
 
@@ -139,7 +140,7 @@ def paced_by(
         Of the samples, shape (n,).
     """
     recorded = np.interp(np.asarray(protocol.table_times), times, strain)
-    return replace(protocol, table_strains=jnp.asarray(recorded))
+    return replace(protocol, table_strains=on_device(recorded))
 
 
 def jumps_at_start(protocol: FlowProtocol) -> bool:

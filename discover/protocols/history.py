@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.programs import on_device
 from discover.protocols.protocol import FlowProtocol, shear_rates
 
 STEADY_LENGTH = 20.0
@@ -193,8 +194,8 @@ def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
     cycles = np.concatenate([before + k * period for k in range(more)])
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([cycles, knots])),
-        table_rates=jnp.asarray(
+        table_times=on_device(np.concatenate([cycles, knots])),
+        table_rates=on_device(
             np.concatenate([np.tile(np.roll(rates[inside], -first), more), rates])
         ),
         begins=jnp.asarray(float(cycles[0])),
@@ -222,8 +223,8 @@ def _begun(
     first, later = np.interp(until, own_times, own_rates), own_times > until
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([knots, [until], own_times[later]])),
-        table_rates=jnp.asarray(np.concatenate([rates, [first], own_rates[later]])),
+        table_times=on_device(np.concatenate([knots, [until], own_times[later]])),
+        table_rates=on_device(np.concatenate([rates, [first], own_rates[later]])),
         begins=jnp.asarray(float(knots[0])),
         # of other samples; what is recorded at a given stress, its run gives again
         table_strains=None,

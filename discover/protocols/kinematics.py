@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
+from discover.programs import on_device
 from discover.words import listed
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
@@ -144,7 +145,7 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
     recorded = np.array(_RECORDED[quantity or recorded_name(kind)])
     intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
     return Kinematics(
-        *(jnp.asarray(part) for part in (gradient, recorded, intensity, recorded @ rate))
+        *(on_device(part) for part in (gradient, recorded, intensity, recorded @ rate))
     )
 
 
@@ -174,7 +175,7 @@ def of_one_kind(each: Sequence[Kinematics | None]) -> list[Kinematics] | list[No
 
 def stack_kinematics(each: Sequence[Kinematics | None]) -> Kinematics | None:
     """Return kinematics with a leading batch axis; None where all are simple shear."""
-    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *of_one_kind(each))
+    return jax.tree.map(lambda *leaves: on_device(np.stack(leaves)), *of_one_kind(each))
 
 
 def in_words(quantities: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.errors import InputError
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.protocols.kinematics import (
     MODULI,
     Control,
@@ -307,7 +307,7 @@ def stack_protocols(protocols: Sequence[FlowProtocol]) -> FlowProtocol:
     stacked = [
         replace(_padded(p, m, c), kinematics=flow) for p, flow in zip(bare, flows, strict=True)
     ]
-    return jax.tree.map(lambda *leaves: jnp.asarray(np.stack(leaves)), *stacked)
+    return jax.tree.map(lambda *leaves: on_device(np.stack(leaves)), *stacked)
 
 
 def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
@@ -319,17 +319,17 @@ def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
         strains = np.pad(np.asarray(strains), (0, rows), mode="edge")
     waves = (0, cosines - protocol.amplitudes.shape[0])
     amplitudes, frequencies, phases = (
-        jnp.asarray(np.pad(np.asarray(v), waves))
+        on_device(np.pad(np.asarray(v), waves))
         for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
     )
     return replace(
         protocol,
-        table_times=jnp.asarray(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
-        table_rates=jnp.asarray(np.pad(rates, (0, rows), mode="edge")),
+        table_times=on_device(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
+        table_rates=on_device(np.pad(rates, (0, rows), mode="edge")),
         amplitudes=amplitudes,
         frequencies=frequencies,
         phases=phases,
-        table_strains=None if strains is None else jnp.asarray(strains),
+        table_strains=None if strains is None else on_device(strains),
     )
 
 
@@ -363,7 +363,7 @@ def _at_many(function, protocol, times):
     n = len(times)
     entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
     padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
-    times = jnp.asarray(np.pad(times, (0, size - n), mode="edge"))
+    times = on_device(np.pad(times, (0, size - n), mode="edge"))
     return np.asarray(_mapped(function, padded, times))[:n]
 
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols
 from discover.simulate.grid import IntegrationGrid, make_grids
@@ -104,7 +105,7 @@ class FlowBatch(eqx.Module):
             more = -times.shape[1] % few
             spacing = (times[:, -1] - times[:, -2])[:, None] if times.shape[1] > 1 else 1.0
             added = times[:, -1:] + spacing * np.arange(1, more + 1)
-            longer = jnp.asarray(np.concatenate([times, added], axis=1))
+            longer = on_device(np.concatenate([times, added], axis=1))
             parts.append((protocols, eqx.tree_at(lambda grid: grid.times, grids, longer)))
         return FlowBatch(tuple(parts), self.shown)
 
@@ -121,7 +122,7 @@ class FlowBatch(eqx.Module):
                 cycle = None if grids.cycle is None else count * grids.cycle
                 grids = replace(
                     grids,
-                    times=jnp.asarray(cut),
+                    times=on_device(cut),
                     sample_index=count * grids.sample_index,
                     cycle=cycle,
                     cycle_steps=count * grids.cycle_steps,
@@ -253,6 +254,6 @@ def _with_samples(grids: IntegrationGrid, n: int) -> IntegrationGrid:
         return grids
     return replace(
         grids,
-        sample_index=jnp.asarray(np.pad(index, more, mode="edge")),
-        sample_mask=jnp.asarray(np.pad(mask, more)),
+        sample_index=on_device(np.pad(index, more, mode="edge")),
+        sample_mask=on_device(np.pad(mask, more)),
     )

@@ -5,11 +5,11 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
+from discover.programs import on_device
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import FlowProtocol
 
@@ -383,9 +383,9 @@ def make_grids(
         stacked[0].append(np.concatenate([grid, padding]))
         stacked[1].append(np.pad(index, (0, n_samples - len(index)), mode="edge"))
         stacked[2].append(np.arange(n_samples) < len(index))
-    columns = [jnp.asarray(np.stack(s)) for s in stacked]
+    columns = [on_device(np.stack(s)) for s in stacked]
     if protocols[0].control != "oscillation":
-        cycle = jnp.asarray(np.array(cycles)) if cycle_steps else None
+        cycle = on_device(np.array(cycles)) if cycle_steps else None
         return IntegrationGrid(
             columns[0], columns[1], columns[2], cycle=cycle, cycle_steps=cycle_steps
         )
@@ -395,7 +395,7 @@ def make_grids(
     strain_step = limits.get("strain_step", 0.1)
     step = min(4.0 * strain_step, max(_STRAIN_OF_CYCLE, 2.0 * strain_step))
     phase = half_cycle(largest, step)
-    phases = jnp.asarray(np.tile(phase, (len(grids), 1)))
+    phases = on_device(np.tile(phase, (len(grids), 1)))
     return IntegrationGrid(columns[0], columns[1], columns[2], phases)
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol, shear_rates
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.flow_batch import FlowBatch, lay_out
@@ -162,8 +162,8 @@ def simulate(
     components, successful = _solve_adaptively(
         fluid,
         protocol,
-        jnp.asarray(_padded(times)),
-        jnp.asarray(jumps) if jumps.size else None,
+        on_device(_padded(times)),
+        on_device(jumps) if jumps.size else None,
         solver,
         rtol,
         atol,

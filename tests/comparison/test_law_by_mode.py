@@ -8,6 +8,7 @@ from independent import Modes, PhanThienTanner
 from independent.flow import start_up as independent_start_up
 from independent.giesekus import multimode_giesekus
 
+from discover.comparison.fitting import law_by_mode
 from discover.comparison.fitting.law_by_mode import (
     CoefficientsInModes,
     SparseLaw,
@@ -42,11 +43,14 @@ from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
 
+pytestmark = pytest.mark.usefixtures("optimised")
+
 MODULI, RELAXATION_TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
 TIMES = np.geomspace(0.02, 20.0, 60)
 FITTED, UNSEEN = (0.3, 1.0, 5.0), (3.0,)
 NOISE = 0.01
 MOBILITIES = (0.1, 0.25, 0.5)  # nearly linear in log λ on the scale of the link
+SLIP = "non_affine_motion"
 
 
 def records(mobilities, rates, noise=NOISE, fluid=None):
@@ -273,7 +277,14 @@ def test_control_they_stay_determined_where_such_a_law_is_worth_less_or_explains
         assert open_where_modes_differ(NORMAL, other, in_library=True) == NORMAL
 
 
-def asked(fitted_rates, mobilities, unseen, explained=True):
+@pytest.fixture
+def asked(monkeypatch):
+    """`asked_of`, with one law to choose: which is chosen is for the tests above."""
+    monkeypatch.setattr(law_by_mode, "_NAMED", (("giesekus_mobility",),))
+    return asked_of
+
+
+def asked_of(fitted_rates, mobilities, unseen, explained=True):
     """What is said where one coefficient misses a run held out, and may explain those fitted."""
     runs = records(mobilities, fitted_rates)
     flows = [*flows_of(runs, "training"), *flows_of(unseen, "held_out")]
@@ -294,19 +305,19 @@ def asked(fitted_rates, mobilities, unseen, explained=True):
 TO_BE_FITTED = "would, as another law may: fit one of them too."
 
 
-def test_a_run_held_out_that_coefficients_by_mode_would_allow_is_told_as_one_to_fit():
+def test_a_run_held_out_that_coefficients_by_mode_would_allow_is_told_as_one_to_fit(asked):
     found = asked((0.02, 0.05, 0.1), MOBILITIES, records(MOBILITIES, UNSEEN))
     assert found.law is None
     assert found.said.endswith(TO_BE_FITTED)
 
 
-def test_control_a_run_held_out_of_another_fluid_is_not():
+def test_control_a_run_held_out_of_another_fluid_is_not(asked):
     (run,) = records(MOBILITIES, UNSEEN)
     stiffer = replace(run, stress=1.5 * run.stress)
     assert asked((0.02, 0.05, 0.1), MOBILITIES, [stiffer]).said == ""
 
 
-def test_a_law_by_mode_that_a_run_held_out_refutes_explains_nothing():
+def test_a_law_by_mode_that_a_run_held_out_refutes_explains_nothing(asked):
     (run,) = records(MOBILITIES, UNSEEN)
     stiffer = replace(run, stress=1.5 * run.stress)
     law = asked(FITTED, MOBILITIES, [stiffer], explained=False).law
@@ -316,22 +327,27 @@ def test_a_law_by_mode_that_a_run_held_out_refutes_explains_nothing():
     assert open_where_modes_differ(NORMAL, law, in_library=True) == NORMAL
 
 
-def test_control_one_that_foretells_it_explains_both():
+def test_control_one_that_foretells_it_explains_both(asked):
     law = asked(FITTED, MOBILITIES, records(MOBILITIES, UNSEEN), explained=False).law
     assert law.explains
     assert not law.refuted
 
 
-def test_networks_that_slip_and_whose_junctions_are_lost_by_mode_are_found_with_their_n2():
+def test_networks_that_slip_and_whose_junctions_are_lost_by_mode_are_found_with_their_n2(
+    monkeypatch,
+):
+    # either alone, both, and the rival with slip that has as many constants
+    named = ("ptt_linear",), (SLIP,), ("giesekus_mobility", SLIP), ("ptt_linear", SLIP)
+    monkeypatch.setattr(law_by_mode, "_NAMED", named)
     slip, losses = 0.15, (0.05, 0.12, 0.3)
     modes = zip(losses, MODULI, RELAXATION_TIMES, strict=True)
     fluid = Modes(
         *(PhanThienTanner(e, slip=slip, modulus=g, relaxation_time=t) for e, g, t in modes)
     )
     law = fitted(losses, fluid)
-    assert list(law.constants) == ["ptt_linear", "non_affine_motion"]
-    assert law.constants["non_affine_motion"].degree == 0
-    low, high = law.constants["non_affine_motion"].ci95
+    assert list(law.constants) == ["ptt_linear", SLIP]
+    assert law.constants[SLIP].degree == 0
+    low, high = law.constants[SLIP].ci95
     assert low - 0.25 * (high - low) < slip < high + 0.25 * (high - low)
     seen = fluid.respond(independent_start_up(3.0), TIMES)
     truth = {"N1": seen.N1, "N2": seen.N2}
@@ -339,6 +355,6 @@ def test_networks_that_slip_and_whose_junctions_are_lost_by_mode_are_found_with_
         assert off(law.bands["held_out/at 3"], truth, quantity) < 2.0 * IN_INTEGRATION
 
 
-def test_control_without_a_run_held_out_none_is_said_to_miss_one_coefficient():
+def test_control_without_a_run_held_out_none_is_said_to_miss_one_coefficient(asked):
     # runs left out in turn may speak against a law too
     assert asked((0.02, 0.05, 0.1), MOBILITIES, []).said == ""

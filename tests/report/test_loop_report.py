@@ -14,6 +14,7 @@ from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunR
 from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
 from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.report.loop import report
 from discover.report.loop.report import write_loop
 from discover.report.loop.tables import noise_range
 from discover.report.loop.verdict import loop_verdict
@@ -59,6 +60,14 @@ def loop_result(held_out=0.2):
     )  # fmt: skip
 
 
+@pytest.fixture
+def few_pictures(monkeypatch):
+    """Leave pictures out where words are asked for, but that of constants by mode."""
+    for name in vars(report):
+        if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
+            monkeypatch.setattr(report, name, lambda *_: None)
+
+
 def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
     folder = RunFolder(tmp_path, "x")
     page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
@@ -81,7 +90,7 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
     assert r"\begin{equation}" in (tmp_path / "equations.tex").read_text()
 
 
-def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
+def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, few_pictures):
     result = replace(
         loop_result(), stages=(), error_before=ErrorPair(0.01, None),
         error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
@@ -91,7 +100,9 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path):
     assert "with what was added" not in page
 
 
-def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tmp_path):
+def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(
+    tmp_path, few_pictures
+):
     result = replace(
         loop_result(),
         folds=(Fold("only.csv", "unexplained", ("tr(sigma)*sigma",), 0.7, 0.123),),
@@ -108,7 +119,7 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(tm
     assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
 
 
-def test_the_page_says_which_modes_the_data_leave_open(tmp_path):
+def test_the_page_says_which_modes_the_data_leave_open(tmp_path, few_pictures):
     modes = (ModeConstant(5.0, 0.1, (0.08, 0.12), False), ModeConstant(0.05, 0.6, None, True))
     found = ConstantByMode(0.15, (0.14, 0.16), "", 2.0, 1, (0.0, 12.3), modes)
     stage = Stage(
@@ -238,7 +249,9 @@ def test_many_aliases_are_counted_and_not_recited():
         assert "edge fracture" not in sentence
 
 
-def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path):
+def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(
+    tmp_path, few_pictures
+):
     result = loop_result()
     fitted = result.records[0]
     worse = replace(fitted, name="worse.csv", errors=np.array([0.6, 0.03]))
@@ -310,9 +323,10 @@ def test_nothing_is_called_augmented_where_nothing_was_added():
     with_stage, without = loop_result(), without_stages()
     for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
         assert "augmented" in draw(with_stage).svg
-        assert "augmented" not in draw(without).svg
-        assert "declared" in draw(without).svg
-    assert "→" not in runs_picture(without).svg
+        drawn = draw(without).svg
+        assert "augmented" not in drawn
+        assert "declared" in drawn
+        assert "→" not in drawn
 
 
 def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residuals():
@@ -325,7 +339,7 @@ def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residual
     assert noise_range(estimated) == pytest.approx([noise, noise])
 
 
-def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path):
+def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path, few_pictures):
     result = loop_result()
     (stage,) = result.stages
     known = {"gain_error": StageParameter(0.7, (0.69, 0.71), "")}

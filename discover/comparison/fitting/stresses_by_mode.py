@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -14,6 +13,7 @@ from discover.identify.rivals.bands import PredictionBand, bands_of_predictions
 from discover.identify.side_by_side.many_laws import predict_laws
 from discover.inference.draws_by_mode import ConstantsDrawn
 from discover.laws.multimode import Fluid
+from discover.programs import on_device
 
 _AT_A_TIME = 512
 """Modes followed side by side: every length is one more program, and more take more memory."""
@@ -93,4 +93,4 @@ def _modes(columns, effects: Sequence[ConstitutiveEffect], fluid: Fluid) -> Flui
         )
         return Fluid(law, modulus, time, solvent)
 
-    return eqx.filter_vmap(make)(*(jnp.asarray(column) for column in columns))
+    return eqx.filter_vmap(make)(*(on_device(column) for column in columns))

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
 from discover.forward.batches.samples import measured
+from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 from discover.simulate.grid import stress_grid
@@ -65,7 +65,7 @@ def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
         weight, recorded = measured(run, n_samples)
         index = np.pad(index, (0, n_samples - len(run)), mode="edge")
         rows.append((padded, imposed, index, weight, recorded, run.clock_factor))
-    columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
+    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
     return StressBatch(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
+from discover.programs import on_device
 from discover.protocols.kinematics import MODULI
 from discover.simulate.grid import half_cycle
 
@@ -63,9 +63,9 @@ def oscillations(
         moduli.append((at, MODULI.index(run.quantity)))
     n = max(len(strain) for strain, _ in sweeps)
     strains, frequencies = (
-        jnp.asarray(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
+        on_device(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
         for column in zip(*sweeps, strict=True)
     )
     phase = half_cycle(max(float(np.max(strain)) for strain, _ in sweeps), strain_step)
-    phases = jnp.asarray(np.tile(phase, (len(sweeps), 1)))
+    phases = on_device(np.tile(phase, (len(sweeps), 1)))
     return OscillationBatch(strains, frequencies, phases), tuple(moduli)

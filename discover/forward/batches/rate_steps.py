@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
+from discover.programs import on_device
 
 _NEVER = -1.0
 
@@ -89,5 +90,5 @@ def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
         for k, step in enumerate(run.rate_steps):
             rows[i, k] = step.start, step.end, step.change, step.share
             place[i, k] = -1 if step.place is None else step.place
-    start, end, change, share = (jnp.asarray(column) for column in np.moveaxis(rows, -1, 0))
-    return RateSteps(start, end, change, share, jnp.asarray(place))
+    start, end, change, share = (on_device(column) for column in np.moveaxis(rows, -1, 0))
+    return RateSteps(start, end, change, share, on_device(place))

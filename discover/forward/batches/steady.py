@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
 from discover.forward.batches.samples import measured
+from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 
 
@@ -49,7 +49,7 @@ def steady_states(runs: Sequence[Run]) -> SteadyBatch:
     # a padded sample is one more of the last
     rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
     weights, recorded = zip(*(measured(run, n) for run in runs), strict=True)
-    columns = (jnp.asarray(np.stack(column)) for column in (rates, weights, recorded))
+    columns = (on_device(np.stack(column)) for column in (rates, weights, recorded))
     return SteadyBatch(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )

@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.forward.batches.rate_steps import RateSteps, rate_steps
 from discover.forward.batches.samples import measured
+from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 from discover.simulate.grid import make_grid
@@ -128,7 +128,7 @@ def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
                 np.asarray(cycle),
             )
         )
-    columns = [jnp.asarray(np.stack(column)) for column in zip(*rows, strict=True)]
+    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
     return RunBatch(
         *columns,
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),

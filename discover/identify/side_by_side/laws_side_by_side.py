@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -12,7 +11,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.grid import IntegrationGrid
 from discover.simulate.runge_kutta import runge_kutta_4
@@ -72,7 +71,7 @@ def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
         some = [dense(library, law) for law in laws[first : first + LAWS_AT_ONCE]]
         count = len(some)
         some += some[-1:] * (LAWS_AT_ONCE - count)
-        coefficients, inner = (jnp.asarray(np.stack(part)) for part in zip(*some, strict=True))
+        coefficients, inner = (on_device(np.stack(part)) for part in zip(*some, strict=True))
         yield count, coefficients, inner
 
 

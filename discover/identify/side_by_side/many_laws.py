@@ -7,7 +7,6 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy.stats import norm
@@ -18,7 +17,7 @@ from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
@@ -95,7 +94,7 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
         )
         return Fluid(law, modulus, declared.relaxation_time, declared.solvent_viscosity)
 
-    stacked = (jnp.asarray(part) for part in (coefficients, inner, np.stack(moduli)))
+    stacked = (on_device(part) for part in (coefficients, inner, np.stack(moduli)))
     return eqx.filter_vmap(make)(*stacked)
 
 

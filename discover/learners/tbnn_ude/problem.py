@@ -14,6 +14,7 @@ from discover.dataset.run import Run
 from discover.forward.fluids import observed_on_grid
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
+from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.enough_steps import in_enough_steps
@@ -153,12 +154,12 @@ def make_problem(
     size = np.stack([np.pad(sizes, (0, n - len(sizes))) for sizes in own])
     return TrainingProblem(
         flows,
-        jnp.asarray(target / unit),
-        jnp.asarray(size / unit),
+        on_device(target / unit),
+        on_device(size / unit),
         jnp.asarray([_stress_of_unit(run, total) for run in runs]),
-        jnp.asarray(np.arange(n) < np.array([[len(run)] for run in runs])),
-        jnp.asarray(modulus / total),
-        jnp.asarray(relaxation_time),
+        on_device(np.arange(n) < np.array([[len(run)] for run in runs])),
+        on_device(modulus / total),
+        on_device(relaxation_time),
         jnp.asarray(solvent_viscosity / total),
     )
 

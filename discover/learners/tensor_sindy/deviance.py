@@ -1,6 +1,5 @@
 """How far laws are from a fit, measured by the data: the likelihood of draws of its parameters."""
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -14,6 +13,7 @@ from discover.learners.tensor_sindy.weighed_draws import (
 )
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
+from discover.programs import on_device
 
 
 def draws_of_fit(
@@ -77,7 +77,7 @@ def _deviance(problem, fit, uncertainty, residual, columns, inner, slots) -> Dev
         inners[:, list(inner)] = laws[:, n:]
         inside = np.all((laws[:, n:] >= bounds[:, 0]) & (laws[:, n:] <= bounds[:, 1]), axis=1)
         predicted = predict_many(
-            problem, jnp.asarray(active), jnp.asarray(coefficients), jnp.asarray(inners)
+            problem, on_device(active), on_device(coefficients), on_device(inners)
         )
         apart = np.asarray(predicted) - fit.predicted
         sane = inside & np.all(np.isfinite(apart), axis=1)

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float
 from discover.learners.trajectories.damped_steps import levenberg_marquardt
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.progress import require_wanted
 
 # One support to a program, and programs side by side in threads: a batch of supports by `vmap`
@@ -157,7 +157,7 @@ def _lay_out(problem: TrajectoryProblem, support, begin, scale, slots: int, keep
     start[:count] = coefficients[places] / scale[places]
     start[slots:] = free_from_inner(problem, inner)
     arrays = (active, np.arange(slots) < count, scale[active], keep)
-    return _Layout(*(jnp.asarray(a) for a in arrays)), jnp.asarray(start)
+    return _Layout(*(on_device(a) for a in arrays)), on_device(start)
 
 
 def sum_of_squares(apart: Float[np.ndarray, " rows"]) -> float:

@@ -13,6 +13,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.runs import as_runs
+from discover.programs import on_device
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics import root_of
@@ -171,14 +172,14 @@ def make_problem(
     return TrajectoryProblem(
         library=library,
         base=base,
-        modulus=jnp.asarray(modulus),
-        relaxation_time=jnp.asarray(relaxation_time),
+        modulus=on_device(modulus),
+        relaxation_time=on_device(relaxation_time),
         solvent_viscosity=jnp.asarray(float(solvent_viscosity)),
-        modulus_error=jnp.asarray(_root(modulus_covariance, len(modulus))),
+        modulus_error=on_device(_root(modulus_covariance, len(modulus))),
         flows=in_enough_steps(fluid, flows.with_steps_in(_PADDED_STEPS)),
-        target=jnp.asarray(target),
-        weight=jnp.asarray(weight / np.sqrt(np.sum(weight > 0))),
-        order_of_time=jnp.asarray(order),
+        target=on_device(target),
+        weight=on_device(weight / np.sqrt(np.sum(weight > 0))),
+        order_of_time=on_device(order),
     )
 
 
