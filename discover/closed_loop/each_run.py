@@ -78,6 +78,7 @@ def run_loop_on_each(
             store=store,
             # the number of the run and not its name, which may hold anything
             name=f"search_{names.index(held_out[0])}" if held_out else "search",
+            left_out_in_turn=not held_out,
         )
 
     whole = loop(names, (), "all runs")

@@ -38,7 +38,7 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import Store
 from discover.closed_loop.searching import SearchTask
 from discover.closed_loop.verdict import FinalVerdict, verdict_on
-from discover.dataset import Dataset
+from discover.dataset import Dataset, Run
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
@@ -61,6 +61,7 @@ def run_loop(
     progress: Callable[[str], None] | None = None,
     store: Store | None = None,
     name: str = "search",
+    left_out_in_turn: bool = False,
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
 
@@ -107,6 +108,8 @@ def run_loop(
         Where the search is kept after each stage, so that it goes on there when it was interrupted.
     name
         Of this search among others in the store.
+    left_out_in_turn
+        Whether other searches leave each of the runs out, and so test what this one finds.
 
     Raises
     ------
@@ -144,10 +147,11 @@ def run_loop(
     whole = dataset.select([run.name for run in fitted_runs]).runs
     verdict = verdict_on(final, constants, silent, whole)
     judgement = verdict.judgement
+    tested = final.fitted, final.fitted if left_out_in_turn else final.held_out
     side_by_side = Explanations()
     if final.carried:
         side_by_side = explain(
-            final.model, final.batch, final.carried, final.fit, (final.fitted, final.held_out),
+            final.model, final.batch, final.carried, final.fit, tested,
             final.held_batch, judgement,
             min((one.criterion for one in verdict.other_times), default=np.inf),
         )  # fmt: skip
@@ -173,7 +177,7 @@ def run_loop(
             for i, name in enumerate(final.active, start=1)
         ),
         remaining=_remaining(
-            final, constants, verdict, with_later_spikes(spikes, final.fitted, judgement)
+            final, constants, verdict, with_later_spikes(spikes, final.fitted, judgement), tested
         ),
         rankings=tuple(search.rankings),
         records=tuple(beyond.records),
@@ -200,6 +204,7 @@ def _remaining(
     constants: FinalConstants,
     verdict: FinalVerdict,
     spikes: Mapping[str, Sequence[float]],
+    tested: tuple[Sequence[Run], Sequence[Run]],
 ) -> dict[str, Any]:
     """Return what is left, as the contract names it.
 
@@ -209,6 +214,8 @@ def _remaining(
         The final model on the runs, its constants, and what is to be believed of it.
     spikes
         Times of outliers in s, by name of the run.
+    tested
+        The runs that were fitted, and those that test what was found.
     """
     search, judgement, coarse = final.search, verdict.judgement, constants.coarse
     left = judgement.left
@@ -226,9 +233,7 @@ def _remaining(
         "noise_known": judgement.noise_known,
         "carries_over": judgement.carries_over,
         "without_fluid": verdict.silence is not None,
-        "untested": why_untested(
-            final.model, final.fit, final.active, (final.fitted, final.held_out)
-        ),
+        "untested": why_untested(final.model, final.fit, final.active, tested),
         "not_judging": list(judgement.not_judging),
         "linear_error": final.model.declared.linear_error,
         "autocorrelation": float(np.mean(summary.autocorrelation)),

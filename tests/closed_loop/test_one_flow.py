@@ -34,9 +34,10 @@ def run(name: str, rate: float, seed: int) -> dc.Run:
     return dc.Run(name, TIMES, dc.start_up(rate), np.full(len(TIMES), rate), stress + noise)
 
 
-def looped(*runs: dc.Run):
+def looped(*runs: dc.Run, **options):
     data = dc.Dataset("giesekus", runs)
-    return dc.close_loop(data, BASE, effects=["giesekus_mobility", "ptt_linear"], max_effects=1)
+    effects = ["giesekus_mobility", "ptt_linear"]
+    return dc.close_loop(data, BASE, effects=effects, max_effects=1, **options)
 
 
 @pytest.mark.parametrize("repeated", [False, True])
@@ -59,6 +60,16 @@ def test_a_name_that_two_flows_tell_is_believed():
     assert loop.explanations.inclusion["giesekus_mobility"] > 0.5
     assert not loop.remaining["untested"]
     assert "Fitted, not tested" not in loop_verdict(loop)[0]
+
+
+def test_runs_that_other_searches_leave_out_in_turn_test_a_name():
+    runs = run("slow", 0.7, 0), run("fast", 2.0, 1)
+    alone, left_out = (
+        loop.explanations.inclusion["giesekus_mobility"]
+        for loop in (looped(*runs), looped(*runs, held_out="each"))
+    )
+    # one constant takes one of the two flows: (1 + 1)/(1 + 2)
+    assert alone == pytest.approx(2.0 / 3.0 * left_out, rel=0.01)
 
 
 def test_two_effects_that_two_flows_of_another_fluid_show_are_less_likely_than_not():

@@ -39,7 +39,7 @@ def explain(
     carried, fit
         The explanations, and the fit of what the search chose.
     runs
-        The runs that were fitted, and those held out.
+        The runs that were fitted, and those held out; or that other searches leave out in turn.
     held_batch
         These, as the model has them, if there are any.
     judgement

@@ -311,8 +311,7 @@ _EXPLAINED = ("effects_added", "no_effect_needed")
 
 def _untested(result: LoopResult) -> str:
     """Return why nothing tested what explains the records, `Untested`; empty where it was."""
-    asked = result.verdict not in _EXPLAINED or result.folds
-    return "" if asked else str(result.remaining.get("untested") or "")
+    return str(result.remaining.get("untested") or "") if result.verdict in _EXPLAINED else ""
 
 
 def _telling_test(result: LoopResult) -> str:
