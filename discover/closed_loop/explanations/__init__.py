@@ -2,6 +2,7 @@
 
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
+from discover.closed_loop.explanations.other_times import weighed_times
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, is_untested, with_band
 
@@ -13,5 +14,6 @@ __all__ = [
     "next_tests",
     "over_explanations",
     "search_and_carry",
+    "weighed_times",
     "with_band",
 ]
