@@ -166,7 +166,8 @@ FLUIDS = {
     "power_law": Case("inelastic, power law", recorded(Inelastic()), outside=True, model=FITTED),
     "herschel_bulkley": Case("inelastic, yields", recorded(Inelastic(40.0, 0.6, 60.0)),
                              outside=True, model=FITTED),
-    "rubber": Case("no fluid: a rubber", recorded(Rubber()), outside=True, model=FITTED),
+    "rubber": Case("no fluid: a rubber with a dashpot", recorded(Rubber()), outside=True,
+                   model=FITTED, same_as=("solvent_viscosity",)),
     "rubber_told": Case("no fluid: a rubber", recorded(Rubber()), outside=True),
 }  # fmt: skip
 _HEAT = ("viscous_heating",)
