@@ -7,8 +7,8 @@ data folder and a study file and no more. The rules, written before the first ru
 2. **Any verdict that claims to explain** (`explained`, `effects_added`, `no_effect_needed`) is
    false where what is predicted misses the record without its noise by more than half the noise in
    the runs fitted, or by more than the noise in the run held out.
-3. **Names**: under such a verdict of the loop every effect with a probability of one half or more is
-   there, or is an alias of one that is. A name that is less likely than not is listed.
+3. **Names**: under such a verdict of the loop every effect with a probability of one half or more
+   is there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others.
 5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
 6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
@@ -32,7 +32,8 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import without_pages
-from hostile_fluids_cases import CASES, Case
+from hostile_fluids_cases import CASES
+from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
 from independent.folders import write_study, write_table
 

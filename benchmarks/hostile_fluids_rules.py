@@ -14,7 +14,7 @@ from bad_day_rules import (
     HELD_OUT_DETECTABLE,
     read_predictions,
 )
-from hostile_fluids_cases import Case, Record
+from hostile_fluids_records import Case, Record
 from independent.noise import rms
 
 Records = dict[str, Record]

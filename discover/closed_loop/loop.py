@@ -16,6 +16,7 @@ from discover.closed_loop.explanations import (
     BEAM_WIDTH,
     explain,
     over_explanations,
+    weighed_times,
     why_untested,
 )
 from discover.closed_loop.final_fit import FinalConstants, FinalFit, final_constants, final_fit
@@ -157,7 +158,8 @@ def run_loop(
         )  # fmt: skip
     beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
     bounds, by_mode = constants.bounds, constants.by_mode
-    over_all = over_explanations(bounds, final.model, final.fit, final.carried, side_by_side)
+    times = weighed_times(verdict.other_times, final.carried, final.active)
+    over_all = over_explanations(bounds, final.model, final.fit, final.carried, side_by_side, times)
     differ = {name for name, found in by_mode.items() if found.degree}
     own = declared_parameters(declared, final.fit, (bounds, over_all))
     of_law = {n: with_shared_interval(by_mode[n], one) for n, one in own.items() if n in by_mode}

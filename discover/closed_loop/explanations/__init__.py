@@ -2,6 +2,7 @@
 
 from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
+from discover.closed_loop.explanations.other_times import weighed_times
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
 from discover.closed_loop.explanations.untested import why_untested
@@ -13,6 +14,7 @@ __all__ = [
     "next_tests",
     "over_explanations",
     "search_and_carry",
+    "weighed_times",
     "why_untested",
     "with_band",
 ]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.judgement import Judgement
@@ -41,12 +42,15 @@ class OtherTimes:
         Relative misfit of the fitted runs.
     criterion
         As of `Carried`; the factor counts as an effect.
+    theta
+        All parameters of the fit.
     """
 
     factor: float
     effects: tuple[str, ...]
     error: float
     criterion: float
+    theta: Float[np.ndarray, " p"]
 
     @property
     def sentence(self) -> str:
@@ -111,13 +115,33 @@ def _inside(search: Search, fit: Fit) -> bool:
 def _found(search: Search, effects: tuple[str, ...], fit: Fit) -> OtherTimes:
     worth = _worth(search, search.problem.cost(fit), fit.free, (*effects, FACTOR))
     error = float(np.mean(fit.run_errors))
-    return OtherTimes(float(np.exp(fit.theta[_FACTOR_AT])), effects, error, worth)
+    return OtherTimes(float(np.exp(fit.theta[_FACTOR_AT])), effects, error, worth, fit.theta)
 
 
 def _worth(search: Search, cost: float, free: Sequence[int], effects: Sequence[str]) -> float:
     """Return the criterion of a fit as the explanations are weighed: by what the search left."""
     problem = search.problem
     return problem.criterion(cost, free, effects, problem.independent_samples(search.fit))
+
+
+def weighed_times(
+    others: Sequence[OtherTimes], carried: Sequence[Carried], active: Sequence[str]
+) -> list[tuple[OtherTimes, float]]:
+    """Return sets beside a factor, and how much likelier each is than what was found.
+
+    Those that the records tell from it are left out.
+
+    Parameters
+    ----------
+    others, carried, active
+        As in `compared_with_times`.
+    """
+    own = next((one.criterion for one in carried if set(one.effects) == set(active)), np.inf)
+    return [
+        (one, float(np.exp(0.5 * (own - one.criterion))))
+        for one in others
+        if abs(one.criterion - own) < INDISTINGUISHABLE
+    ]
 
 
 def compared_with_times(

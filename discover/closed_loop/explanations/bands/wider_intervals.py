@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.explanations.other_times import OtherTimes
 from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
 from discover.forward import AugmentedModel
@@ -25,6 +26,7 @@ def over_explanations(
     fit: Fit,
     carried: Sequence[Carried],
     explanations: Explanations,
+    other: Sequence[tuple[OtherTimes, float]] = (),
 ) -> dict[int, tuple[float, float]]:
     """Return 95 % intervals of constants over all explanations that have them.
 
@@ -41,6 +43,9 @@ def over_explanations(
         With all candidates; what the search ended with.
     carried, explanations
         Sets of effects, and how probable each is.
+    other
+        Sets of effects beside other relaxation times, and how much likelier each is than what was
+        found: with a shorter time a coefficient is smaller by the same factor.
     """
     weighed = contenders(carried, explanations)
     found = dict(bounds)
@@ -51,13 +56,20 @@ def over_explanations(
             for one, weight in weighed
             if at not in own or own[at] in one.effects
         ]
+        # of what was found the weight is the largest, or another would have been found
+        most = max((weight for _, weight in having), default=0.0)
+        having += [
+            (one.theta[at], most * odds)
+            for one, odds in other
+            if at in own and own[at] in one.effects
+        ]
         value = float(fit.theta[at])
         if having and low < value < high and np.isfinite([low, high]).all():
             values, weights = np.array(having, dtype=float).T
             ends = _ends(values, weights / np.sum(weights), value - low, high - value)
-            least, most = float(model.low[at]), float(model.high[at])
+            least, largest = float(model.low[at]), float(model.high[at])
             # half a normal distribution may reach beyond the range that is physical
-            found[at] = (min(low, max(ends[0], least)), max(high, min(ends[1], most)))
+            found[at] = (min(low, max(ends[0], least)), max(high, min(ends[1], largest)))
     return found
 
 
