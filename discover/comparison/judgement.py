@@ -278,6 +278,7 @@ def _statements(
         beside.structure,
         tested.bands,
         study.compare.use_normal_stresses,
+        0 if chosen is None else len(chosen.terms),
     )
     if explanation.verdict != "no_signal":
         apart = contested(outcomes, judged, frame.bands(tested.bands))

@@ -296,6 +296,17 @@ def test_one_run_with_none_held_out_determines_nothing(good):
     assert found[0].determined == "if_the_law_is_in_the_library"
 
 
+def test_as_many_terms_as_flows_with_none_held_out_determine_nothing(good):
+    # three to five terms follow two start-ups of fluids that the library does not hold
+    explanation, flows = good
+    two = [flows[0], replace(flows[0], name="another")]
+    told = [
+        make_statements(explanation, two, [], STRUCTURE, bands(flows), n_terms=n)[0].determined
+        for n in (1, 2)
+    ]
+    assert told == ["if_the_law_is_in_the_library", "no"]
+
+
 def test_states_alone_determine_no_transient(good):
     # a flow curve of a fluid with a structure: three terms that are not there left the noise
     explanation, flows = good

@@ -38,8 +38,8 @@ _ONLY_EXTENSION = (
 )
 _IN_TRANSIENTS = "σ12 in transients"
 _UNTESTED = (
-    "One run was fitted and none held out, so no other flow tested the law, and {} is not "
-    "determined. Fit another run, or hold one out."
+    "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
+    "tested the law, and {} is not determined. Fit another run, or hold one out."
 )
 IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
@@ -186,6 +186,7 @@ def make_statements(
     structure: Structure | None = None,
     bands: Mapping[str, PredictionBand] | None = None,
     normal_stresses_used: bool = False,
+    n_terms: int = 0,
 ) -> list[Statement]:
     """Return what the training data say of N1 and N2, with the reason.
 
@@ -204,6 +205,8 @@ def make_statements(
         Of the sparse law, by the key of the flow. Without one nothing is determined.
     normal_stresses_used
         Whether measured normal stresses were part of the fit.
+    n_terms
+        Of the sparse law.
     """
     if explanation.verdict == "no_signal":
         text = "The records hold no signal, so they say nothing of {}."
@@ -218,7 +221,7 @@ def make_statements(
     at = law_structure(structure)
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
-    untested = one_run(flows)
+    untested = no_flow_left(flows, n_terms)
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
@@ -237,15 +240,21 @@ def make_statements(
     return found
 
 
-def one_run(flows: Sequence[Flow]) -> bool:
-    """Return whether a law was never asked of another flow than the one it was fitted to.
+def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
+    """Return whether a law was never asked of another flow than those that its terms take.
+
+    As `discover.closed_loop.explanations.untested` asks of a loop; a law without terms takes one.
 
     Parameters
     ----------
     flows
         All flows.
+    n_terms
+        Of the law.
     """
-    return [flow.kind for flow in _measured(flows)] == ["training"]
+    measured = _measured(flows)
+    count = sum(len(flow.times) if flow.is_of_states else 1 for flow in measured)
+    return {flow.kind for flow in measured} == {"training"} and count <= max(n_terms, 1)
 
 
 def only_states(flows: Sequence[Flow]) -> bool:

@@ -10,7 +10,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.judging.next_measurement import NextMeasurement
-from discover.comparison.judging.statements import one_run, only_states
+from discover.comparison.judging.statements import no_flow_left, only_states
 from discover.comparison.outcomes.constant import in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -58,7 +58,8 @@ def _found(comparison: Comparison) -> str:
     if explanation.verdict == "explained":
         names = " and ".join(_law_of(name) for name in explanation.by)
         one = len(explanation.by) == 1
-        unasked = one_run(comparison.flows) and not comparison.judged
+        n_terms = len(sparse.terms) if sparse is not None and explanation.in_library else 0
+        unasked = no_flow_left(comparison.flows, n_terms) and not comparison.judged
         if unasked or only_states(comparison.flows):
             verb = "fits" if one else "fit"
             parts.append(
