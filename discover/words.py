@@ -8,6 +8,11 @@ def listed(parts: Sequence[str]) -> str:
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
+def counted(count: int, thing: str) -> str:
+    """Return how many there are: '1 run', '2 runs'."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def plainly(value: float, digits: int = 3) -> str:
     """Return a number with so many digits, without a power of ten below a million."""
     return f"{float(f'{value:.{digits}g}'):g}"

@@ -17,6 +17,7 @@ from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Loop
 from discover.validation import validated
+from discover.words import counted
 
 _OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws"}
 
@@ -94,9 +95,8 @@ def close_loop(
         result = run_loop(divided.dataset, declared, held_out=divided.held_out.names, **options)
     judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
     summary = (
-        f"Data: {data.name}, {len(divided.fit)} runs fitted, {judged}. Declared model: "
-        f"{fluid.described}, {len(fluid.modulus)} relaxation "
-        f"mode{'s' if len(fluid.modulus) > 1 else ''}. {data.thinned}"
+        f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
+        f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
     ).strip()
     return replace(result, title=data.name, summary=summary)
 

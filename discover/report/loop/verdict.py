@@ -122,12 +122,18 @@ def _values(stage: Stage) -> str:
     ]
     for one in stage.told_together:
         value = f"{estimate(one.value, one.ci95)} {one.unit}".rstrip()
-        told.append(f"{one.name.replace('_', ' ')} = {value} (95 % {interval(one.ci95)})")
+        told.append(f"{_in_words(one.name)} = {value} (95 % {interval(one.ci95)})")
     if stage.left_open:
-        names = listed([name.replace("_", " ") for name in stage.left_open])
+        names = listed([_in_words(name) for name in stage.left_open])
         alone = " alone" if stage.told_together else ""
-        told.append(f"{names}{alone} not determined by these data")
+        left = f"{names}{alone} not determined by these data"
+        return f"{', '.join(told)}, with {left}" if told else left
     return ", ".join(told)
+
+
+def _in_words(name: str) -> str:
+    """Return the name of a constant as it is read."""
+    return readable(name.replace("_", " ").replace("build up", "build-up"))
 
 
 def _law_chosen(laws: Sequence[LawFit]) -> str:
@@ -141,7 +147,7 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
 
 def named(name: str, parameter: StageParameter) -> str:
     """Return a parameter's name in the field's letters, and of one by mode, what it stands for."""
-    text = readable(name.replace("_", " "))
+    text = _in_words(name)
     if not isinstance(parameter, ConstantByMode):
         return text
     if not parameter.degree:
