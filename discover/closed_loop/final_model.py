@@ -64,7 +64,9 @@ def stage_of(
         first = effect.parameters[0].name
         parameters[first] = with_shared_interval(by_mode, parameters[first])
     places = dict(zip(parameters, model.positions(name), strict=True))
-    left_open = tuple(name for name, parameter in parameters.items() if parameter.is_open)
+    left_open = tuple(
+        n for n, parameter in parameters.items() if parameter.is_open_up_to(model.high[places[n]])
+    )
     return Stage(
         effect=name,
         kind=effect.kind,

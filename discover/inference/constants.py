@@ -9,6 +9,8 @@ _OPEN = 100.0
 """Factor above the value from which on an interval tells nothing: two decades, beyond which records
 tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."""
 
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class StageParameter:
@@ -35,6 +37,13 @@ class StageParameter:
     def is_open(self) -> bool:
         """Whether these data leave it open: the interval goes on for two decades above it."""
         return self.ci95[1] > _OPEN * abs(self.value)
+
+    def is_open_up_to(self, end: float) -> bool:
+        """Whether it is open in a range: from two decades below its upper end, to that end."""
+        low, high = self.ci95
+        # a logarithm there and back errs by a rounding
+        at_the_end = high >= (1.0 - _ROUNDING) * end
+        return self.is_open or (at_the_end and end > _OPEN * max(low, 0.0))
 
 
 @dataclass(frozen=True)

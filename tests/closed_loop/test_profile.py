@@ -17,6 +17,7 @@ from discover.closed_loop import DeclaredModel
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.forward.least_squares import intervals
+from discover.inference.constants import StageParameter
 from discover.inference.problem import FitProblem
 from discover.inference.profile import profiled
 from discover.report.loop.verdict import loop_verdict
@@ -103,3 +104,13 @@ def test_what_is_well_told_keeps_its_interval(tmp_path):
     problem, fit = fitted(data)
     parabola = intervals(problem.model, problem.batch, fit)
     assert profiled(problem, fit, parabola, [0]).bounds[0] == parabola[0]
+
+
+@pytest.mark.parametrize(
+    ("interval", "is_open"),
+    [((0.02, 1e3), True), ((0.02, 999.0), False), ((0.78, 1e3), True), ((20.0, 1e3), False)],
+)
+def test_what_goes_on_to_the_end_of_its_range_from_two_decades_below_is_left_open(
+    interval, is_open
+):
+    assert StageParameter(50.0, interval, "").is_open_up_to(1000.0) is is_open
