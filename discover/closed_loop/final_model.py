@@ -65,7 +65,9 @@ def stage_of(
         parameters[first] = with_shared_interval(by_mode, parameters[first])
     places = dict(zip(parameters, model.positions(name), strict=True))
     left_open = tuple(
-        n for n, parameter in parameters.items() if parameter.is_open_up_to(model.high[places[n]])
+        name
+        for name, parameter in parameters.items()
+        if parameter.is_open_up_to(float(model.high[places[name]]))
     )
     return Stage(
         effect=name,
