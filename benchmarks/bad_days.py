@@ -35,7 +35,7 @@ import json
 import time
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -107,28 +107,35 @@ def without_pages() -> Iterator[None]:
 
 def run(name: str, task: str, out: Path, seed: int, pages: bool) -> dict:
     """Return the row of one case and task."""
+    case, folder = CASES[name], out / name
+    clean, noisy = make(case, seed)
+    study = write(case, noisy, folder)[task]
+    row = {"case": name, "task": task, "truth": case.truth}
+    started = time.perf_counter()
+    row |= answer(
+        study, task, folder / task, pages, lambda: judge(case, task, folder / task, clean, noisy)
+    )
+    return {**row, "seconds": time.perf_counter() - started}
+
+
+def answer(study: Path, task: str, out: Path, pages: bool, judged: Callable[[], dict]) -> dict:
+    """Return what a command says of a study and what is wrong with it, or how it ended."""
     from discover.batch.tasks import run_close_loop, run_compare
     from discover.errors import InputError
 
-    case = CASES[name]
-    folder = out / name
-    clean, noisy = make(case, seed)
-    study = write(case, noisy, folder)[task]
     execute = run_close_loop if task == "close-loop" else run_compare
-    row = {"case": name, "task": task, "truth": case.truth}
-    started = time.perf_counter()
     try:
         with warnings.catch_warnings(), nullcontext() if pages else without_pages():
             warnings.simplefilter("ignore")
-            execute(study, folder / task, None, True, lambda text, fraction: None)
-        row |= judge(case, task, folder / task, clean, noisy)
+            execute(study, out, None, True, lambda text, fraction: None)
+        return judged()
     except InputError as error:
-        row |= {"verdict": "refused", "message": str(error), "falsehoods": [], "notes": []}
+        ended = {"verdict": "refused", "message": str(error)}
     except Exception as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {error} ({Path(last.filename).name}, line {last.lineno})"
-        row |= {"verdict": "fault", "message": text, "falsehoods": [], "notes": []}
-    return {**row, "seconds": time.perf_counter() - started}
+        ended = {"verdict": "fault", "message": text}
+    return {**ended, "falsehoods": [], "notes": []}
 
 
 def line(row: dict) -> str:

@@ -24,14 +24,11 @@ To say `unexplained` of what could be explained is no falsehood; it is listed.
 import argparse
 import json
 import time
-import traceback
-import warnings
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from bad_days import without_pages
+from bad_days import answer
 from hostile_fluids_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
@@ -84,26 +81,14 @@ def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path
 
 def run(name: str, task: str, out: Path, seed: int, pages: bool) -> dict:
     """Return the row of one case and task."""
-    from discover.batch.tasks import run_close_loop, run_compare
-    from discover.errors import InputError
-
     case, folder = CASES[name], out / name
     clean, noisy = make(case, seed)
     study = write(case, noisy, folder, seed)[task]
-    execute = run_close_loop if task == "close-loop" else run_compare
-    row = {"case": name, "task": task, "truth": case.truth, "falsehoods": [], "notes": []}
+    row = {"case": name, "task": task, "truth": case.truth}
     started = time.process_time()
-    try:
-        with warnings.catch_warnings(), nullcontext() if pages else without_pages():
-            warnings.simplefilter("ignore")
-            execute(study, folder / task, None, True, lambda text, fraction: None)
-        row |= judge(case, task, folder / task, clean, noisy)
-    except InputError as error:
-        row |= {"verdict": "refused", "message": str(error)}
-    except Exception as error:
-        last = traceback.extract_tb(error.__traceback__)[-1]
-        where = f"{Path(last.filename).name}, line {last.lineno}"
-        row |= {"verdict": "fault", "message": f"{type(error).__name__}: {error} ({where})"}
+    row |= answer(
+        study, task, folder / task, pages, lambda: judge(case, task, folder / task, clean, noisy)
+    )
     return {**row, "seconds": round(time.process_time() - started, 1)}
 
 

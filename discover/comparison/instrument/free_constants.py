@@ -45,11 +45,6 @@ class FreeConstants:
         return list(self.positions.values())
 
     @property
-    def moves_modes(self) -> bool:
-        """Whether moduli or relaxation times are among them."""
-        return any(name in self.positions for name in MODE_CONSTANTS)
-
-    @property
     def moves_times(self) -> bool:
         """Whether relaxation times are among them."""
         return MODE_CONSTANTS[1] in self.positions
