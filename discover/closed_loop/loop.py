@@ -32,6 +32,7 @@ from discover.closed_loop.final_model import (
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.silence import records_are_silent
 from discover.closed_loop.judging.told_by_kinds import told_by_kinds
+from discover.closed_loop.own_noise import searched_by_noise
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
@@ -130,7 +131,7 @@ def run_loop(
     candidates = [effect for effect in candidates if effect.name not in known]
     require_possible(declared, [*fitted_runs, *held_runs])
     silent = records_are_silent(fitted_runs)
-    ended = SearchTask(
+    task = SearchTask(
         candidates,
         fitted_runs,
         held_runs,
@@ -141,8 +142,9 @@ def run_loop(
         store=store,
         name=name,
         say=say,
-    ).search(declared, laws)
-    declared, search = ended.declared, ended.search
+    )
+    task, ended = searched_by_noise(task, task.search(declared, laws), declared, laws)
+    fitted_runs, declared, search = list(task.fitted), ended.declared, ended.search
     final = final_fit(ended, fitted_runs, held_runs, dataset.names)
     constants = final_constants(final, ended.by_mode)
     whole = dataset.select([run.name for run in fitted_runs]).runs
@@ -237,6 +239,7 @@ def _remaining(
         "without_fluid": verdict.silence is not None,
         "untested": why_untested(final.model, final.fit, final.active, tested),
         "not_judging": list(judgement.not_judging),
+        "weights": {run.name: run.weight for run in final.fitted if run.weight != 1.0},
         "linear_error": final.model.declared.linear_error,
         "autocorrelation": float(np.mean(summary.autocorrelation)),
         "worst_run": judgement.worst.name,

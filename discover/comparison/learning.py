@@ -37,12 +37,15 @@ class Learning:
         Where finished learners are kept and found again.
     made
         Learners that are fitted already: what they found, by learner.
+    prefix
+        Of the names under which they are kept.
     """
 
     study: Study
     seed: int
     store: RunFolder | None = None
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
+    prefix: str = ""
 
     def outcomes(
         self, learners: Sequence[str], known: Known, progress: Progress
@@ -93,7 +96,8 @@ class Learning:
             Of a sweep, the name under which it is kept; its outcomes are looked at in one flow.
         """
         store, made = self.store, self.made
-        kept = None if store is None else store.load(part or learner)
+        name = f"{self.prefix}{part or learner}"
+        kept = None if store is None else store.load(name)
         if kept is not None and all(flow.key in kept["predictions"] for flow in known.flows):
             return LearnerOutcome.from_state(kept)
         progress("starting", 0.0)
@@ -118,7 +122,7 @@ class Learning:
             outcome = replace(outcome, physics=physics_of(fluid, flows))
             outcome = with_sampled_rates(outcome, fluid, frame.model.fluid, flows)
         if store is not None:
-            store.save(part or learner, outcome.to_state())
+            store.save(name, outcome.to_state())
             # the same route as after an interruption, so that both give the same files
             return LearnerOutcome.from_state(outcome.to_state())
         return outcome

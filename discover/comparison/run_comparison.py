@@ -21,6 +21,7 @@ from discover.comparison.judgement import judge
 from discover.comparison.learning import Learning, distilled, require_teacher, sweep_studies
 from discover.comparison.outcomes.flows import comparison_flows
 from discover.comparison.outcomes.truth import TrueTerm, true_terms
+from discover.comparison.own_noise import learned_by_noise
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
@@ -81,17 +82,22 @@ def compare(
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
-    pipkin = itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers)
+    next_flows = options.next.weissenberg_numbers, options.next.deborah_numbers
+    pipkin = list(itertools.product(*next_flows))
     library = study_library(study) if library is None else library
     undated = data
     data, of_steps = with_step_instants(declared, data, library)
-    known = known_part(declared, data, library, options.high_deborah, list(pipkin), fit_constants)
+
+    def known_in(some: StudyData) -> Known:
+        grid = options.high_deborah, pipkin
+        return known_part(declared, some, library, *grid, fit_constants)
+
+    known = known_in(data)
     if sweep and (known.along is not None or declared.effects):
         raise InputError(
             "compare.sweep computes data that hold no instrument, so [model] can have neither "
             'effects nor constants to be fitted along with it. Write numbers instead of "fit".'
         )
-    model = known.before.model
     learning = Learning(study, options.seed if seed is None else seed, store, made)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
     done = 0
@@ -99,13 +105,14 @@ def compare(
     def step(title: str) -> Progress:
         return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
 
-    own = learning.outcomes(
-        options.learners,
-        known,
-        lambda text, fraction: progress(text, fraction * len(options.learners) / n_parts),
-    )
+    def learn(text: str, fraction: float) -> None:
+        progress(text, fraction * len(options.learners) / n_parts)
+
+    own = learning.outcomes(options.learners, known, learn)
+    if made is None:
+        known, own = learned_by_noise(study, learning, data, (known, own), known_in, learn)
     done += len(own)
-    points = []
+    points, model = [], known.before.model
     for law, value, other in sweep:
         other_data = thinned_to(load_study_data(other, seed), options.most_samples)
         flow = comparison_flows(other_data, ())[len(other_data.fit)]
@@ -130,7 +137,8 @@ def compare(
         name=study.name,
         data_summary=data_in_words(data, study)
         + (_TAKEN_OUT if known.along is None and known.effects else "")
-        + (f". {of_steps}" if of_steps else ""),
+        + (f". {of_steps}" if of_steps else "")
+        + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
         known_part=known_in_words(declared, known, study),
         flows=known.flows,
         before=known.alone(),
@@ -156,6 +164,7 @@ def compare(
     )
 
 
+_BY_NOISE = ". Runs differ in noise, and each weighs by its own"
 _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 
 

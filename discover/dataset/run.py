@@ -94,6 +94,9 @@ class Run:
         Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
     metadata
         What else the source says of the run.
+    weight
+        How much its samples weigh in a fit beside those of other runs: one over the size of its
+        noise, in units of the mean. Misfits that are told or judged do not know it.
 
     Examples
     --------
@@ -122,6 +125,7 @@ class Run:
     storage_modulus: Float[np.ndarray, " _"] | None = None
     loss_modulus: Float[np.ndarray, " _"] | None = None
     rate_steps: tuple[RateStep, ...] = ()
+    weight: float = 1.0
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -222,7 +222,8 @@ def _misfits(
     for flow, rows in zip(training, predicted, strict=False):  # judged flows follow
         assert flow.measured is not None
         size = sizes_of(flow.measured, flow.protocol)
-        squares += np.sum(((rows[:, :, 0] - flow.measured) / size) ** 2, axis=1)
+        off = flow.weight * (rows[:, :, 0] - flow.measured) / size
+        squares += np.sum(off**2, axis=1)
     misfit = np.sqrt(squares / sum(flow.times.size for flow in training))
     return np.where(np.isfinite(misfit), misfit, np.inf)
 

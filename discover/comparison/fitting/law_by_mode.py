@@ -307,7 +307,7 @@ def _fitted(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, D
 def _worth_of(law: SparseLaw, problem: FitProblem, runs: Sequence[Run], effective: float) -> float:
     """Return the criterion of a law by what it leaves of the fitted runs."""
     off = (
-        (predicted - run.recorded) / run.sizes(run.recorded)
+        run.weight * (predicted - run.recorded) / run.sizes(run.recorded)
         for predicted, run in zip(law.predicted, runs, strict=True)
     )
     cost = sum(float(np.mean(one**2)) for one in off)

@@ -68,6 +68,8 @@ class Flow:
         Whether Lissajous curves make sense.
     commanded
         The protocol before an instrument that is known changed it, for titles; None where none did.
+    weight
+        How much its samples weigh in fits beside those of other runs; see `Run`.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Flow:
     training_end: float | None = None
     oscillatory: bool = False
     commanded: FlowProtocol | None = None
+    weight: float = 1.0
 
     @property
     def _imposed(self) -> FlowProtocol:
@@ -264,6 +267,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
         oscillatory=_oscillates(run.protocol, run.rate),
+        weight=run.weight,
     )
 
 

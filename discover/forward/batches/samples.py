@@ -16,7 +16,7 @@ def measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
     n
         Length to which it is padded.
     """
-    scale = 1.0 / (run.sizes(run.recorded) * np.sqrt(len(run)))
+    scale = run.weight / (run.sizes(run.recorded) * np.sqrt(len(run)))
     pad = (0, n - len(run))
     return np.pad(scale, pad), np.pad(run.recorded, pad)
 

@@ -149,8 +149,10 @@ def make_problem(
     unit = np.array([1.0 if run.quantity == "strain" else total for run in runs])[:, None]
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
     target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])
-    states = [run.protocol.control in STATES for run in runs]
-    own = [run.sizes(run.recorded) * each for run, each in zip(runs, states, strict=True)]
+    # a transient has the size of its record, unless it weighs more or less than others
+    told = [run.protocol.control in STATES or run.weight != 1.0 for run in runs]
+    sized = zip(runs, told, strict=True)
+    own = [run.sizes(run.recorded) * each / run.weight for run, each in sized]
     size = np.stack([np.pad(sizes, (0, n - len(sizes))) for sizes in own])
     return TrainingProblem(
         flows,

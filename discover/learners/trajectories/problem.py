@@ -158,7 +158,7 @@ def make_problem(
                     )
                 continue  # a normal stress difference may vanish in truth, but sets no scale
             target[i, : len(run), kind] = values
-            weight[i, : len(run), kind] = 1.0 / run.sizes(values)
+            weight[i, : len(run), kind] = run.weight / run.sizes(values)
     base = UpperConvectedMaxwell(known_relaxation) if base is None else base
     fluid = Fluid(base, modulus, relaxation_time)
     flows = lay_out(

@@ -215,6 +215,9 @@ def _loop_sure(result: LoopResult) -> str:
     if few := result.remaining.get("not_judging", ()):
         verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
         parts.append(f"{_several(few, 'and')} {verb}")
+    if weights := result.remaining.get("weights"):
+        ratio = significant(max(weights.values()) / min(weights.values()), 2)
+        parts.append(f"runs differ in noise by a factor of {ratio}, and each weighs by its own")
     if count := result.remaining.get("outliers", 0):
         which = "samples are outliers" if count > 1 else "sample is an outlier"
         parts.append(f"{count} {which} and did not count")

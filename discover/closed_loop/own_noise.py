@@ -1,0 +1,40 @@
+"""The search with each run weighed by its own noise, where equal weights will not do."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.closed_loop.searching import SearchResult, SearchTask
+from discover.dataset.run_table import kind_of_record
+from discover.forward import DeclaredModel
+from discover.statistics.noise_weights import weights_by_noise
+
+
+def searched_by_noise(
+    task: SearchTask, ended: SearchResult, declared: DeclaredModel, laws: Sequence[str]
+) -> tuple[SearchTask, SearchResult]:
+    """Return a search with runs weighed by their noise, and its task, if that explains them.
+
+    Otherwise the search that has ended, and its task.
+
+    Parameters
+    ----------
+    task, ended
+        The search with equal weights.
+    declared, laws
+        What it started from.
+    """
+    search = ended.search
+    if task.silent or not search.fit.usable:
+        return task, ended
+    rows = zip(search.fit.residual, search.problem.weight, strict=True)
+    left = [row[w > 0] * np.sqrt(np.count_nonzero(w)) for row, w in rows]
+    weights = weights_by_noise(left, list(map(kind_of_record, task.fitted)), search.explained)
+    if weights is None:
+        return task, ended
+    task.say("runs differ in noise: the search once more, each run weighed by its own")
+    runs = [replace(run, weight=own) for run, own in zip(task.fitted, weights, strict=True)]
+    weighed = replace(task, fitted=runs, name=f"{task.name}_by_noise")
+    again = weighed.search(declared, laws)
+    return (weighed, again) if again.search.explained else (task, ended)

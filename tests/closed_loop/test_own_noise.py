@@ -1,0 +1,63 @@
+"""Runs of unlike noise, fitted together: each weighs by its own."""
+
+import numpy as np
+from independent import Giesekus, Structured, start_up
+
+import discover as dc
+from discover.closed_loop import own_noise
+
+MOBILITY, MODULUS, TIME = 0.3, 100.0, 1.0
+NOISES = {0.5: 0.06, 2.0: 0.06, 5.0: 0.002}
+"""Relative noise of each start-up, by its rate in 1/s: slow flows hardly move the transducer."""
+
+TIMES = np.linspace(0.05, 8.0, 80)
+
+
+def loop_on(material):
+    """Return the loop on start-ups by scipy, each with its own noise."""
+    rng, runs = np.random.default_rng(3), []
+    for rate, noise in NOISES.items():
+        stress = material.respond(start_up(rate), TIMES).sigma12
+        stress = stress + noise * np.sqrt(np.mean(stress**2)) * rng.standard_normal(len(TIMES))
+        runs.append(dc.Run(f"{rate:g}.csv", TIMES, dc.start_up(rate), 0 * TIMES + rate, stress))
+    return dc.close_loop(
+        dc.Dataset("unlike noise", tuple(runs)),
+        dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
+        effects=["giesekus_mobility"],
+        max_effects=1,
+        explanations=1,
+    )
+
+
+def deviation() -> float:
+    """Return the least standard deviation of α that any unbiased fit has, by scipy's derivative."""
+    step, information = 0.01, 0.0
+    for rate, noise in NOISES.items():
+        low, own, high = (
+            Giesekus(MOBILITY + d, MODULUS, TIME).respond(start_up(rate), TIMES).sigma12
+            for d in (-step, 0.0, step)
+        )
+        slope = (high - low) / (2.0 * step) / np.sqrt(np.mean(own**2))
+        information += float(slope @ slope) / noise**2
+    return 1.0 / np.sqrt(information)
+
+
+def test_a_quiet_run_beside_loud_ones_is_explained_and_tells_as_much_as_it_can():
+    loop = loop_on(Giesekus(MOBILITY, MODULUS, TIME))
+    assert loop.verdict == "effects_added"
+    low, high = loop.stages[0].parameters["alpha"].ci95
+    assert low < MOBILITY < high
+    # 95 % of a normal distribution is 3.9 deviations wide; the noise is estimated, and not exactly
+    assert high - low < 6.0 * deviation()
+
+
+def test_with_equal_weights_loud_runs_leave_a_pattern_in_the_quiet_one(monkeypatch):
+    monkeypatch.setattr(own_noise, "weights_by_noise", lambda *_: None)
+    loop = loop_on(Giesekus(MOBILITY, MODULUS, TIME))
+    low, high = loop.stages[0].parameters["alpha"].ci95
+    assert loop.verdict == "unexplained" or high - low > 6.0 * deviation()
+
+
+def test_weights_by_noise_explain_no_fluid_of_another_kind():
+    loop = loop_on(Structured(2.0, (2.0,), in_modulus=True, modulus=MODULUS, mobility=0.0))
+    assert loop.verdict == "unexplained"
