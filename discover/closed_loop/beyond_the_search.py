@@ -104,7 +104,7 @@ def _with_bands(
     tried: Sequence[str],
 ) -> list[RunRecord]:
     """Return all runs with bands, which allow for what the rate did between its samples."""
-    parts = [(final.batch, final.records_fitted), (final.held_batch, final.records_held_out)]
+    parts = [(final.batch, final.records_fitted), (final.held_as_noisy, final.records_held_out)]
     records = with_band(
         final.model, final.batch, final.carried, explanations, parts, judgement, tried
     )

@@ -18,6 +18,7 @@ from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
+from discover.closed_loop.own_noise import weighed_like
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.search import Search
@@ -103,6 +104,13 @@ class FinalFit:
             self.model, self.held_batch, self.held_out, self.search.path, held_out=True,
             order=self.order,
         )  # fmt: skip
+
+    @cached_property
+    def held_as_noisy(self) -> Batch | None:
+        """The runs held out, taken to be as noisy as fitted ones of their kind."""
+        if self.held_batch is None or all(run.weight == 1.0 for run in self.fitted):
+            return self.held_batch
+        return make_batch(weighed_like(self.held_out, self.fitted))
 
     @property
     def records(self) -> list[RunRecord]:

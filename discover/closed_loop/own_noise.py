@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.closed_loop.searching import SearchResult, SearchTask
+from discover.dataset import Run
 from discover.dataset.run_table import kind_of_record
 from discover.forward import DeclaredModel
 from discover.statistics.noise_weights import weights_by_noise
@@ -38,3 +39,20 @@ def searched_by_noise(
     weighed = replace(task, fitted=runs, name=f"{task.name}_by_noise")
     again = weighed.search(declared, laws)
     return (weighed, again) if again.search.explained else (task, ended)
+
+
+def weighed_like(runs: Sequence[Run], fitted: Sequence[Run]) -> list[Run]:
+    """Return runs that no fit saw, each with the mean weight of the fitted ones of its kind.
+
+    Parameters
+    ----------
+    runs
+        Those; one of a kind of its own has a weight of one.
+    fitted
+        Runs with their weights.
+    """
+    of_kind: dict[str, list[float]] = {}
+    for run in fitted:
+        of_kind.setdefault(kind_of_record(run), []).append(run.weight)
+    mean = {kind: float(np.exp(np.mean(np.log(own)))) for kind, own in of_kind.items()}
+    return [replace(run, weight=mean.get(kind_of_record(run), 1.0)) for run in runs]
