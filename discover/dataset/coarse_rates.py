@@ -101,9 +101,12 @@ def significant_samples(count: float) -> str:
     return f"{count:.0f}" if count >= 10.0 else f"{count:.2g}"
 
 
-def of_json(found: Mapping[str, Any]) -> CoarseRates:
-    """Return what `CoarseRates.to_json` wrote."""
-    return CoarseRates(found["change"], found["left"], found["shifts"], found["runs"])
+def coarse_in(found: Mapping[str, Any] | None) -> CoarseRates | None:
+    """Return what `CoarseRates.to_json` wrote; None where that is nothing, or too small to tell."""
+    if not found:
+        return None
+    coarse = CoarseRates(found["change"], found["left"], found["shifts"], found["runs"])
+    return coarse if coarse.is_coarse else None
 
 
 def samples_a_cycle(time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]) -> float | None:

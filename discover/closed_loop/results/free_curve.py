@@ -2,8 +2,8 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -58,10 +58,6 @@ class FreeForm:
     evidence: float
     explains: bool
     error: ErrorPair
-
-    def to_json(self) -> dict[str, Any]:
-        """Return what ``loop.json`` holds of it."""
-        return asdict(self)
 
 
 def drawn_form(

@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.coarse_rates import CoarseRates, of_json, samples_a_cycle, worth_a_look
+from discover.dataset.coarse_rates import CoarseRates, coarse_in, samples_a_cycle, worth_a_look
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 from discover.learners.recovered_term import RecoveredTerm
@@ -77,9 +77,7 @@ def with_sampled_rates(
 
 def coarse_rates_of(outcome: LearnerOutcome) -> CoarseRates | None:
     """Return what rates read in too few samples leave open of a law; None where that is small."""
-    found = outcome.details.get(KEY)
-    coarse = None if found is None else of_json(found)
-    return coarse if coarse is not None and coarse.is_coarse else None
+    return coarse_in(outcome.details.get(KEY))
 
 
 def _changed(fluid: Fluid, flow: Flow, prediction: Stresses) -> np.ndarray:

@@ -13,6 +13,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
+from discover.plain_json import plain
 from discover.progress import Progress, silent
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import Expectation
@@ -177,8 +178,7 @@ def searched(
         row.update(uncertainty_row(sparse.search_, rival.fit, seed))
     table["rivals_text"] = table.pop("text")
     if runs:
-        told_by = told_by_kinds(sparse.search_, chosen, runs)
-        table["told_by"] = [one.to_json() for one in told_by]
+        table["told_by"] = plain(told_by_kinds(sparse.search_, chosen, runs))
     return replace(result, details={**result.details, **table})
 
 

@@ -83,12 +83,12 @@ class Rival:
         """Return the rival as the contract spells it."""
         return {
             "terms": [
-                {"term": name, "coefficient": value, "inner": dict(self.inner)}
+                {"term": name, "coefficient": value, "inner": self.inner}
                 for name, value in self.terms.items()
             ],
             "reason": self.reason,
-            "errors_to_chosen": dict(self.errors_to_chosen),
-            "separated_by": None if self.separated_by is None else dict(self.separated_by),
+            "errors_to_chosen": self.errors_to_chosen,
+            "separated_by": self.separated_by,
         }
 
 

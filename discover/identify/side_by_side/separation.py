@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -52,10 +51,6 @@ class Separation:
             else percent_of(self.difference)
         )
         return f"{self.quantity} in {self.flow} ({size})"
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the experiment as JSON-able values."""
-        return {"flow": self.flow, "quantity": self.quantity, "difference": self.difference}
 
 
 def separations(

@@ -5,7 +5,7 @@ simulation of other flows without a second thought.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import jax
@@ -78,16 +78,6 @@ class PhysicsCheck:
         """Return the check as one line of a table."""
         return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the check as JSON-able values."""
-        return {
-            "name": self.name,
-            "passed": None if self.passed is None else bool(self.passed),
-            "value": None if self.value is None else float(self.value),
-            "where": self.where,
-            "text": self.text,
-        }
-
 
 @dataclass(frozen=True)
 class PhysicsReport(SentenceAndTable):
@@ -118,7 +108,7 @@ class PhysicsReport(SentenceAndTable):
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""
-        return {"text": self.text, "checks": [check.to_json() for check in self.checks]}
+        return {"text": self.text, "checks": [asdict(check) for check in self.checks]}
 
 
 def check_physics(
