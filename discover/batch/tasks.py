@@ -201,13 +201,6 @@ def fit_declared(model, dataset):
     learners can correct that: a wrong relaxation time is a term in ``sigma``, a wrong modulus one
     in ``gammadot``.
 
-    Parameters
-    ----------
-    model
-        From `discover.study.declared_model.declared_model`.
-    dataset
-        The runs to fit.
-
     Raises
     ------
     InputError

@@ -117,13 +117,6 @@ def judged_by(whole: LoopResult, folds: Sequence[Fold]) -> LoopResult:
     A verdict is a claim about runs that nobody has seen, and only these loops had one. Of n, k of
     which fail, the next fails with probability (k + 1)/(n + 2), by Laplace's rule of succession;
     *none of these* is no less probable.
-
-    Parameters
-    ----------
-    whole
-        Of the loop on all runs.
-    folds
-        Of the loops that left one out.
     """
     against = sum(fold.verdict == "unexplained" for fold in folds)
     if whole.verdict not in ("effects_added", "no_effect_needed") or 2 * against <= len(folds):

@@ -132,15 +132,6 @@ def law_beside_effects(
 
     The first law was chosen while these effects were missing, and may have stood for a part of
     them: White–Metzner for a structure that flow breaks.
-
-    Parameters
-    ----------
-    declared, tried
-        As `choose_law` returned them.
-    search
-        The search that found the effects.
-    fitted, held_out, say
-        As in `choose_law`.
     """
     model = search.model
     found = [

@@ -100,17 +100,7 @@ def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iter
 def with_later_spikes(
     spikes: dict[str, list[float]], runs: Sequence[Run], judgement: Judgement
 ) -> dict[str, list[float]]:
-    """Return the times of all outliers: of those that the fit showed too.
-
-    Parameters
-    ----------
-    spikes
-        Times in s of those seen before the fit, by name of the run.
-    runs
-        The fitted runs.
-    judgement
-        What is left of them.
-    """
+    """Return the times of all outliers: of those that the fit showed too."""
     found = dict(spikes)
     for run, samples in zip(runs, judgement.left.outlier_samples, strict=True):
         if samples:
@@ -136,13 +126,6 @@ def _needed(run: Run, most: int) -> int:
 
 def require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
     """Refuse what any law would fit.
-
-    Parameters
-    ----------
-    runs
-        The runs to fit.
-    declared
-        The declared model, whose constants they must tell.
 
     Raises
     ------

@@ -182,15 +182,7 @@ class SearchTask:
 
 
 def _is_likelier(search: Search, other: Search, by: float = BARE_MENTION) -> bool:
-    """Return whether what one search found explains the runs better than what another did.
-
-    Parameters
-    ----------
-    search, other
-        Searches in the same runs.
-    by
-        Difference of the criterion that counts.
-    """
+    """Return whether what one search found explains the runs better than what another did."""
     effective = min(one.problem.independent_samples(one.fit) for one in (search, other))
     own, theirs = (one.problem.worth(one.fit, one.active, effective) for one in (search, other))
     return own < theirs - by

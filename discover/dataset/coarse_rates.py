@@ -124,13 +124,5 @@ def samples_a_cycle(time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
 
 
 def worth_a_look(unknown: Sequence[float], left: float) -> bool:
-    """Return whether what is unknown of rates may matter beside what a law leaves.
-
-    Parameters
-    ----------
-    unknown
-        Of each run, as from `unknown_between_samples`.
-    left
-        Relative misfit.
-    """
+    """Return whether what is unknown of rates may matter beside what a law leaves."""
     return max(unknown, default=0.0) > _NEGLIGIBLE * left

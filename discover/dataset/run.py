@@ -38,13 +38,6 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
 
     The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion to
     each value and of which each decade counts, the value itself.
-
-    Parameters
-    ----------
-    values
-        A quantity recorded in the flow.
-    protocol
-        Of the flow.
     """
     size = np.full(len(values), np.sqrt(np.mean(values**2)))
     if protocol.control in STATES:

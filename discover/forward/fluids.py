@@ -62,15 +62,7 @@ class AtSamples(NamedTuple):
 
 
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
-    """Return what is seen of a fluid in one flow. Not finite where it runs away.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    protocol, grid
-        Of one run, from `lay_out`.
-    """
+    """Return what is seen of a fluid in one flow. Not finite where it runs away."""
     if protocol.control in FOLLOWED:
         states = solve_states_on_grid(fluid, protocol, grid)
         rate = jax.vmap(protocol.rate)(grid.sample_times)
@@ -83,15 +75,7 @@ def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> A
 def observed_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, adjoint: Any = None
 ) -> Inexact[Array, "n 3"]:
-    """Return what `AtSamples.observed` holds, at the samples of one grid.
-
-    Parameters
-    ----------
-    fluid, protocol, grid
-        As in `at_samples`.
-    adjoint
-        As in `solve_on_grid`, at a given rate.
-    """
+    """Return what `AtSamples.observed` holds, at the samples of one grid."""
     if protocol.control in FOLLOWED:
         return _observed(solve_on_grid(fluid, protocol, grid, adjoint), protocol)
     return at_samples(fluid, protocol, grid).observed
@@ -99,15 +83,7 @@ def observed_on_grid(
 
 @compiled
 def observed_in_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 3"]:
-    """Return what is recorded of one fluid in a batch of runs, and N1 and N2.
-
-    Parameters
-    ----------
-    fluid
-        The fluid, shared by all runs.
-    flows
-        From `lay_out`.
-    """
+    """Return what is recorded of one fluid in a batch of runs, and N1 and N2."""
     return flows.over(partial(observed_on_grid, fluid))
 
 
@@ -162,7 +138,7 @@ def solved_on_grid(
     numbers
         A tree.
     protocol, grid
-        As in `at_samples`.
+        Of one run, from `lay_out`.
     together
         Whether the samples are of use only together, and not one is solved for once another cannot.
     """
@@ -226,15 +202,7 @@ def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Arra
 
 
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
-    """Return a fluid as the integrators take it.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    protocol
-        Which flow it is.
-    """
+    """Return a fluid as the integrators take it."""
     dynamics = dynamics_of_modes(
         fluid.law.stress_rate,
         fluid.modulus,

@@ -51,19 +51,6 @@ def draw_constants(
     Of the fit itself, and of one with one degree more for each constant that may have it, as
     intervals hold both. None where a constant stands at an end of its range, from where no first
     order leads anywhere.
-
-    Parameters
-    ----------
-    problem, fit
-        What is fitted to what, and the final fit.
-    degrees
-        Degree of each constant by mode.
-    wider
-        From `fits_of_one_degree_more`.
-    n_draws
-        About each fit.
-    seed
-        Of the draws.
     """
     constants = varying_constants(problem.model, fit, degrees)
     if not constants:

@@ -72,11 +72,6 @@ def begun(
     A periodic state is solved for, without derivatives. One step of Newton's method from there
     moves it by nothing, and its derivatives, also those that stand beside it in columns, to those
     of the implicit function.
-
-    Parameters
-    ----------
-    following, grid, alone
-        As in `follow`.
     """
     if grid.cycle is None:
         return following.rest

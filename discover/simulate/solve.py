@@ -274,15 +274,7 @@ def _in_steady_flow(fluid, protocol, grid, observe):
 
 @compiled
 def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
-    """Return the stresses of one fluid in a batch of runs, on fixed grids.
-
-    Parameters
-    ----------
-    fluid
-        The fluid, shared by all runs.
-    flows
-        From `lay_out`.
-    """
+    """Return the stresses of one fluid in a batch of runs, on fixed grids."""
     return flows.over(partial(solve_on_grid, fluid))
 
 

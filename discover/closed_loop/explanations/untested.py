@@ -50,11 +50,6 @@ def share_believed(model: AugmentedModel, fit: Fit, effects: Sequence[str], runs
     """Return how far an explanation is to be believed, by the flows that tested it.
 
     Runs held out are a test by themselves, and the verdict tells what they say.
-
-    Parameters
-    ----------
-    model, fit, effects, runs
-        As in `why_untested`.
     """
     if not fit.free or (runs[1] and not _are_states(runs)):
         return 1.0

@@ -106,13 +106,7 @@ def drawn_form(
 
 
 def error_of(left: Float[np.ndarray, "runs n"]) -> float:
-    """Return the mean relative error of runs, infinite where a model runs away.
-
-    Parameters
-    ----------
-    left
-        Weighted residuals, padded.
-    """
+    """Return the mean relative error of runs, infinite where a model runs away."""
     if not np.all(np.isfinite(left)):
         return np.inf
     return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))

@@ -15,11 +15,6 @@ from discover.study.declared_model import DeclaredModel
 def prepared(data: StudyData) -> StudyData:
     """Return data whose runs are as learners take them.
 
-    Parameters
-    ----------
-    data
-        Of a study, split.
-
     Raises
     ------
     InputError
@@ -53,13 +48,6 @@ def thinned_to(data: StudyData, most: int) -> StudyData:
 
     Every sample is a step of the integration, and a record of thousands says little more of a law
     than its hundreds do. What was thinned says so.
-
-    Parameters
-    ----------
-    data
-        Of a study, split.
-    most
-        Samples of a run, at most.
     """
     return with_each_run(data, lambda run: thin_run(run, most))
 
@@ -80,11 +68,6 @@ def _with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]
 
 def require_one_known_law(declared: DeclaredModel) -> None:
     """Refuse a known part that only a closed loop can have.
-
-    Parameters
-    ----------
-    declared
-        The declared model.
 
     Raises
     ------

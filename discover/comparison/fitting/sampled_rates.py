@@ -31,17 +31,6 @@ def with_sampled_rates(
 
     What another curve through the samples changes in σ12 is told under `KEY` of its details;
     coefficients with an interval get it wider by what that would do to them.
-
-    Parameters
-    ----------
-    outcome
-        Of a learner, with its predictions.
-    fluid
-        The law found.
-    declared
-        The known part.
-    flows
-        The flows of the comparison.
     """
     training = [flow for flow in flows if flow.kind == "training" and flow.measured is not None]
     if not training or any(not np.any(flow.measured) for flow in training):

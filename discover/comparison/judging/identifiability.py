@@ -231,21 +231,7 @@ def structure_of(
     model: DeclaredModel,
     use_normal_stresses: bool,
 ) -> Structure:
-    """Return what the flows of these runs determine, at the known part and at the law found.
-
-    Parameters
-    ----------
-    terms
-        The law found.
-    runs
-        Training runs.
-    library
-        Candidate terms.
-    model
-        The known part.
-    use_normal_stresses
-        Whether measured normal stresses take part in the fit.
-    """
+    """Return what the flows of these runs determine, at the known part and at the law found."""
     found = law_terms(terms)
     return analyse_structure(
         runs,

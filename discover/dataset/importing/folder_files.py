@@ -54,11 +54,6 @@ class NamedRecord:
 def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     """Return the text of every file of a folder by name, and what is to be said of them.
 
-    Parameters
-    ----------
-    found
-        The tests, in their order.
-
     Raises
     ------
     InputError

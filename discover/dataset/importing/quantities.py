@@ -128,15 +128,7 @@ _SHORT = 3
 
 
 def to_celsius(value: float, unit: str) -> float | None:
-    """Return a temperature in °C, or None if the unit is none of temperature.
-
-    Parameters
-    ----------
-    value
-        In that unit.
-    unit
-        As the export writes it.
-    """
+    """Return a temperature in °C, or None if the unit is none of temperature."""
     scale = unit.replace("º", "°").replace("°", "").replace("deg", "").strip().upper()
     if scale in ("C", "CELSIUS"):
         return value

@@ -125,13 +125,6 @@ def read_blocks(
 def require_blocks(blocks: list[Block], name: str) -> list[Block]:
     """Return the blocks of a file.
 
-    Parameters
-    ----------
-    blocks
-        What was found.
-    name
-        Of the file.
-
     Raises
     ------
     InputError

@@ -48,15 +48,7 @@ Batch = Part | MixedBatch
 
 
 def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
-    """Return runs as a batch.
-
-    Parameters
-    ----------
-    runs
-        One or more runs.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return runs as a batch."""
     make = {
         "rate": lambda some: transients(some, strain_step),
         "steady": steady_states,

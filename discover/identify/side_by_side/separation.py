@@ -63,11 +63,6 @@ def separations(
 
     Oscillations and start-ups of shear, and the start of uniaxial and planar extension. A shear
     quantity comes first where one differs, as it needs the fewest new instruments.
-
-    Parameters
-    ----------
-    library, reference, others, base
-        As in `differences`.
     """
     laws = [reference, *others]
     flows = histories_for(base)

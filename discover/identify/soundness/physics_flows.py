@@ -49,15 +49,7 @@ class Trajectories:
 
 
 def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
-    """Return conformation and dissipation of a fluid along flows.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    flows
-        The flows.
-    """
+    """Return conformation and dissipation of a fluid along flows."""
     states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
     sampled = np.asarray(flows.sample_mask)[..., None]
     whole = np.all(np.isfinite(states), axis=(1, 2, 3))

@@ -79,15 +79,7 @@ def member_predictions(
 
 
 def coefficient_spread(members: Sequence[TensorBasisNetwork], cloud: Cloud) -> dict[str, float]:
-    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training.
-
-    Parameters
-    ----------
-    members
-        The laws.
-    cloud
-        States at which all of them are looked at.
-    """
+    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training."""
     values = np.stack([np.asarray(cloud.coefficients(member)) for member in members])
     rms = np.sqrt(np.mean(np.var(values, axis=0), axis=0))
     return dict(zip(TENSOR_NAMES, map(float, rms), strict=True))
