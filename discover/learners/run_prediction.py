@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from discover.laws.multimode import Fluid
     from discover.learners.result import LearnerResult
 
+_Learner = TypeVar(
+    "_Learner", bound="RunPrediction"
+)  # not Self, which the tests' hook cannot check
+
 
 class RunPrediction(RegressorMixin, BaseEstimator):
     """What is common to estimators: what they are fitted to, prediction, score, law, file."""
@@ -43,7 +47,7 @@ class RunPrediction(RegressorMixin, BaseEstimator):
     _saved_types: ClassVar[tuple[type, ...]]
     """Dataclasses among them and among the parameters."""
 
-    def fit(self, X: Iterable[Run], y=None) -> Self:
+    def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
         """Find the law of these runs.
 
         Parameters
