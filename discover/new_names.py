@@ -10,8 +10,6 @@ def require_new_name(name: str, known: Sequence[str], what: str) -> None:
 
     Parameters
     ----------
-    name
-        The name.
     known
         Names that are taken.
     what

@@ -18,8 +18,6 @@ class BatchProgress:
 
     Parameters
     ----------
-    names
-        Names of the studies.
     progress
         Called with what is going on and the fraction done.
     """

@@ -84,8 +84,6 @@ def run_compare(
 
     Parameters
     ----------
-    path
-        The study file.
     out
         Folder for the results; goes on there if it holds unfinished ones.
     seed

@@ -20,8 +20,6 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> Path:
 
     Parameters
     ----------
-    dataset
-        The data.
     name
         The folder, or its name under DISCOVER_DATA.
     out

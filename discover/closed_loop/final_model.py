@@ -39,10 +39,6 @@ def stage_of(
 
     Parameters
     ----------
-    search
-        The finished search.
-    name
-        Name of the effect.
     bounds
         Intervals given the effects of the final model, and over all explanations.
     error

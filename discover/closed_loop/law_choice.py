@@ -52,8 +52,6 @@ def choose_law(
         Modes, solvent and known effects, which every law shares.
     names
         Of the laws, keys of `LAWS`.
-    fitted, held_out
-        The runs.
     say
         Called with a line of text for each law.
     beside

@@ -77,8 +77,6 @@ def run_loop(
 
     Parameters
     ----------
-    dataset
-        All runs.
     declared
         The model to start from.
     fit

@@ -39,8 +39,6 @@ def split_runs(
 
     Parameters
     ----------
-    dataset
-        All runs.
     fit, held_out
         Names; by default all are fitted that are not held out.
     strain

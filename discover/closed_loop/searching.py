@@ -55,8 +55,6 @@ class SearchTask:
 
     Attributes
     ----------
-    candidates
-        The effects.
     fitted, held_out
         Runs to fit, and runs that only judge.
     noise
@@ -93,8 +91,6 @@ class SearchTask:
 
         Parameters
         ----------
-        declared
-            The declared model.
         laws
             Named laws to choose its law from; none where it is as declared.
 

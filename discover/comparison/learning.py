@@ -31,8 +31,6 @@ class Learning:
     ----------
     study
         Which learners, and with what options.
-    seed
-        Of the learners.
     store
         Where finished learners are kept and found again.
     made
@@ -76,8 +74,6 @@ class Learning:
 
         Parameters
         ----------
-        learner
-            Its name.
         known
             The known part, and the flows of the page.
         progress

@@ -36,8 +36,6 @@ def read_material_functions(
 
     Parameters
     ----------
-    root
-        The folder.
     runs
         Files that ``runs.csv`` names: they are runs, whatever they are called.
     frequency
@@ -129,8 +127,6 @@ def read_over_time(
 
     Parameters
     ----------
-    path
-        Of the table.
     kind
         ``relaxation``, in Pa, or ``creep``, in 1/Pa.
 

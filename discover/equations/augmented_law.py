@@ -20,10 +20,6 @@ class AugmentedLaw(AbstractExtendedLaw):
     ----------
     base
         The declared law.
-    values
-        Parameters of each effect.
-    effects
-        The effects.
     linear_relaxation
         As in the declared law.
     """

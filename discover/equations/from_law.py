@@ -53,8 +53,6 @@ def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[Equati
 
     Parameters
     ----------
-    effect
-        The effect.
     values
         Its parameters in their order, shape (p,).
 

@@ -240,8 +240,6 @@ def dynamics_of_modes(
         Dimensionless dσ/dt of a mode, of its σ and its λL.
     modulus, relaxation_time, solvent_viscosity
         In Pa, s and Pa s.
-    protocol
-        Which flow it is.
     variables
         Structure variables of each mode.
     """

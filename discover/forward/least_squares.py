@@ -59,8 +59,6 @@ class Fit:
 
     Attributes
     ----------
-    theta
-        All parameters.
     free
         Positions of the fitted ones.
     residual

@@ -24,8 +24,6 @@ class ConstantsDrawn:
 
     Attributes
     ----------
-    names
-        Of the constants.
     values
         Shape (draws, constants, k). Each group begins with the fit that it is drawn about.
     sizes

@@ -47,8 +47,6 @@ class VaryingConstant:
 
         Parameters
         ----------
-        fit
-            The fit.
         shift
             By how much, shape (k,) or ().
         """

@@ -66,8 +66,6 @@ class Student:
         Makes the law from its parameters, in the order of `bounds`.
     bounds
         Name and admissible range of each parameter.
-    start
-        Where the fit starts.
     latex
         The law with ``%s`` where each parameter's value goes.
     more_starts
@@ -179,8 +177,6 @@ class Distillation:
 
     Attributes
     ----------
-    student
-        Its name.
     penalised, debiased
         Parameters by name, with the penalty and without.
     penalty

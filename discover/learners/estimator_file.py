@@ -59,11 +59,6 @@ def write_estimator(
 class EstimatorFile:
     """What a file written by `write_estimator` holds.
 
-    Parameters
-    ----------
-    path
-        The file.
-
     Attributes
     ----------
     learner

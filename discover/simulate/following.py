@@ -24,8 +24,6 @@ class Following(NamedTuple):
     ----------
     vector_field
         dy/dt = f(t, y, args).
-    solver
-        The method.
     rest
         Where there has been no flow, shape (k, s), or (k, s, c) with derivatives behind the first
         column.
@@ -51,8 +49,6 @@ def follow(
     ----------
     following
         The states.
-    grid
-        Grid of one run.
     observe
         Of (t, y, args); y itself by default.
     alone

@@ -116,8 +116,6 @@ def make_grid(
 
     Parameters
     ----------
-    protocol
-        The flow.
     times
         Sampling times in s, increasing, from 0 on.
     strain_step, phase_step

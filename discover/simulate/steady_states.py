@@ -144,8 +144,6 @@ def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Arr
 
     Parameters
     ----------
-    fluid
-        The fluid.
     velocity_gradient
         The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
     """
@@ -173,8 +171,6 @@ def steady_modes(
         Dimensionless dσ/dt of a mode, of its σ and its λL.
     scaled_gradient
         λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
-    rest
-        The modes at rest.
     """
     # the shear rate, or of an extension the largest rate of stretching
     weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)

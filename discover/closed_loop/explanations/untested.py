@@ -36,8 +36,6 @@ def why_untested(
         With all candidates.
     fit, effects
         A fit, and the effects in it. One in which nothing was fitted was tested by any run.
-    runs
-        The runs.
     """
     if not fit.free:
         return None

@@ -35,8 +35,6 @@ class CurrentModel(SearchState):
     ----------
     model
         The declared model with all candidates.
-    batch
-        Runs that are fitted.
     held_batch
         Flows through which a chosen law must be integrable; their stresses are not looked at.
     n_candidates

@@ -103,8 +103,6 @@ def fit_classical_laws(
 
     Parameters
     ----------
-    model
-        The declared model.
     flows
         Training flows, with what was measured, and flows to judge in.
     known_relaxation

@@ -60,10 +60,6 @@ def train(
         The study, for the learner's settings.
     model
         The known part.
-    runs
-        Runs to learn from.
-    seed
-        Seed of the learner.
     progress
         Called as it goes.
     searched_library

@@ -32,8 +32,6 @@ class OtherConstant:
 
     Attributes
     ----------
-    term, coefficient
-        The term.
     declared
         What was declared, in s or Pa; None where there are several modes.
     factor, ci95

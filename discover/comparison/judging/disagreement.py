@@ -37,8 +37,6 @@ def disagreements(
 
     Parameters
     ----------
-    outcomes
-        By learner.
     flows
         Flows to look at: tests and held-out runs.
     bands

@@ -104,8 +104,6 @@ def find_rivals(
 
     Parameters
     ----------
-    terms
-        The chosen law.
     met
         Rivals that the sparse search met: ``support``, ``coefficients``, ``inner``, ``text``.
     model
@@ -250,8 +248,6 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
     Parameters
     ----------
-    fluid
-        A learned fluid.
     flows
         The flows of the comparison; training ones set the box beyond which the law extrapolates.
     """

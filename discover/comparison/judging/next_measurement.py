@@ -129,8 +129,6 @@ def bands_of_law(
 
     Parameters
     ----------
-    outcome
-        Of the sparse learner.
     rivals
         Laws with ``terms`` and ``inner``, closest first.
     declared

@@ -36,8 +36,6 @@ class NamedRecord:
     ----------
     name
         Of its file, if it is a run, without ending.
-    record
-        The test.
     source, block
         Name of the file, and what that calls the block.
     chosen

@@ -152,8 +152,6 @@ class Mapping(Section):
 
         Parameters
         ----------
-        file
-            Its name.
         block
             Number of the block, from 1.
         """

@@ -41,8 +41,6 @@ def frequency_of(time: Values, values: Values) -> float:
     ----------
     time
         In s, increasing.
-    values
-        The record.
     """
     span = float(time[-1] - time[0])
     centred = values - np.mean(values)

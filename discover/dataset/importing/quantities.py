@@ -57,8 +57,6 @@ def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
 
     Parameters
     ----------
-    block
-        The block.
     given
         Names of columns that the user gave; they win over guesses.
 

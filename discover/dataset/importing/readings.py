@@ -38,8 +38,6 @@ class Readings:
 
     Attributes
     ----------
-    block
-        The block.
     columns
         Place of each quantity among its columns.
     mapping

@@ -29,8 +29,6 @@ class Record:
 
     Attributes
     ----------
-    kind
-        Which test.
     table
         Columns in SI units by quantity, in the order of the file.
     conditions

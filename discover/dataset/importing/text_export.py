@@ -101,8 +101,6 @@ def read_blocks(
 
     Parameters
     ----------
-    path
-        The file.
     delimiter
         ``tab``, ``semicolon``, ``comma`` or ``space``; found from the file if None.
     decimal

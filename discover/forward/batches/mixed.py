@@ -22,10 +22,6 @@ class MixedBatch(eqx.Module):
 
     Attributes
     ----------
-    parts
-        The runs of each control.
-    rows
-        Which runs these are.
     moduli
         Of each run that is a modulus, which sweep of its part, and whether G′ (0) or G″ (1).
     weight, recorded

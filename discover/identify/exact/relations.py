@@ -85,11 +85,6 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
     count as independent of every polynomial.
 
-    Parameters
-    ----------
-    library
-        The terms.
-
     Returns
     -------
     Relations that touch nothing first, then those that touch σ33 only and are not of the first

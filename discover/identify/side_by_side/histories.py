@@ -133,8 +133,6 @@ def differences(
     ----------
     library
         Holds every term of the laws.
-    reference, others
-        The laws.
     base
         The known part; by default UCM.
     """

@@ -28,8 +28,6 @@ class LawTerms:
 
     Attributes
     ----------
-    coefficients
-        Term → coefficient.
     inner
         Inner parameters of closed forms by name.
     """
@@ -88,8 +86,6 @@ def stresses_of_laws(
     ----------
     library
         Holds every term of the laws.
-    laws
-        The laws.
     protocols, grids
         From `stack_protocols` and `make_grids`.
     base

@@ -56,8 +56,6 @@ class PhysicsCheck:
 
     Attributes
     ----------
-    name
-        Of the check.
     passed
         Whether the law passes; None where the check could not be made.
     value
@@ -122,12 +120,8 @@ def check_physics(
 
     Parameters
     ----------
-    fluid
-        The fluid.
     flows
         Flows along which stresses are looked at.
-    names
-        Of the flows.
     weissenberg, deborah
         Largest shear rate and frequency of training, times the mean relaxation time: the corner of
         the box beyond which the law extrapolates.

@@ -112,8 +112,6 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
 
     Parameters
     ----------
-    fluid
-        The fluid.
     weissenberg, deborah
         Amplitudes of the shear rate and frequencies, times the mean relaxation time.
     """

@@ -93,8 +93,6 @@ class LawStructure(NotebookView):
 
     Attributes
     ----------
-    name
-        Of the law.
     law
         Its terms beyond the known part.
     hidden

@@ -76,8 +76,6 @@ def posterior_draws(
     ----------
     law
         Trained on the problem, with coefficients that vary.
-    problem
-        The training data.
     keys
         One for each draw.
     fits

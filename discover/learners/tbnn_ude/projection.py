@@ -27,8 +27,6 @@ class Projection:
 
     Attributes
     ----------
-    library
-        The terms chosen.
     coefficients
         Their least-squares coefficients, shape (n,).
     inner

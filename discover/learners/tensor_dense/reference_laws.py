@@ -47,8 +47,6 @@ class ReferenceLaw(AbstractExtendedLaw):
         α, ξ, ε, k and m.
     relaxation
         r: one where the known law lacks −σ, else zero.
-    base
-        The known law.
     linear_relaxation
         Whether the known law holds −σ.
     """

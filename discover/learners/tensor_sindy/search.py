@@ -195,8 +195,6 @@ class SupportSearch:
 
         Parameters
         ----------
-        chosen
-            A fit of this search.
         within
             Misfit over that of the chosen law up to which a law may.
         """

@@ -53,12 +53,8 @@ def undetermined(
 
     Parameters
     ----------
-    model, theta
-        The model and the parameters.
     bounds
         95 % interval of each fitted parameter, by position.
-    name
-        The effect.
     longest
         Length of the longest run in s. A time beyond it that may be endless is known well enough,
         but not from steady states, which know no time: there it is zero.

@@ -48,8 +48,6 @@ class Choice:
 
     Attributes
     ----------
-    candidate, fit
-        The candidate and the fit with it.
     left_out
         Error of each fitted run when left out.
     parts

@@ -125,8 +125,6 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     ----------
     panel
         Axes of matplotlib.
-    record
-        The run.
     along
         What the stress is drawn against, shape (n,).
     marked, shown
