@@ -123,13 +123,7 @@ def _needed(run: Run, most: int) -> int:
 
 
 def require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
-    """Refuse what any law would fit.
-
-    Raises
-    ------
-    InputError
-        If they hold too few samples for its constants.
-    """
+    """Refuse what any law would fit."""
     count, constants = sum(len(run) for run in runs), declared.free_constants
     if count < FEWEST_SAMPLES + constants:
         raise InputError(

@@ -126,13 +126,7 @@ def _told_of_constants(found: Learned) -> LearnerResult:
 
 
 def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
-    """Return the law, the value and the study of each point of a sweep.
-
-    Raises
-    ------
-    InputError
-        If the study cannot be swept so.
-    """
+    """Return the law, the value and the study of each point of a sweep."""
     sweep, synthetic = study.compare.sweep, study.data.synthetic
     if sweep is None:
         return []
@@ -157,13 +151,7 @@ def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
 
 
 def require_teacher(study: Study) -> None:
-    """Refuse a distillation where no law made the data.
-
-    Raises
-    ------
-    InputError
-        If it asks for one.
-    """
+    """Refuse a distillation where no law made the data."""
     if study.compare.distillation and study.data.synthetic is None:
         raise InputError(
             "compare.distillation needs a known law as teacher, so [data] must say synthetic = "

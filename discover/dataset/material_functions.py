@@ -40,11 +40,6 @@ def read_material_functions(
         Files that ``runs.csv`` names: they are runs, whatever they are called.
     frequency
         In rad/s, of an amplitude sweep that does not give its own.
-
-    Raises
-    ------
-    InputError
-        If a file is wrong.
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():

@@ -323,13 +323,7 @@ def same_samples(one: Run, other: Run) -> bool:
 
 
 def require_signal(runs: Sequence[Run]) -> None:
-    """Refuse runs of which none can teach a law.
-
-    Raises
-    ------
-    InputError
-        If nothing flows in any of them, or no stress is anything but zero.
-    """
+    """Refuse runs of which none can teach a law."""
     names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")
     if runs and not any(run.flows for run in runs):
         raise InputError(

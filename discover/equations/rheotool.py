@@ -206,11 +206,6 @@ def rheotool_text(
         rheoTool's solvers want a density; shear rheometry does not measure it.
     tolerance
         As in `rheotool_model`.
-
-    Raises
-    ------
-    InputError
-        If rheoTool has no such law.
     """
     if equation.states:
         raise InputError(

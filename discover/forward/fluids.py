@@ -98,11 +98,6 @@ def observe(
     ----------
     fluid, protocol, times
         As in `simulate`.
-
-    Raises
-    ------
-    SimulationError
-        If the fluid runs away.
     """
     if protocol.control in FOLLOWED:
         stress = simulate(fluid, protocol, times)

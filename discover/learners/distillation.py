@@ -141,11 +141,6 @@ def student_of(law: str) -> Student:
     ----------
     law
         Key of `STUDENTS` or of `LAWS`.
-
-    Raises
-    ------
-    InputError
-        If there is no such law, or it has no constant.
     """
     if law in STUDENTS:
         return STUDENTS[law]

@@ -61,13 +61,7 @@ def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
 
 
 def check_library(library: TermLibrary | None) -> None:
-    """Refuse what is no library of terms.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """Refuse what is no library of terms."""
     if library is not None and not isinstance(library, TermLibrary):
         raise InputError(
             "library must be a TermLibrary; got a "

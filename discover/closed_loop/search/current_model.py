@@ -121,11 +121,6 @@ class CurrentModel(SearchState):
         ----------
         by_mode
             Whether constants may differ from mode to mode, as far as the model says so.
-
-        Raises
-        ------
-        InputError
-            If it cannot be integrated through the runs.
         """
         self.fit = self._problem.best_fit(first_starts(self.model), self.model.free_positions)
         if not self.fit.usable:

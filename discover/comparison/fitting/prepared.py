@@ -13,13 +13,7 @@ from discover.study.declared_model import DeclaredModel
 
 
 def prepared(data: StudyData) -> StudyData:
-    """Return data whose runs are as learners take them.
-
-    Raises
-    ------
-    InputError
-        If every run is to be held out in turn.
-    """
+    """Return data whose runs are as learners take them."""
     if data.each:
         raise InputError(
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
@@ -67,13 +61,7 @@ def _with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]
 
 
 def require_one_known_law(declared: DeclaredModel) -> None:
-    """Refuse a known part that only a closed loop can have.
-
-    Raises
-    ------
-    InputError
-        If its law is to be chosen, or has constants by mode.
-    """
+    """Refuse a known part that only a closed loop can have."""
     if declared.choice:
         raise InputError(
             "[model] law names several laws to choose from, which is for close-loop: a comparison "

@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 
 
 def require_numbers(model: DeclaredModel) -> None:
-    """Check that nothing of the declared law is left to be fitted.
-
-    Raises
-    ------
-    InputError
-        If something is.
-    """
+    """Check that nothing of the declared law is left to be fitted."""
     if model.free:
         raise InputError(
             f"compare needs a known part without free parameters, but {', '.join(model.free)} in "

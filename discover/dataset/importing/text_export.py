@@ -121,13 +121,7 @@ def read_blocks(
 
 
 def require_blocks(blocks: list[Block], name: str) -> list[Block]:
-    """Return the blocks of a file.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
+    """Return the blocks of a file."""
     if not blocks:
         raise InputError(
             f"{name} holds no lines of numbers under a line of names. If it has no names, add "

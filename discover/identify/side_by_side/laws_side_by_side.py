@@ -37,13 +37,7 @@ class LawTerms:
 
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
-    """Return a library that also holds the terms of some laws.
-
-    Raises
-    ------
-    InputError
-        If a term cannot be read.
-    """
+    """Return a library that also holds the terms of some laws."""
     names = [name for law in laws for name in law.coefficients]
     try:
         terms = [parse_term(name) for name in names]
