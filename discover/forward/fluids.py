@@ -25,6 +25,7 @@ from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.flow_batch import FlowBatch, lay_out
+from discover.simulate.following import without_derivatives
 from discover.simulate.grid import IntegrationGrid
 from discover.simulate.solve import (
     SimulationError,
@@ -137,7 +138,7 @@ def solved_on_grid(
     together
         Whether the samples are of use only together, and not one is solved for once another cannot.
     """
-    dynamics, fixed = make(numbers), make(_fixed(numbers))
+    dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
         return _at_given_stress(dynamics, fixed, protocol, grid)
 
@@ -172,12 +173,6 @@ def solved_on_grid(
     _, found = jax.lax.scan(group, jnp.asarray(True), grid.times[places].reshape(-1, size))
     of_sample = jnp.argsort(order)[grid.sample_index]  # not those that pad a record
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[of_sample], found)
-
-
-def _fixed(numbers: Numbers) -> Numbers:
-    """Return a tree through which no derivative passes."""
-    arrays, rest = eqx.partition(numbers, eqx.is_array)
-    return eqx.combine(jax.lax.stop_gradient(arrays), rest)
 
 
 def _at_given_stress(

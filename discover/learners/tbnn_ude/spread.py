@@ -37,11 +37,6 @@ class MemberPredictions:
     N1: Float[np.ndarray, "members n"]
     N2: Float[np.ndarray, "members n"]
 
-    @property
-    def ran_away(self) -> int:
-        """Number of members that could not be integrated through the flow."""
-        return int(np.sum(np.any(np.isnan(self.sigma12), axis=1)))
-
     def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """Return the lowest and the highest prediction at each time; nan where all ran away.
 
