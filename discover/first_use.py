@@ -35,13 +35,7 @@ def set_up() -> None:
 
 
 def require_double() -> None:
-    """Check that JAX computes in double precision here and now.
-
-    Raises
-    ------
-    InputError
-        If it was turned off, for the program or for a block of it.
-    """
+    """Check that JAX computes in double precision here and now."""
     import jax
 
     if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]

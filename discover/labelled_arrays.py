@@ -6,13 +6,7 @@ from discover.errors import InputError
 
 
 def xarray_module() -> Any:
-    """Return the module xarray.
-
-    Raises
-    ------
-    InputError
-        If it is not installed.
-    """
+    """Return the module xarray."""
     try:
         import xarray
     except ImportError:

@@ -10,17 +10,10 @@ def require_new_name(name: str, known: Sequence[str], what: str) -> None:
 
     Parameters
     ----------
-    name
-        The name.
     known
         Names that are taken.
     what
         What it is to name, in the singular.
-
-    Raises
-    ------
-    InputError
-        If it is taken, or could not be written in a study file.
     """
     if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
         raise InputError(

@@ -69,11 +69,5 @@ class HasLine(Protocol):
 
 
 def table_of(results: Sequence[HasLine]) -> pd.DataFrame:
-    """Return results of one kind as a table, one line each.
-
-    Parameters
-    ----------
-    results
-        Such as the list of twins of a law, or of proposed experiments.
-    """
+    """Return results of one kind as a table, one line each."""
     return pd.DataFrame([dict(result.line()) for result in results])

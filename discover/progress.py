@@ -17,13 +17,7 @@ def silent(text: str, fraction: float) -> None:
 
 
 def checked(progress: Progress | None) -> Progress | None:
-    """Return what is to be told of progress, if it can be.
-
-    Raises
-    ------
-    InputError
-        If it cannot be called.
-    """
+    """Return what is to be told of progress, if it can be."""
     if progress is None or callable(progress):
         return progress
     raise InputError(
@@ -50,13 +44,7 @@ def may_be_stopped(stop: Event) -> Iterator[None]:
 
 
 def require_wanted() -> None:
-    """Go on only if somebody still waits for what this thread computes.
-
-    Raises
-    ------
-    Stopped
-        If nobody does.
-    """
+    """Go on only if somebody still waits for what this thread computes."""
     stop = _stop.get()
     if stop is not None and stop.is_set():
         raise Stopped

@@ -12,11 +12,6 @@ def on_stop(callback: Callable[[], object]) -> Iterator[None]:
 
     Whatever decides to stop the program calls `run_stop_callbacks`, from a thread of its own.
     Nothing is called if the context ends by itself.
-
-    Parameters
-    ----------
-    callback
-        Takes no arguments, and takes no longer than a user waits after Ctrl-C.
     """
     _registered.append(callback)
     try:

@@ -18,8 +18,6 @@ class BatchProgress:
 
     Parameters
     ----------
-    names
-        Names of the studies.
     progress
         Called with what is going on and the fraction done.
     """
@@ -55,15 +53,7 @@ class BatchProgress:
 
 
 def now_and_then(send: Callable[[str, float], None], pause: float = _PAUSE) -> Progress:
-    """Return a progress function that passes on at most one line in so many seconds.
-
-    Parameters
-    ----------
-    send
-        Called with what is going on and the fraction done.
-    pause
-        In s.
-    """
+    """Return a progress function that passes on at most one line in so many seconds."""
     latest = -pause
 
     def say(label: str, fraction: float) -> None:

@@ -132,13 +132,7 @@ def _loop(content: Mapping[str, Any]) -> StudyRow:
 
 
 def results_table(rows: Sequence[StudyRow]) -> pd.DataFrame:
-    """Return what studies found as a table, one line each, without columns that nothing fills.
-
-    Parameters
-    ----------
-    rows
-        What they found.
-    """
+    """Return what studies found as a table, one line each, without columns that nothing fills."""
     lines = []
     for row in rows:
         line: dict[str, Any] = {}

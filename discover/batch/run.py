@@ -37,10 +37,6 @@ def run_batch(
 
     Parameters
     ----------
-    paths
-        Study files.
-    out
-        Folder of the batch.
     workers
         Processes on this machine; with 1, everything happens in this one.
     scheduler

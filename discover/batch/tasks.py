@@ -8,7 +8,7 @@ import numpy as np
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
-from discover.progress import Progress, by_lines
+from discover.progress import Progress
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -84,8 +84,6 @@ def run_compare(
 
     Parameters
     ----------
-    path
-        The study file.
     out
         Folder for the results; goes on there if it holds unfinished ones.
     seed
@@ -142,7 +140,7 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
     if there is not None:
         return there
-    from discover.closed_loop import run_loop, run_loop_on_each
+    from discover.closed_loop.each_run import run_loop_on
     from discover.dataset.conditions import material_and_temperature
     from discover.report.loop.report import write_loop
     from discover.report.loop.verdict import loop_verdict
@@ -155,27 +153,11 @@ def run_close_loop(
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
-    stages = study.loop.max_effects + 1
+    asked = dict(study.loop)
+    result = run_loop_on(
+        data_of_study, declared, progress, laws=model.choice, store=folder, **asked
+    )
     each = data_of_study.each
-    if each:
-        stages *= 1 + len(data_of_study.fit)
-    options = {
-        "fit": data_of_study.fit.names,
-        "effects": study.loop.effects,
-        "max_effects": study.loop.max_effects,
-        "strain": study.loop.strain,
-        "noise": study.loop.noise,
-        "most_samples": study.loop.most_samples,
-        "explanations": study.loop.explanations,
-        "laws": model.choice,
-        "progress": by_lines(progress, stages),
-        "store": folder,
-    }
-    if each:
-        result = run_loop_on_each(data_of_study.dataset, declared, **options)
-    else:
-        held_out = data_of_study.held_out.names
-        result = run_loop(data_of_study.dataset, declared, held_out=held_out, **options)
     progress("drawing", 0.97)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
@@ -216,13 +198,6 @@ def fit_declared(model, dataset):
     The declared law alone is fitted to the stresses, so what it lacks biases its constants. The
     learners can correct that: a wrong relaxation time is a term in ``sigma``, a wrong modulus one
     in ``gammadot``.
-
-    Parameters
-    ----------
-    model
-        From `discover.study.declared_model.declared_model`.
-    dataset
-        The runs to fit.
 
     Raises
     ------

@@ -20,8 +20,6 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> Path:
 
     Parameters
     ----------
-    dataset
-        The data.
     name
         The folder, or its name under DISCOVER_DATA.
     out
@@ -44,15 +42,6 @@ def write_import_page(
     """Write the page on an imported folder into it; return its path, None if it cannot be read.
 
     A first study is written beside it unless there is one: that may have been changed by hand.
-
-    Parameters
-    ----------
-    folder
-        Just imported.
-    findings
-        Of its check.
-    said
-        What the import said of the files.
     """
     from discover.dataset.load import load_dataset
 

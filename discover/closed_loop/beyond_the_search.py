@@ -46,17 +46,7 @@ def beyond_the_search(
     explanations: Explanations,
     candidates: Sequence[AbstractEffect],
 ) -> Beyond:
-    """Return what is told beyond the effects that were found.
-
-    Parameters
-    ----------
-    final, constants
-        The final model on the runs, and its constants.
-    judgement, explanations
-        Of what the search chose, and how probable that is.
-    candidates
-        The effects among which was searched.
-    """
+    """Return what is told beyond the effects that were found."""
     if not final.carried:
         return Beyond(final.records)
     forms = _free_functions(final, constants, judgement)

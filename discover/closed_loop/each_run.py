@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,27 +11,46 @@ from discover.closed_loop.loop import run_loop
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Fold
-from discover.closed_loop.runs import MOST_SAMPLES
-from discover.closed_loop.search.checkpoint import Store
 from discover.dataset import Dataset
-from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
+from discover.progress import Progress, by_lines
+from discover.study.data import StudyData
+
+
+def run_loop_on(
+    data: StudyData,
+    declared: DeclaredModel,
+    progress: Progress | None,
+    max_effects: int,
+    **options: Any,
+) -> LoopResult:
+    """Close the loop on data that are divided, and judge it by the runs held out.
+
+    Parameters
+    ----------
+    data
+        Runs to fit, and those held out: some, or each in turn.
+    declared, max_effects, **options
+        As in `run_loop`.
+    progress
+        Called with a line of text now and then, and about what fraction is done.
+    """
+    rounds = 1 + len(data.fit) if data.each else 1
+    say = by_lines(progress, rounds * (max_effects + 1))
+    options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
+    if data.each:
+        return run_loop_on_each(data.dataset, declared, **options)
+    return run_loop(data.dataset, declared, held_out=data.held_out.names, **options)
 
 
 def run_loop_on_each(
     dataset: Dataset,
     declared: DeclaredModel,
     fit: Sequence[str] | None = None,
-    effects: Sequence[str | AbstractEffect] | str | None = None,
-    max_effects: int = 3,
-    strain: tuple[float, float] | None = None,
-    noise: float | None = None,
-    most_samples: int = MOST_SAMPLES,
     explanations: int = BEAM_WIDTH,
-    laws: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
-    store: Store | None = None,
+    **options: Any,
 ) -> LoopResult:
     """Close the loop on all runs, and judge it by loops that each leave one run out.
 
@@ -41,8 +61,7 @@ def run_loop_on_each(
 
     Parameters
     ----------
-    dataset, declared, effects, max_effects, strain, noise, most_samples, explanations, laws,
-    progress, store
+    dataset, declared, explanations, progress, **options
         As in `run_loop`.
     fit
         Names of the runs; by default all.
@@ -66,19 +85,13 @@ def run_loop_on_each(
             declared,
             fit=fitted,
             held_out=held_out,
-            effects=effects,
-            max_effects=max_effects,
-            strain=strain,
-            noise=noise,
-            most_samples=most_samples,
             # a loop that leaves a run out only judges what it found itself
             explanations=1 if held_out else explanations,
-            laws=laws,
             progress=lambda line: say(f"{prefix}: {line}"),
-            store=store,
             # the number of the run and not its name, which may hold anything
             name=f"search_{names.index(held_out[0])}" if held_out else "search",
             left_out_in_turn=not held_out,
+            **options,
         )
 
     whole = loop(names, (), "all runs")
@@ -104,13 +117,6 @@ def judged_by(whole: LoopResult, folds: Sequence[Fold]) -> LoopResult:
     A verdict is a claim about runs that nobody has seen, and only these loops had one. Of n, k of
     which fail, the next fails with probability (k + 1)/(n + 2), by Laplace's rule of succession;
     *none of these* is no less probable.
-
-    Parameters
-    ----------
-    whole
-        Of the loop on all runs.
-    folds
-        Of the loops that left one out.
     """
     against = sum(fold.verdict == "unexplained" for fold in folds)
     if whole.verdict not in ("effects_added", "no_effect_needed") or 2 * against <= len(folds):

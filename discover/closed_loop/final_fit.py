@@ -205,8 +205,6 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
 
     Parameters
     ----------
-    final
-        The final fit.
     apart
         What is known of each mode's constant where one for all modes explains the records.
     """

@@ -39,10 +39,6 @@ def stage_of(
 
     Parameters
     ----------
-    search
-        The finished search.
-    name
-        Name of the effect.
     bounds
         Intervals given the effects of the final model, and over all explanations.
     error
@@ -139,17 +135,7 @@ def with_shared_interval(by_mode: ConstantByMode, shared: StageParameter) -> Con
 def declared_parameters(
     declared: DeclaredModel, fit: Fit, bounds: tuple[Bounds, Bounds]
 ) -> dict[str, StageParameter]:
-    """Return the fitted constants of the declared model, in their units.
-
-    Parameters
-    ----------
-    declared
-        The declared model.
-    fit
-        The final fit.
-    bounds
-        Intervals given its effects, and over all explanations.
-    """
+    """Return the fitted constants of the declared model, in their units."""
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
     # of several modes only a common factor is fitted, which has no unit
     single = len(declared.modulus) == 1
@@ -176,15 +162,7 @@ def declared_parameters(
 def declared_effects(
     model: AugmentedModel, fit: Fit, bounds: Bounds, by_mode: Mapping[str, ConstantByMode]
 ) -> tuple[DeclaredEffect, ...]:
-    """Return the known effects with their values in the final model.
-
-    Parameters
-    ----------
-    model, fit, bounds
-        The final model, its fit and its intervals.
-    by_mode
-        Constants in each mode, of effects where they differ.
-    """
+    """Return the known effects with their values in the final model."""
     found = []
     for known in model.declared.effects:
         parameters: dict[str, KnownParameter | ConstantByMode] = {
@@ -198,15 +176,7 @@ def declared_effects(
 
 
 def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
-    """Return the declared law with its modes as fitted; None where it cannot be written out.
-
-    Parameters
-    ----------
-    declared
-        The declared model.
-    fit
-        The final fit.
-    """
+    """Return the declared law with its modes as fitted; None where it cannot be written out."""
     law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     try:
         named, terms = law_parts(law)
@@ -225,15 +195,7 @@ def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
 def states_of(
     model: AugmentedModel, fit: Fit, active: Sequence[str]
 ) -> tuple[StatePart, ...] | None:
-    """Return the states of the whole fluid; None where one of them cannot be written out.
-
-    Parameters
-    ----------
-    model, fit
-        The final model and its fit.
-    active
-        Names of the effects in it.
-    """
+    """Return the states of the whole fluid; None where one of them cannot be written out."""
     parts = []
     for effect in model.effects:
         if effect.name not in active or not isinstance(effect, StateEffect):
@@ -250,15 +212,7 @@ def states_of(
 
 
 def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> Fluid:
-    """Return the augmented fluid, without states that no law of one mode can carry.
-
-    Parameters
-    ----------
-    model, fit
-        The final model and its fit.
-    active
-        Names of the effects in it.
-    """
+    """Return the augmented fluid, without states that no law of one mode can carry."""
     declared = model.declared
     added = [
         (effect, jnp.asarray(fit.theta[model.positions(effect.name)]))

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from discover.closed_loop.each_run import run_loop_on_each
-from discover.closed_loop.loop import run_loop
+from discover.closed_loop.each_run import run_loop_on
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.progress import Progress, by_lines, checked
+from discover.progress import Progress, checked
 from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Loop
@@ -86,13 +85,8 @@ def close_loop(
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
     declared = forward_model(with_known(fluid, known_effects, free, by_mode))
-    rounds = (1 + len(divided.fit)) if divided.each else 1
-    say = by_lines(checked(progress), rounds * (asked.max_effects + 1))
-    options |= {"fit": divided.fit.names, "progress": say}
-    if divided.each:
-        result = run_loop_on_each(divided.dataset, declared, **options)
-    else:
-        result = run_loop(divided.dataset, declared, held_out=divided.held_out.names, **options)
+    options["max_effects"] = asked.max_effects
+    result = run_loop_on(divided, declared, checked(progress), **options)
     judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
     summary = (
         f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "

@@ -52,8 +52,6 @@ def choose_law(
         Modes, solvent and known effects, which every law shares.
     names
         Of the laws, keys of `LAWS`.
-    fitted, held_out
-        The runs.
     say
         Called with a line of text for each law.
     beside
@@ -132,15 +130,6 @@ def law_beside_effects(
 
     The first law was chosen while these effects were missing, and may have stood for a part of
     them: White–Metzner for a structure that flow breaks.
-
-    Parameters
-    ----------
-    declared, tried
-        As `choose_law` returned them.
-    search
-        The search that found the effects.
-    fitted, held_out, say
-        As in `choose_law`.
     """
     model = search.model
     found = [

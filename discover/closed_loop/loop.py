@@ -78,8 +78,6 @@ def run_loop(
 
     Parameters
     ----------
-    dataset
-        All runs.
     declared
         The model to start from.
     fit
@@ -210,17 +208,7 @@ def _remaining(
     spikes: Mapping[str, Sequence[float]],
     tested: tuple[Sequence[Run], Sequence[Run]],
 ) -> dict[str, Any]:
-    """Return what is left, as the contract names it.
-
-    Parameters
-    ----------
-    final, constants, verdict
-        The final model on the runs, its constants, and what is to be believed of it.
-    spikes
-        Times of outliers in s, by name of the run.
-    tested
-        The runs that were fitted, and those that test what was found.
-    """
+    """Return what is left, as the contract names it."""
     search, judgement, coarse = final.search, verdict.judgement, constants.coarse
     left = judgement.left
     summary = summarise(final.fit.residual, np.asarray(final.batch.weight))

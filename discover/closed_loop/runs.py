@@ -39,8 +39,6 @@ def split_runs(
 
     Parameters
     ----------
-    dataset
-        All runs.
     fit, held_out
         Names; by default all are fitted that are not held out.
     strain
@@ -100,17 +98,7 @@ def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iter
 def with_later_spikes(
     spikes: dict[str, list[float]], runs: Sequence[Run], judgement: Judgement
 ) -> dict[str, list[float]]:
-    """Return the times of all outliers: of those that the fit showed too.
-
-    Parameters
-    ----------
-    spikes
-        Times in s of those seen before the fit, by name of the run.
-    runs
-        The fitted runs.
-    judgement
-        What is left of them.
-    """
+    """Return the times of all outliers: of those that the fit showed too."""
     found = dict(spikes)
     for run, samples in zip(runs, judgement.left.outlier_samples, strict=True):
         if samples:
@@ -135,20 +123,7 @@ def _needed(run: Run, most: int) -> int:
 
 
 def require_samples(runs: Sequence[Run], declared: DeclaredModel) -> None:
-    """Refuse what any law would fit.
-
-    Parameters
-    ----------
-    runs
-        The runs to fit.
-    declared
-        The declared model, whose constants they must tell.
-
-    Raises
-    ------
-    InputError
-        If they hold too few samples for its constants.
-    """
+    """Refuse what any law would fit."""
     count, constants = sum(len(run) for run in runs), declared.free_constants
     if count < FEWEST_SAMPLES + constants:
         raise InputError(

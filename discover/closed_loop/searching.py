@@ -55,8 +55,6 @@ class SearchTask:
 
     Attributes
     ----------
-    candidates
-        The effects.
     fitted, held_out
         Runs to fit, and runs that only judge.
     noise
@@ -93,8 +91,6 @@ class SearchTask:
 
         Parameters
         ----------
-        declared
-            The declared model.
         laws
             Named laws to choose its law from; none where it is as declared.
 
@@ -182,15 +178,7 @@ class SearchTask:
 
 
 def _is_likelier(search: Search, other: Search, by: float = BARE_MENTION) -> bool:
-    """Return whether what one search found explains the runs better than what another did.
-
-    Parameters
-    ----------
-    search, other
-        Searches in the same runs.
-    by
-        Difference of the criterion that counts.
-    """
+    """Return whether what one search found explains the runs better than what another did."""
     effective = min(one.problem.independent_samples(one.fit) for one in (search, other))
     own, theirs = (one.problem.worth(one.fit, one.active, effective) for one in (search, other))
     return own < theirs - by

@@ -25,8 +25,6 @@ def find_instrument_effects(
     ----------
     search
         The search, before it adds anything; what is found is in it afterwards.
-    runs
-        The fitted runs.
     max_effects
         Largest number of effects found.
     say

@@ -22,7 +22,7 @@ from discover.comparison.outcomes.flows import (
     of_recorded,
     relative_errors,
 )
-from discover.comparison.outcomes.outcome import LearnerOutcome, plain
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.outcomes.range import Placement, place
 from discover.comparison.outcomes.truth import TrueTerm
 from discover.effects import KnownEffect
@@ -31,6 +31,7 @@ from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import Structure
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
+from discover.plain_json import plain
 from discover.statistics import FitVerdict
 
 
@@ -300,22 +301,7 @@ class Comparison(PageView, NotebookView):
         learners = {}
         for name, outcome in self.outcomes.items():
             learners[name] = {
-                "terms": [
-                    {
-                        "term": t.term,
-                        "coefficient": t.coefficient,
-                        "ci95": None if t.ci95 is None else list(t.ci95),
-                        "ci95_given_equal_modes": None
-                        if t.ci95_given_equal_modes is None
-                        else list(t.ci95_given_equal_modes),
-                        "coefficient_penalised": t.coefficient_penalised,
-                        "inner": dict(t.inner),
-                        "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},
-                        "inner_at_one": {k: list(v) for k, v in t.inner_at_one.items()},
-                        "latex": t.latex,
-                    }
-                    for t in outcome.terms
-                ],
+                "terms": outcome.terms,
                 "errors": self._errors(name, self.judged),
                 "errors_without_outliers": {
                     flow.name: {
@@ -331,12 +317,8 @@ class Comparison(PageView, NotebookView):
                 "training_errors": self._errors(name, self.flows_of("training")),
                 "intervals_hold": IN_LIBRARY if self.explanation.in_library else "no",
                 "constants": {
-                    key: {
-                        "value": constant.value,
-                        "ci95": None if constant.ci95 is None else list(constant.ci95),
-                        "unit": constant.unit,
-                    }
-                    for key, constant in outcome.constants.items()
+                    key: {"value": one.value, "ci95": one.ci95, "unit": one.unit}
+                    for key, one in outcome.constants.items()
                 },
                 "effects": [self._effect(known, outcome) for known in self.known_effects],
                 "train_seconds": outcome.train_seconds,
@@ -357,32 +339,27 @@ class Comparison(PageView, NotebookView):
                 who: [{"Wi": wi, "De": de, **row} for (wi, de), row in self.error_map(who).items()]
                 for who in ("before", *self.outcomes)
             },
-            "truth": None
-            if self.truth is None
-            else [
-                {"term": t.term, "coefficient": t.coefficient, "inner": dict(t.inner)}
-                for t in self.truth
-            ],
-            "stood_for_by_constants": list(self.stood_for),
-            "classical": {fit.law: fit.to_json() for fit in self.classical},
+            "truth": self.truth,
+            "stood_for_by_constants": self.stood_for,
+            "classical": {fit.law: fit for fit in self.classical},
             "by_mode": None
             if self.by_mode is None
             else {**self.by_mode.to_json(), "errors_by_quantity": self.errors_by_mode()},
-            "range": {flow.name: self.placement(flow).to_json() for flow in self.judged},
-            "rivals": [rival.to_json() for rival in self.rivals],
+            "range": {flow.name: self.placement(flow) for flow in self.judged},
+            "rivals": self.rivals,
             "undetermined": self.undetermined,
             "room_left": self.room_left,
             "told_by": self.told_by,
-            "warnings": list(self.warnings),
-            "statements": [statement.to_json() for statement in self.statements],
-            "structure": None if self.structure is None else self.structure.to_json(),
+            "warnings": self.warnings,
+            "statements": self.statements,
+            "structure": self.structure,
             "physics": self.physics,
             "sweep": [
                 {"law": p.law, "parameter": p.parameter, "value": p.value, "errors": p.errors()}
                 for p in self.sweep
             ],
-            "distillation": list(self.distillations),
-            "next_measurement": self.next_measurement.to_json(),
+            "distillation": self.distillations,
+            "next_measurement": self.next_measurement,
         }
         return plain(content)
 
@@ -392,7 +369,7 @@ class Comparison(PageView, NotebookView):
         parameters = {}
         for parameter, value in zip(known.effect.parameters, known.values, strict=True):
             fitted = outcome.constants.get(f"{known.name}.{parameter.name}")
-            limits = None if fitted is None or fitted.ci95 is None else list(fitted.ci95)
+            limits = None if fitted is None else fitted.ci95
             number = value if fitted is None else fitted.value
             parameters[parameter.name] = {"value": number, "ci95": limits, "unit": parameter.unit}
         return {"effect": known.name, "kind": known.effect.kind, "parameters": parameters}

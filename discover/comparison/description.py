@@ -10,13 +10,7 @@ from discover.study.schema import Study
 
 
 def data_in_words(data: StudyData, study: Study) -> str:
-    """Return what is fitted of which data.
-
-    Parameters
-    ----------
-    data, study
-        Of the comparison.
-    """
+    """Return what is fitted of which data."""
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
     # what is recorded beside σ12 is data of its own, and no other run
@@ -37,15 +31,7 @@ def _runs(number: int) -> str:
 
 
 def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:
-    """Return what was known before, and what was fitted along.
-
-    Parameters
-    ----------
-    declared
-        The model as the study declares it.
-    known, study
-        Of the comparison.
-    """
+    """Return what was known before, and what was fitted along."""
     model = known.before.model
     text = _law_and_modes(model, study)
     of_law = [name for name in declared.free if name not in MODE_CONSTANTS]

@@ -36,19 +36,7 @@ def known_equation(model: DeclaredModel) -> Equation | None:
 def outcome_equation(
     known: Equation, outcome: LearnerOutcome, flows: Sequence[Flow], study: str
 ) -> Equation:
-    """Return the known part with what a learner found.
-
-    Parameters
-    ----------
-    known
-        From `known_equation`.
-    outcome
-        What the learner found.
-    flows
-        Every flow of the comparison.
-    study
-        Name of the study.
-    """
+    """Return the known part with what a learner found."""
     who = learner_title(outcome.learner)
     who = f"the {who}" if outcome.learner == "tbnn_ude" else who
     found = tuple(EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in outcome.terms)

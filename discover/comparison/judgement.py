@@ -120,8 +120,6 @@ def judge(
         The study, the known part with the flows of the page, and the terms that were searched.
     own, frames
         What each learner found, and the frame in which it did.
-    seed
-        Of the draws.
     say
         Called with what is going on.
     undated

@@ -31,8 +31,6 @@ class Learning:
     ----------
     study
         Which learners, and with what options.
-    seed
-        Of the learners.
     store
         Where finished learners are kept and found again.
     made
@@ -53,13 +51,6 @@ class Learning:
         """Return what each learner finds, those of this package side by side.
 
         Whether another one may share a process with threads is not known, so they come after.
-
-        Parameters
-        ----------
-        learners
-            Their names.
-        known, progress
-            As in `outcome`.
         """
         if known.along is not None:
             _ = known.along.twins  # once, and not in every thread
@@ -86,8 +77,6 @@ class Learning:
 
         Parameters
         ----------
-        learner
-            Its name.
         known
             The known part, and the flows of the page.
         progress
@@ -141,18 +130,7 @@ def _told_of_constants(found: Learned) -> LearnerResult:
 
 
 def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
-    """Return the law, the value and the study of each point of a sweep.
-
-    Parameters
-    ----------
-    study
-        The study.
-
-    Raises
-    ------
-    InputError
-        If the study cannot be swept so.
-    """
+    """Return the law, the value and the study of each point of a sweep."""
     sweep, synthetic = study.compare.sweep, study.data.synthetic
     if sweep is None:
         return []
@@ -177,18 +155,7 @@ def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
 
 
 def require_teacher(study: Study) -> None:
-    """Refuse a distillation where no law made the data.
-
-    Parameters
-    ----------
-    study
-        The study.
-
-    Raises
-    ------
-    InputError
-        If it asks for one.
-    """
+    """Refuse a distillation where no law made the data."""
     if study.compare.distillation and study.data.synthetic is None:
         raise InputError(
             "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
@@ -199,17 +166,7 @@ def require_teacher(study: Study) -> None:
 def distilled(
     study: Study, truth: Fluid | None, store: RunFolder | None, progress: Progress
 ) -> list[dict[str, Any]]:
-    """Return what the law that made the data teaches each other law, where that is asked for.
-
-    Parameters
-    ----------
-    study, truth
-        The study, and the fluid that made its data.
-    store
-        Where the answer is kept and found again.
-    progress
-        Called with what is going on and the fraction done.
-    """
+    """Return what the law that made the data teaches each other law, where that is asked for."""
     if not study.compare.distillation:
         return []
     assert truth is not None

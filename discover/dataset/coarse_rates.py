@@ -101,9 +101,12 @@ def significant_samples(count: float) -> str:
     return f"{count:.0f}" if count >= 10.0 else f"{count:.2g}"
 
 
-def of_json(found: Mapping[str, Any]) -> CoarseRates:
-    """Return what `CoarseRates.to_json` wrote."""
-    return CoarseRates(found["change"], found["left"], found["shifts"], found["runs"])
+def coarse_in(found: Mapping[str, Any] | None) -> CoarseRates | None:
+    """Return what `CoarseRates.to_json` wrote; None where that is nothing, or too small to tell."""
+    if not found:
+        return None
+    coarse = CoarseRates(found["change"], found["left"], found["shifts"], found["runs"])
+    return coarse if coarse.is_coarse else None
 
 
 def samples_a_cycle(time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]) -> float | None:
@@ -121,13 +124,5 @@ def samples_a_cycle(time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
 
 
 def worth_a_look(unknown: Sequence[float], left: float) -> bool:
-    """Return whether what is unknown of rates may matter beside what a law leaves.
-
-    Parameters
-    ----------
-    unknown
-        Of each run, as from `unknown_between_samples`.
-    left
-        Relative misfit.
-    """
+    """Return whether what is unknown of rates may matter beside what a law leaves."""
     return max(unknown, default=0.0) > _NEGLIGIBLE * left

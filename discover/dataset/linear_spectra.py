@@ -23,13 +23,7 @@ Values = Float[np.ndarray, " n"]
 
 
 def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
-    """Return the modes of a linear test, the fewest that fit nearly as well as any.
-
-    Parameters
-    ----------
-    test
-        A sweep, a relaxation modulus or a creep compliance.
-    """
+    """Return the modes of a linear test, the fewest that fit nearly as well as any."""
     if test.kind == SWEEP:
         return relaxation_spectrum(test.sweep)
     fit = _from_relaxation if test.kind == RELAXATION else _from_creep

@@ -31,13 +31,7 @@ DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
 
 
 def folder_roots(base: str | Path | None = None) -> list[Path]:
-    """Return the folders in which a data folder is looked for, in their order.
-
-    Parameters
-    ----------
-    base
-        Folder of the study file, if there is one.
-    """
+    """Return the folders in which a data folder is looked for, in their order."""
     return [Path(root) for root in (base, os.environ.get(DATA_VARIABLE), ".") if root]
 
 

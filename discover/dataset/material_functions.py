@@ -36,17 +36,10 @@ def read_material_functions(
 
     Parameters
     ----------
-    root
-        The folder.
     runs
         Files that ``runs.csv`` names: they are runs, whatever they are called.
     frequency
         In rad/s, of an amplitude sweep that does not give its own.
-
-    Raises
-    ------
-    InputError
-        If a file is wrong.
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():
@@ -129,8 +122,6 @@ def read_over_time(
 
     Parameters
     ----------
-    path
-        Of the table.
     kind
         ``relaxation``, in Pa, or ``creep``, in 1/Pa.
 
@@ -159,15 +150,7 @@ def _amplitude_sweep(table: Table) -> Run:
 
 
 def linear_sweep_as_run(sweep: LinearSweep, name: str = "lve.csv") -> Run:
-    """Return a linear sweep as a run: oscillations of a strain of `LINEAR_STRAIN`.
-
-    Parameters
-    ----------
-    sweep
-        G′ and G″.
-    name
-        Of the run.
-    """
+    """Return a linear sweep as a run: oscillations of a strain of `LINEAR_STRAIN`."""
     strain = np.full(len(sweep), LINEAR_STRAIN)
     moduli = sweep.storage_modulus, sweep.loss_modulus
     what = f"linear sweep, at a strain of {LINEAR_STRAIN:g}"
@@ -229,10 +212,5 @@ def as_compared(runs: Iterable[Run]) -> list[Run]:
     Where the stress is imposed, it is imposed on every law, and the strain is what is observed: a
     rate derived from a noisy strain errs smoothly, which looks like a missing term. Oscillations
     become a record of each modulus; a flow curve stays what it is.
-
-    Parameters
-    ----------
-    runs
-        Of any control.
     """
     return [record for run in runs for record in run.records]

@@ -132,15 +132,7 @@ def lay_over(
 
 
 def _longest(pairs: list[_Pair], up: bool) -> float | None:
-    """Return log a_T of the longest overlap of those that agree best; None if none agree.
-
-    Parameters
-    ----------
-    pairs
-        Of each kind.
-    up
-        Whether log b_T is free.
-    """
+    """Return log a_T of the longest overlap of those that agree best; None if none agree."""
 
     def misfit(shift: float) -> tuple[float, float]:
         used = _overlapping(pairs, shift)
@@ -166,11 +158,6 @@ def overlap_misfit(cold: LinearTest, warm: LinearTest) -> float | None:
     """Return the root-mean-square relative misfit of two tests where they overlap.
 
     Samples count as they do in the fit; None where too few overlap.
-
-    Parameters
-    ----------
-    cold, warm
-        Both moved to the reference.
     """
     pair = _pair(cold, warm, "")
     rows = pair.inside(0.0)

@@ -38,13 +38,6 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
 
     The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion to
     each value and of which each decade counts, the value itself.
-
-    Parameters
-    ----------
-    values
-        A quantity recorded in the flow.
-    protocol
-        Of the flow.
     """
     size = np.full(len(values), np.sqrt(np.mean(values**2)))
     if protocol.control in STATES:
@@ -334,13 +327,7 @@ def same_samples(one: Run, other: Run) -> bool:
 
 
 def require_signal(runs: Sequence[Run]) -> None:
-    """Refuse runs of which none can teach a law.
-
-    Raises
-    ------
-    InputError
-        If nothing flows in any of them, or no stress is anything but zero.
-    """
+    """Refuse runs of which none can teach a law."""
     names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")
     if runs and not any(run.flows for run in runs):
         raise InputError(

@@ -21,11 +21,6 @@ def run_line(run: Run) -> dict[str, Any]:
 
     Frequency (rad/s) and strain amplitude are there for oscillations alone. They are read off the
     shear rate at the samples, so that commanded and measured rates are treated alike.
-
-    Parameters
-    ----------
-    run
-        The run.
     """
     flow = _flow(run)
     wave = oscillation(run) if flow in (_VARYING, "given stress") else None
@@ -46,13 +41,7 @@ def run_line(run: Run) -> dict[str, Any]:
 
 
 def kind_of_record(run: Run) -> str:
-    """Return the kind of test and, of a normal stress difference, which one was recorded.
-
-    Parameters
-    ----------
-    run
-        The run.
-    """
+    """Return the kind of test and, of a normal stress difference, which one was recorded."""
     kind = run_line(run)["flow"]
     return f"{kind}, {run.quantity}" if run.quantity in ("N1", "N2") else kind
 

@@ -24,8 +24,6 @@ def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple
 
     Parameters
     ----------
-    runs
-        Runs on one sample.
     order
         Start times, or any numbers in the order of the runs; runs of equal number are parallel.
     """

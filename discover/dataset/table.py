@@ -39,8 +39,6 @@ class Table:
     ----------
     name
         Name of the file, for messages.
-    columns
-        Text of every column.
     lines
         Line of the file on which each row stands; blank lines count but are no rows.
     """
@@ -146,8 +144,6 @@ def read_bytes(
 
     Parameters
     ----------
-    path
-        The file.
     name
         Its name in messages.
     if_missing
@@ -195,8 +191,6 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
 
     Parameters
     ----------
-    path
-        The file.
     name
         Its name in messages; the file's own by default.
     if_missing

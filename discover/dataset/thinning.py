@@ -125,8 +125,6 @@ def thin_run(run: Run, most: int) -> Run:
 
     Parameters
     ----------
-    run
-        The run.
     most
         How many samples may stay, 2 or more.
     """

@@ -33,8 +33,6 @@ def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]
 
     Parameters
     ----------
-    path
-        The file.
     kind
         What it should be, for messages, such as "study file".
     example

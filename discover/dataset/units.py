@@ -129,13 +129,6 @@ def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
     """Return the column that holds a quantity and its factor to SI, or None if there is none.
 
-    Parameters
-    ----------
-    names
-        Columns of the file.
-    quantity
-        What is looked for.
-
     Raises
     ------
     InputError

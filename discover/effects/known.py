@@ -18,8 +18,6 @@ class KnownEffect:
 
     Attributes
     ----------
-    effect
-        The effect.
     values
         Of its parameters, in their units and order; None where one is to be fitted.
     """

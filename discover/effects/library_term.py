@@ -12,13 +12,7 @@ _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
 
 @dataclass(frozen=True)
 class LibraryTerm(ConstitutiveEffect):
-    """Adds c · term to the law, for one candidate term of the tensor library.
-
-    Attributes
-    ----------
-    term
-        The term.
-    """
+    """Adds c · term to the law, for one candidate term of the tensor library."""
 
     term: CandidateTerm = None  # type: ignore[assignment]  # fields of the base have defaults
 

@@ -100,13 +100,7 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
 
 
 def make_effect(name: str) -> AbstractEffect:
-    """Return the effect of this name, or the effect that adds the library term so spelled.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Return the effect of this name, or the effect that adds the library term so spelled."""
     effects = named_effects()
     if name in effects:
         return effects[name]

@@ -20,10 +20,6 @@ class AugmentedLaw(AbstractExtendedLaw):
     ----------
     base
         The declared law.
-    values
-        Parameters of each effect.
-    effects
-        The effects.
     linear_relaxation
         As in the declared law.
     """
@@ -73,11 +69,6 @@ class AugmentedLaw(AbstractExtendedLaw):
 
         None where no law with a name has the term of the effect alone, with its amplitude for the
         only constant, as Giesekus's law has its mobility; or where the declared law has terms.
-
-        Parameters
-        ----------
-        name
-            Of the effect.
         """
         effects = [effect.name for effect in self.effects]
         if name not in effects or self.base.as_terms() != ():

@@ -14,13 +14,7 @@ EXPONENTIAL = f"{CLOSED_FORMS.present['exp'].spelling}*sigma"
 
 
 def law_terms(law: AbstractConstitutiveLaw) -> tuple[EquationTerm, ...]:
-    """Return h of a law as a sum of terms.
-
-    Raises
-    ------
-    InputError
-        If the law is no such sum.
-    """
+    """Return h of a law as a sum of terms."""
     shares = law.as_terms()
     if shares is None:
         raise InputError(
@@ -53,15 +47,8 @@ def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[Equati
 
     Parameters
     ----------
-    effect
-        The effect.
     values
         Its parameters in their order, shape (p,).
-
-    Raises
-    ------
-    InputError
-        If what it adds is no such sum.
     """
     shares = effect.as_terms([float(value) for value in values])
     if shares is None:

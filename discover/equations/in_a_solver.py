@@ -61,11 +61,6 @@ def in_a_solver(equation: Equation) -> InASolver | None:
     Each mode goes through start-up of shear at the largest Wi, and through oscillation at the
     largest Wi and the least and the largest De. A step is stable where |1 + Δt μ| ≤ 1 for every
     eigenvalue μ of the linearised stress equation that decays.
-
-    Parameters
-    ----------
-    equation
-        The law.
     """
     if equation.tested is None or equation.states:
         return None

@@ -101,8 +101,6 @@ def term_mathml(
 
     Parameters
     ----------
-    name
-        Canonical spelling.
     inner
         Inner parameters by name; one that is missing stays a letter.
     coefficient

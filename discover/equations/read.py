@@ -45,13 +45,7 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
 
 
 def choose_law(laws: dict[str, Equation], name: str | None = None) -> Equation:
-    """Return the law of this name; without one the sparse learner's, or the only one.
-
-    Raises
-    ------
-    InputError
-        If there is no such law.
-    """
+    """Return the law of this name; without one the sparse learner's, or the only one."""
     if name is None:
         return laws.get("tensor_sindy") or next(iter(laws.values()))
     if name not in laws:
@@ -81,13 +75,7 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
 
 
 def read_json(path: Path) -> Any:
-    """Return what a JSON file of results holds.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """Return what a JSON file of results holds."""
     try:
         return json.loads(read_bytes(path, path.name))
     except RecursionError:

@@ -132,8 +132,6 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
 
     Parameters
     ----------
-    equation
-        The law.
     tolerance
         Relative deviation from a form of rheoTool's that is passed over.
 
@@ -204,17 +202,10 @@ def rheotool_text(
 
     Parameters
     ----------
-    equation
-        The law.
     density_kg_m3
         rheoTool's solvers want a density; shear rheometry does not measure it.
     tolerance
         As in `rheotool_model`.
-
-    Raises
-    ------
-    InputError
-        If rheoTool has no such law.
     """
     if equation.states:
         raise InputError(

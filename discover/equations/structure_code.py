@@ -85,8 +85,6 @@ def structure_fields(equation: Equation, notation: Any, language: str) -> dict[s
 
     Parameters
     ----------
-    equation
-        The law.
     notation
         How a text in Python writes scalars.
     language
@@ -135,8 +133,6 @@ def stepped(equation: Equation, variables: int) -> dict[str, str]:
 
     Parameters
     ----------
-    equation
-        The law.
     variables
         How many structure variables each mode has.
     """

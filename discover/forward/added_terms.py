@@ -104,15 +104,7 @@ class AddedTerms:
         used: InUse,
         amplitudes: Mapping[str, Float[Array, " k"]] | None = None,
     ) -> ModesRate:
-        """Return the function that sums what is in use, dimensionless.
-
-        Parameters
-        ----------
-        theta, used
-            The parameters, and the branches that they take.
-        amplitudes
-            Of each mode, of effects in which they differ.
-        """
+        """Return the function that sums what is in use, dimensionless."""
         library = self._library_rate(theta, used) if self._library.tensors else _nothing
         others = self._others_rate(theta, used, amplitudes or {}) if self._others else _nothing
 

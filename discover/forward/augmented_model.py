@@ -37,8 +37,6 @@ class AugmentedModel:
 
     Parameters
     ----------
-    declared
-        The declared model.
     effects
         Candidates; their parameters follow one another in the vector, after the declared ones.
         Those that the declared model knows follow, if they are not among them, and last the

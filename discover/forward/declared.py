@@ -158,11 +158,6 @@ class DeclaredModel:
             What to fit: parameters of the law, ``modulus_Pa``, ``relaxation_time_s``.
         **options
             Other attributes.
-
-        Raises
-        ------
-        InputError
-            If the law or a parameter is not as it should be.
         """
         law = make_law(law_name, parameters)
         ranges = LAWS[law_name].parameters

@@ -32,8 +32,6 @@ class Series(NamedTuple):
 
     Attributes
     ----------
-    slip, compliance
-        Constants.
     slip_by_stress
         What slip is beyond that at a stress in Pa; None for nothing.
     """

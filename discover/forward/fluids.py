@@ -25,6 +25,7 @@ from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol, recorded_at
 from discover.simulate.flow_batch import FlowBatch, lay_out
+from discover.simulate.following import without_derivatives
 from discover.simulate.grid import IntegrationGrid
 from discover.simulate.solve import (
     SimulationError,
@@ -62,15 +63,7 @@ class AtSamples(NamedTuple):
 
 
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
-    """Return what is seen of a fluid in one flow. Not finite where it runs away.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    protocol, grid
-        Of one run, from `lay_out`.
-    """
+    """Return what is seen of a fluid in one flow. Not finite where it runs away."""
     if protocol.control in FOLLOWED:
         states = solve_states_on_grid(fluid, protocol, grid)
         rate = jax.vmap(protocol.rate)(grid.sample_times)
@@ -83,15 +76,7 @@ def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> A
 def observed_on_grid(
     fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, adjoint: Any = None
 ) -> Inexact[Array, "n 3"]:
-    """Return what `AtSamples.observed` holds, at the samples of one grid.
-
-    Parameters
-    ----------
-    fluid, protocol, grid
-        As in `at_samples`.
-    adjoint
-        As in `solve_on_grid`, at a given rate.
-    """
+    """Return what `AtSamples.observed` holds, at the samples of one grid."""
     if protocol.control in FOLLOWED:
         return _observed(solve_on_grid(fluid, protocol, grid, adjoint), protocol)
     return at_samples(fluid, protocol, grid).observed
@@ -99,15 +84,7 @@ def observed_on_grid(
 
 @compiled
 def observed_in_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 3"]:
-    """Return what is recorded of one fluid in a batch of runs, and N1 and N2.
-
-    Parameters
-    ----------
-    fluid
-        The fluid, shared by all runs.
-    flows
-        From `lay_out`.
-    """
+    """Return what is recorded of one fluid in a batch of runs, and N1 and N2."""
     return flows.over(partial(observed_on_grid, fluid))
 
 
@@ -122,11 +99,6 @@ def observe(
     ----------
     fluid, protocol, times
         As in `simulate`.
-
-    Raises
-    ------
-    SimulationError
-        If the fluid runs away.
     """
     if protocol.control in FOLLOWED:
         stress = simulate(fluid, protocol, times)
@@ -162,11 +134,11 @@ def solved_on_grid(
     numbers
         A tree.
     protocol, grid
-        As in `at_samples`.
+        Of one run, from `lay_out`.
     together
         Whether the samples are of use only together, and not one is solved for once another cannot.
     """
-    dynamics, fixed = make(numbers), make(_fixed(numbers))
+    dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
         return _at_given_stress(dynamics, fixed, protocol, grid)
 
@@ -203,12 +175,6 @@ def solved_on_grid(
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[of_sample], found)
 
 
-def _fixed(numbers: Numbers) -> Numbers:
-    """Return a tree through which no derivative passes."""
-    arrays, rest = eqx.partition(numbers, eqx.is_array)
-    return eqx.combine(jax.lax.stop_gradient(arrays), rest)
-
-
 def _at_given_stress(
     dynamics: Dynamics, fixed: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> AtSamples:
@@ -226,15 +192,7 @@ def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Arra
 
 
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
-    """Return a fluid as the integrators take it.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    protocol
-        Which flow it is.
-    """
+    """Return a fluid as the integrators take it."""
     dynamics = dynamics_of_modes(
         fluid.law.stress_rate,
         fluid.modulus,
@@ -272,8 +230,6 @@ def dynamics_of_modes(
         Dimensionless dσ/dt of a mode, of its σ and its λL.
     modulus, relaxation_time, solvent_viscosity
         In Pa, s and Pa s.
-    protocol
-        Which flow it is.
     variables
         Structure variables of each mode.
     """

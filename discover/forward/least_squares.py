@@ -59,8 +59,6 @@ class Fit:
 
     Attributes
     ----------
-    theta
-        All parameters.
     free
         Positions of the fitted ones.
     residual
@@ -285,15 +283,7 @@ def intervals(
 def uncertainty(
     batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
 ) -> tuple[Float[np.ndarray, "free free"], float]:
-    """Return the covariance of fitted parameters, and how many deviations hold 95 %.
-
-    Parameters
-    ----------
-    batch
-        The fitted runs.
-    residual, jacobian
-        Weighted residuals of the fit, and their derivatives in the parameters.
-    """
+    """Return the covariance of fitted parameters, and how many deviations hold 95 %."""
     covariance, noise = covariance_and_noise(batch, residual, jacobian)
     independent = max(noise.effective_samples - len(jacobian), 1.0)
     return covariance, float(student.ppf(0.975, independent))
@@ -302,10 +292,7 @@ def uncertainty(
 def covariance_and_noise(
     batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
 ) -> tuple[Float[np.ndarray, "free free"], NoiseModel]:
-    """Return the covariance of fitted parameters, and the noise that it rests on.
-
-    Parameters as in `uncertainty`.
-    """
+    """Return the covariance of fitted parameters, and the noise that it rests on."""
     design = jacobian.reshape(len(jacobian), -1).T
     sequences, sizes = sequences_of(batch)
     covariance, _, noise = least_squares_covariance(

@@ -17,13 +17,6 @@ def modulus_shifts(
     """Return the change of the weighted residuals with each independent error of the moduli.
 
     An error of each has unit variance. Empty where the moduli are exact.
-
-    Parameters
-    ----------
-    model, theta
-        The model and its parameters.
-    batch
-        The runs.
     """
     declared = model.declared
     if declared.modulus_covariance is None:
@@ -40,15 +33,7 @@ def modulus_shifts(
 def response(
     jacobian: Float[np.ndarray, "free runs n"], shifts: Float[np.ndarray, "k runs n"]
 ) -> Float[np.ndarray, "free k"]:
-    """Return by how much fitted parameters come out wrong with each error of the moduli.
-
-    Parameters
-    ----------
-    jacobian
-        Derivatives of the weighted residuals in the fitted parameters.
-    shifts
-        From `modulus_shifts`, of the same runs.
-    """
+    """Return by how much fitted parameters come out wrong with each error of the moduli."""
     design = jacobian.reshape(len(jacobian), -1).T
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)

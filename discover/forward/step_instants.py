@@ -36,13 +36,6 @@ def with_places(
 
     Of more than `_MOST` those with the largest change of strain are fitted, and a straight line
     stands for each of the others. What else a fitted run recorded shares its instants.
-
-    Parameters
-    ----------
-    declared
-        The declared model.
-    fitted, held_out
-        Runs that name their steps.
     """
     largest: dict[tuple[str, float], float] = {}
     for run in fitted:
@@ -75,13 +68,6 @@ def with_own_instants(
 
     The constants stay as they are. A model that cannot be integrated through them leaves the runs
     as they were.
-
-    Parameters
-    ----------
-    model, theta
-        A model and its parameters.
-    runs
-        The runs.
     """
     rows = [i for i, run in enumerate(runs) if any(s.place is None for s in run.rate_steps)]
     if not rows:
@@ -139,15 +125,7 @@ def instants_found(
     runs: Sequence[Run],
     held_out: Sequence[Run],
 ) -> dict[str, list[dict[str, Any]]]:
-    """Return the instants as JSON-able values, by name of the run.
-
-    Parameters
-    ----------
-    model, fit, bounds
-        The final model, its fit, and the 95 % interval of each fitted constant by position.
-    runs, held_out
-        Runs with steps; those held out with the instants found.
-    """
+    """Return the instants as JSON-able values, by name of the run."""
     found: dict[str, list[dict[str, Any]]] = {}
     for run in (*runs, *held_out):
         for step in run.rate_steps:

@@ -36,17 +36,6 @@ def constants_by_mode(
 
     The interval of a mode, and that at the mean time, holds that of the chosen degree and that of
     one degree more, where there is one.
-
-    Parameters
-    ----------
-    model, batch, fit
-        The model, the fitted runs and the fit.
-    bounds
-        95 % interval of each fitted parameter, by position.
-    degrees
-        Degree of each constant by mode.
-    wider
-        From `fits_of_one_degree_more`.
     """
     found = {}
     times = model.declared.relaxation_time * np.exp(fit.theta[1])

@@ -49,13 +49,6 @@ def choose_degrees(
     One constant after the other: all degrees are fitted, each from the best of the lower one, and
     the lowest is taken of those about as strong as the strongest (`BARE_MENTION`). Of k modes no
     more than k constants are to be had, so the degree ends at k − 1.
-
-    Parameters
-    ----------
-    problem, fit
-        What is fitted to what, and a fit with the degrees so far.
-    degrees
-        By name of the constant.
     """
     model, chosen = problem.model, dict(degrees)
     alone = replace(problem, n_candidates=1)  # a degree is not chosen among the candidates

@@ -24,8 +24,6 @@ class ConstantsDrawn:
 
     Attributes
     ----------
-    names
-        Of the constants.
     values
         Shape (draws, constants, k). Each group begins with the fit that it is drawn about.
     sizes
@@ -51,19 +49,6 @@ def draw_constants(
     Of the fit itself, and of one with one degree more for each constant that may have it, as
     intervals hold both. None where a constant stands at an end of its range, from where no first
     order leads anywhere.
-
-    Parameters
-    ----------
-    problem, fit
-        What is fitted to what, and the final fit.
-    degrees
-        Degree of each constant by mode.
-    wider
-        From `fits_of_one_degree_more`.
-    n_draws
-        About each fit.
-    seed
-        Of the draws.
     """
     constants = varying_constants(problem.model, fit, degrees)
     if not constants:

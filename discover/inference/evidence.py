@@ -43,8 +43,6 @@ def evidence(
     effective_samples
         One number for all candidates that are compared: counted on each one's own residual, the
         worst fit with the whitest residual could win.
-    n_candidates
-        Number of candidates.
     n_effects
         How many were chosen among them.
     """

@@ -24,15 +24,6 @@ def product_or_ratio(
 ) -> tuple[bool, float, tuple[float, float]] | None:
     """Return what hardly changes where two constants go far; None if nothing is so.
 
-    Parameters
-    ----------
-    batch, fit
-        The fitted runs and the fit.
-    possible
-        Constants that these data do not exclude, from `discover.inference.profile`.
-    first, second
-        Positions of the two.
-
     Returns
     -------
     Whether it is the ratio, first over second, and not the product; its value; its 95 % interval,

@@ -47,8 +47,6 @@ class VaryingConstant:
 
         Parameters
         ----------
-        fit
-            The fit.
         shift
             By how much, shape (k,) or ().
         """
@@ -61,15 +59,7 @@ class VaryingConstant:
         return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
 
     def gradient(self, fit: Fit, degree: int) -> Float[np.ndarray, "k free"] | None:
-        """Return the derivative of each mode's link in what was fitted; None at an end of a range.
-
-        Parameters
-        ----------
-        fit
-            The fit.
-        degree
-            How many coefficients in log λ are free in it.
-        """
+        """Return the slope of each mode's link in what was fitted; None at an end of a range."""
         slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
         if not np.isfinite(slope):
             return None
@@ -85,11 +75,6 @@ class VaryingConstant:
         """Return the 95 % interval of each mode, and half its width on the link's scale.
 
         To first order there, so that it keeps the range.
-
-        Parameters
-        ----------
-        batch, fit, degree
-            The fitted runs, the fit, and how many coefficients in log λ are free in it.
         """
         covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
         gradient = self.gradient(fit, degree)
@@ -103,15 +88,7 @@ class VaryingConstant:
 def varying_constants(
     model: AugmentedModel, fit: Fit, degrees: Mapping[str, Degree]
 ) -> dict[str, VaryingConstant]:
-    """Return the constants by mode that a fit has.
-
-    Parameters
-    ----------
-    model, fit
-        The model and the fit.
-    degrees
-        Degree of each constant by mode.
-    """
+    """Return the constants by mode that a fit has."""
     declared, found = model.declared, {}
     modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
     places = np.asarray(decades(modulus, time))
@@ -134,15 +111,6 @@ def fits_of_one_degree_more(
 
     Evidence for the lower degree does not say that the next coefficient is zero. A constant of the
     highest degree has none, nor has one whose fit is not usable.
-
-    Parameters
-    ----------
-    model, batch, fit
-        The model, the fitted runs and the fit.
-    degrees
-        Degree of each constant by mode.
-    prior
-        What is known of some parameters.
     """
     found = {}
     for name, constant in varying_constants(model, fit, degrees).items():

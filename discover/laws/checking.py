@@ -11,11 +11,6 @@ def check_law(law: AbstractConstitutiveLaw) -> None:
     """Check that a law gives a rate of stress with as many components as the stress.
 
     A term of another shape would be spread over all components without a word.
-
-    Raises
-    ------
-    InputError
-        If it does not, or cannot be computed.
     """
     name = type(law).__name__
     stress, rate = law.rest(), jnp.zeros(())

@@ -27,8 +27,6 @@ class LibraryExpansion(AbstractExtendedLaw):
         cₙ, one for each term; a zero leaves the term out without recompiling anything.
     inner
         Inner parameters in the order of ``library.inner_names``.
-    library
-        The terms.
     base
         A known law whose extra term is added, or None.
     """
@@ -79,8 +77,6 @@ def law_of_terms(
     ----------
     names, coefficients
         The terms; none means h = 0.
-    inner
-        Inner parameters by name.
     linear_relaxation
         Whether −σ is part of the known law.
     base

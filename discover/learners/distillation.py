@@ -66,8 +66,6 @@ class Student:
         Makes the law from its parameters, in the order of `bounds`.
     bounds
         Name and admissible range of each parameter.
-    start
-        Where the fit starts.
     latex
         The law with ``%s`` where each parameter's value goes.
     more_starts
@@ -143,11 +141,6 @@ def student_of(law: str) -> Student:
     ----------
     law
         Key of `STUDENTS` or of `LAWS`.
-
-    Raises
-    ------
-    InputError
-        If there is no such law, or it has no constant.
     """
     if law in STUDENTS:
         return STUDENTS[law]
@@ -179,8 +172,6 @@ class Distillation:
 
     Attributes
     ----------
-    student
-        Its name.
     penalised, debiased
         Parameters by name, with the penalty and without.
     penalty

@@ -30,17 +30,6 @@ def write_estimator(
 ) -> Path:
     """Write an estimator to a file, replacing it whole or not at all.
 
-    Parameters
-    ----------
-    path
-        The file.
-    learner
-        Name of the learner.
-    parameters, fitted
-        What it was made with, and the attributes of the fit, by name.
-    types
-        Dataclasses that may occur in them.
-
     Raises
     ------
     InputError
@@ -69,11 +58,6 @@ def write_estimator(
 
 class EstimatorFile:
     """What a file written by `write_estimator` holds.
-
-    Parameters
-    ----------
-    path
-        The file.
 
     Attributes
     ----------
@@ -109,13 +93,7 @@ class EstimatorFile:
         self.learner = str(self._header.get("learner"))
 
     def read(self, types: Sequence[type]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the parameters and the fitted attributes, by name.
-
-        Parameters
-        ----------
-        types
-            Dataclasses that may occur in them.
-        """
+        """Return the parameters and the fitted attributes, by name."""
         reader = PlainReader(types, self._arrays)
         try:
             parameters, fitted = (

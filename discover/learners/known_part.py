@@ -129,20 +129,7 @@ def _same(value: Any, default: Any) -> bool:
 
 
 def require_known_rate(known: KnownPart, runs: Sequence[Run]) -> None:
-    """Refuse runs without a rate beside a known law that carries more than its stress.
-
-    Parameters
-    ----------
-    known
-        What the learner is told.
-    runs
-        What it is to learn from.
-
-    Raises
-    ------
-    InputError
-        If there is such a run.
-    """
+    """Refuse runs without a rate beside a known law that carries more than its stress."""
     if known.law is None or not (known.law.variables or known.law.retracts):
         return
     for run in runs:

@@ -20,13 +20,6 @@ _FACTOR = 1.96  # of a normal distribution, where intervals have Student's
 def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
     """Return draws of the coefficients of a law's terms, dimensions chain, draw and term.
 
-    Parameters
-    ----------
-    estimator
-        A fitted `TensorSINDy` or `TensorDense`.
-    seed
-        Of the draws.
-
     Raises
     ------
     InputError

@@ -124,8 +124,6 @@ class PlainReader:
     ----------
     types
         The dataclasses that may occur.
-    arrays
-        The arrays by name.
     """
 
     def __init__(self, types: Sequence[type], arrays: Mapping[str, np.ndarray]):

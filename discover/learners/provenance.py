@@ -43,8 +43,6 @@ def provenance_of(data: Any, runs: Sequence[Run]) -> Provenance:
     ----------
     data
         What the user gave: a data set, whose name is kept, or anything else.
-    runs
-        The runs.
     """
     return Provenance(
         str(getattr(data, "name", "")),

@@ -28,13 +28,6 @@ def rough_limits(
     Steps grow after a change of the rate, up to a strain of one. Where the fine grid follows the
     fastest relaxation, and else where it follows the slowest, so does the rough one: in steps of
     many relaxation times a law that relaxes faster than the known one runs away.
-
-    Parameters
-    ----------
-    flows
-        On the fine grid.
-    relaxation_time
-        Of the modes, in s.
     """
     controls = {protocols.control for protocols, _ in flows.parts}
     if not controls <= {"rate", *STATES}:

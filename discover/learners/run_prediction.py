@@ -1,19 +1,22 @@
-"""What every learner does with runs once it has a fluid: predict them, and be scored on them."""
+"""What every learner does with runs: take them, and once it has a fluid predict them."""
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Float
+from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.learners.estimator_file import EstimatorFile, write_estimator
-from discover.learners.provenance import Provenance
+from discover.learners.known_part import KnownPart, known_part, require_known_rate
+from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.runs import as_runs
+from discover.learners.settings import check_settings
 
 if TYPE_CHECKING:
     import xarray
@@ -22,9 +25,13 @@ if TYPE_CHECKING:
     from discover.laws.multimode import Fluid
     from discover.learners.result import LearnerResult
 
+_Learner = TypeVar(
+    "_Learner", bound="RunPrediction"
+)  # not Self, which the tests' hook cannot check
 
-class RunPrediction:
-    """What is common to estimators once they are fitted: prediction, score, law, file."""
+
+class RunPrediction(RegressorMixin, BaseEstimator):
+    """What is common to estimators: what they are fitted to, prediction, score, law, file."""
 
     fluid_: "Fluid"
     result_: "LearnerResult"
@@ -39,6 +46,34 @@ class RunPrediction:
 
     _saved_types: ClassVar[tuple[type, ...]]
     """Dataclasses among them and among the parameters."""
+
+    def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
+        """Find the law of these runs.
+
+        Parameters
+        ----------
+        X
+            Runs (`Run`), or a data set.
+        y
+            Ignored: the observations are part of the runs.
+
+        Raises
+        ------
+        InputError
+            If a parameter or a run is unusable.
+        """
+        del y
+        check_settings(self.get_params(deep=False))
+        self._check_parameters()
+        known = known_part(self)
+        # once, for it may be read only once
+        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
+        require_known_rate(known, runs)
+        self._learn(runs, known)
+        self.n_features_in_ = 1
+        self.runs_ = tuple(runs)
+        self.provenance_ = provenance_of(X, runs)
+        return self
 
     @property
     def equation_(self) -> "Equation":
@@ -71,7 +106,7 @@ class RunPrediction:
             If a parameter or a law cannot be written without pickle.
         """
         check_is_fitted(self, "result_")
-        parameters: Mapping[str, Any] = self.get_params(deep=False)  # pyright: ignore
+        parameters: Mapping[str, Any] = self.get_params(deep=False)
         return write_estimator(
             path,
             self.learner,
@@ -170,6 +205,13 @@ class RunPrediction:
     def _runs(self, X: Iterable[Run]) -> list[Run]:
         fluid = self.fluid_
         return as_runs(X, fluid.relaxation_time, fluid.law.linear_relaxation)
+
+    def _check_parameters(self) -> None:
+        """Refuse parameters that only this learner has."""
+
+    @abstractmethod
+    def _learn(self, runs: list[Run], known: KnownPart) -> None:
+        """Find the law: set the attributes of the fit but those that tell of the runs."""
 
     @abstractmethod
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:

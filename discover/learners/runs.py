@@ -58,17 +58,7 @@ def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool =
 
 
 def waiting(run: Run, relaxation_time: float, relaxes: bool) -> Run:
-    """Return a run with the cycles before it that are waited for, if its state is not solved for.
-
-    Parameters
-    ----------
-    run
-        The run.
-    relaxation_time
-        The longest, in s.
-    relaxes
-        As `as_runs` takes it.
-    """
+    """Return a run with the cycles before it to wait for, if its state is not solved for."""
     if relaxes and run.protocol.control == "rate":
         return run
     return replace(run, protocol=settled(run.protocol, relaxation_time))

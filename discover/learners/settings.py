@@ -24,11 +24,6 @@ _POSITIVE = ("misfit_floor", "strain_step")
 def check_settings(settings: Mapping[str, Any]) -> None:
     """Check settings that several estimators share.
 
-    Parameters
-    ----------
-    settings
-        All parameters of an estimator by name.
-
     Raises
     ------
     InputError
@@ -66,18 +61,7 @@ def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
 
 
 def check_library(library: TermLibrary | None) -> None:
-    """Refuse what is no library of terms.
-
-    Parameters
-    ----------
-    library
-        As an estimator was given it; None for its own.
-
-    Raises
-    ------
-    InputError
-        If it is something else.
-    """
+    """Refuse what is no library of terms."""
     if library is not None and not isinstance(library, TermLibrary):
         raise InputError(
             "library must be a TermLibrary; got a "

@@ -71,49 +71,30 @@ def shorter_where_it_pays(
     return (shorter, laid) if paid else (runs, problem)
 
 
-def apart(
-    whole: Sequence[Float[np.ndarray, " n"]], shorter: Sequence[Float[np.ndarray, " n"]]
-) -> float:
-    """Return how far what a law records on whole runs is from that on shortened ones.
-
-    Root-mean-square over that of the run, of the worst run; infinite where the law runs away.
-
-    Parameters
-    ----------
-    whole, shorter
-        What is recorded of it, for each run.
-    """
-    off = [
-        np.sqrt(np.mean((one - other) ** 2) / np.mean(one**2))
-        for one, other in zip(whole, shorter, strict=True)
-    ]
-    worst = float(np.max(off))
-    return worst if np.isfinite(worst) else np.inf
-
-
-def shortened_rightly(off: float, misfit: float) -> bool:
-    """Return whether a law may be fitted on shortened runs.
-
-    Parameters
-    ----------
-    off
-        From `apart`.
-    misfit
-        What the law leaves, relative to the records.
-    """
-    return off <= max(_SAME, _OF_MISFIT * misfit)
-
-
-def shortened_in_words(whole: _Laid, shorter: _Laid, off: float) -> str:
-    """Return what was passed over to save time, and what that changes.
+def shortened_rightly(
+    whole: _Laid,
+    shorter: _Laid,
+    recorded: tuple[Sequence[Float[np.ndarray, " _"]], Sequence[Float[np.ndarray, " _"]]],
+    misfit: float,
+) -> str:
+    """Return what was passed over to save time, and what that changes; empty if that is too much.
 
     Parameters
     ----------
     whole, shorter
         Problems of the whole and of the shortened runs.
-    off
-        From `apart`.
+    recorded
+        What is recorded of the law found in each whole run, and in each shortened one.
+    misfit
+        What the law leaves, relative to the records.
     """
+    off = float(
+        np.max(
+            [np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2)) for a, b in zip(*recorded, strict=True)]
+        )
+    )
+    if not off <= max(_SAME, _OF_MISFIT * misfit):  # nor where the law runs away
+        return ""
     share = whole.flows.n_steps / shorter.flows.n_steps
     return (
         f"to save time the rates that are held for more than {SETTLED:.0f} relaxation times were "

@@ -11,11 +11,6 @@ def on_device(values: ArrayLike) -> Array:
 
     Told no type, `jax.numpy.asarray` compiles a copy for every new shape, some 10 ms each; told the
     one that the array has, it only copies.
-
-    Parameters
-    ----------
-    values
-        Of any shape and type.
     """
     if isinstance(values, np.ndarray):
         return jnp.asarray(values, values.dtype)

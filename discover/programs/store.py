@@ -69,17 +69,7 @@ def _prepared(parent: Path, stamp: str) -> Path | None:
 
 
 def save_program(file: Path, nesting: Any, exported: bytes) -> None:
-    """Write a program at once or not at all; a full disk costs the next start time, not this run.
-
-    Parameters
-    ----------
-    file
-        Where.
-    nesting
-        Of its results, see `discover.programs.structure`.
-    exported
-        As JAX serialises it.
-    """
+    """Write a program whole or not at all; a full disk costs the next start time, not this run."""
     head = json.dumps(nesting).encode() + b"\n"
     body = head + exported
     with suppress(OSError):

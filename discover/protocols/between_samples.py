@@ -141,15 +141,7 @@ def _samples(
 def _knots(
     times: np.ndarray, rates: np.ndarray, another: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots whose straight lines lie on the curve, and have its area in each interval.
-
-    Parameters
-    ----------
-    times, rates
-        Of the samples.
-    another
-        Whether it is the other curve through them.
-    """
+    """Return knots whose straight lines lie on the curve, and have its area in each interval."""
     stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
     if another:

@@ -130,15 +130,7 @@ def drawn_against(
 def paced_by(
     protocol: FlowProtocol, times: Float[np.ndarray, " n"], strain: Float[np.ndarray, " n"]
 ) -> FlowProtocol:
-    """Return a protocol at a given stress whose integration keeps pace with a recorded strain.
-
-    Parameters
-    ----------
-    protocol
-        From `imposed_stress`.
-    times, strain
-        Of the samples, shape (n,).
-    """
+    """Return a protocol at a given stress whose integration keeps pace with a recorded strain."""
     recorded = np.interp(np.asarray(protocol.table_times), times, strain)
     return replace(protocol, table_strains=on_device(recorded))
 

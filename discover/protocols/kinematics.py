@@ -132,11 +132,6 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
         Of `KINDS`.
     quantity
         What is recorded; by default σ12 in shear and the tensile stress in extension.
-
-    Raises
-    ------
-    InputError
-        If there is no such flow.
     """
     if kind not in _GRADIENT:
         raise InputError(f"Unknown flow {kind!r}; the flows are {', '.join(KINDS)}.")

@@ -76,13 +76,7 @@ _ACCENTS = {"dot": "\u0307", "ddot": "\u0308", "hat": "\u0302", "bar": "\u0304",
 
 
 def plain(latex: str) -> str:
-    """Return a formula in plain signs, to be read aloud or where it cannot be set.
-
-    Parameters
-    ----------
-    latex
-        Without dollar signs.
-    """
+    """Return a formula in plain signs, to be read aloud or where it cannot be set."""
     tokens = re.findall(r"\\[A-Za-z]+|\\.|\s+|.", latex.strip().strip("$"), flags=re.S)
     tokens.reverse()
     return re.sub(r"\s+", " ", _until_brace(tokens)).strip()

@@ -36,8 +36,6 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
         What makes it again.
     files
         Written beside the page.
-    study_text
-        The study file.
     """
     packages = [f"Python {platform.python_version()}"]
     for name in _CALCULATES:

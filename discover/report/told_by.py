@@ -8,13 +8,7 @@ from discover.statistics import Told
 
 
 def told_by_table(told: Sequence[Told]) -> dict[str, Any] | None:
-    """Return the kinds of test and a row for each number; None where there is nothing to compare.
-
-    Parameters
-    ----------
-    told
-        Of each constant and prediction.
-    """
+    """Return the kinds of test and a row for each number; None if there is nothing to compare."""
     if not told:
         return None
     kinds = list(told[0].alone)

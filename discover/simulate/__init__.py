@@ -1,5 +1,6 @@
 """From a fluid and a protocol to stresses."""
 
+from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
 from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.simulate.grid import IntegrationGrid, make_grid, make_grids

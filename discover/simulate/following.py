@@ -1,7 +1,7 @@
 """Flows at a given rate, followed on their grids from rest or from what a cycle brings back."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import diffrax
 import equinox as eqx
@@ -14,6 +14,7 @@ from discover.simulate.fixed_steps import fixed_steps
 from discover.simulate.grid import IntegrationGrid
 from discover.simulate.periodic_start import periodic_start
 
+Tree = TypeVar("Tree")
 VectorField = Callable[[Any, Any, Any], Any]
 
 
@@ -24,8 +25,6 @@ class Following(NamedTuple):
     ----------
     vector_field
         dy/dt = f(t, y, args).
-    solver
-        The method.
     rest
         Where there has been no flow, shape (k, s), or (k, s, c) with derivatives behind the first
         column.
@@ -51,8 +50,6 @@ def follow(
     ----------
     following
         The states.
-    grid
-        Grid of one run.
     observe
         Of (t, y, args); y itself by default.
     alone
@@ -72,17 +69,14 @@ def begun(
     A periodic state is solved for, without derivatives. One step of Newton's method from there
     moves it by nothing, and its derivatives, also those that stand beside it in columns, to those
     of the implicit function.
-
-    Parameters
-    ----------
-    following, grid, alone
-        As in `follow`.
     """
     if grid.cycle is None:
         return following.rest
     alone = following if alone is None else alone
-    fixed = alone._replace(args=_fixed(alone.args), rest=_fixed(alone.rest))
-    state = _fixed(_periodic_state(fixed, grid))
+    fixed = alone._replace(
+        args=without_derivatives(alone.args), rest=without_derivatives(alone.rest)
+    )
+    state = without_derivatives(_periodic_state(fixed, grid))
     is_periodic = grid.cycle > 0
     columns = following.rest
     start = (
@@ -92,7 +86,7 @@ def begun(
     )
     change = _after_cycle(following, grid, start) - start
     # of every mode, the derivative of the end of a cycle by its start: direction, mode, component
-    ends = _fixed(_along_components(fixed, grid, state))
+    ends = without_derivatives(_along_components(fixed, grid, state))
     matrix = jnp.eye(state.shape[1]) - jnp.moveaxis(ends, 0, 2)
     step = jnp.linalg.solve(matrix, change.reshape(*state.shape, -1)).reshape(change.shape)
     return jnp.where(is_periodic, start + step, columns)
@@ -135,7 +129,7 @@ def _after_cycle(following: Following, grid: IntegrationGrid, state):
     return jax.lax.scan(step, state, (jnp.arange(grid.cycle_steps), times[:-1], times[1:]))[0]
 
 
-def _fixed(tree):
+def without_derivatives(tree: Tree) -> Tree:
     """Return a tree through which no derivative passes."""
     return jax.tree.map(
         lambda leaf: jax.lax.stop_gradient(leaf) if eqx.is_inexact_array(leaf) else leaf, tree

@@ -116,8 +116,6 @@ def make_grid(
 
     Parameters
     ----------
-    protocol
-        The flow.
     times
         Sampling times in s, increasing, from 0 on.
     strain_step, phase_step
@@ -400,15 +398,7 @@ def make_grids(
 
 
 def half_cycle(strain: float, strain_step: float) -> Float[np.ndarray, " m"]:
-    """Return ωt at step ends and middles in turn over half a cycle of an oscillation.
-
-    Parameters
-    ----------
-    strain
-        Amplitude.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return ωt at step ends and middles in turn over half a cycle of an oscillation."""
     # half a cycle goes through twice the amplitude
     steps = np.ceil(max(2.0 * strain, _FEWEST_OF_HALF) / strain_step)
     return np.linspace(0.0, np.pi, 2 * int(min(steps, _MOST_OF_HALF)) + 1)

@@ -102,15 +102,7 @@ def next_approximation(
 def goes_on(
     now: Approximation, change: Float[Array, ""], most: int, tolerance: float
 ) -> Bool[Array, ""]:
-    """Return whether to go through another cycle.
-
-    Parameters
-    ----------
-    now, change
-        The approximation, and how far it has moved.
-    most, tolerance
-        Cycles in all, and the change below which the iteration ends.
-    """
+    """Return whether to go through another cycle."""
     begins = now.number <= FROM_REST
     hopeful = (now.number < most) & (jnp.min(now.share) > _HOPELESS)
     return begins | (hopeful & ~(change < tolerance))

@@ -76,8 +76,6 @@ def exponential_steps(fluid: Fluid, columns: bool = False) -> ExponentialRungeKu
 
     Parameters
     ----------
-    fluid
-        The fluid.
     columns
         Whether states have derivatives beside them, along a third axis.
     """
@@ -214,8 +212,6 @@ def solve_on_grid(
     ----------
     fluid, protocol
         As in `simulate`.
-    grid
-        Grid of one run.
     adjoint
         How diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``. None
         is for values and forward mode: the same steps, traced and compiled in a third of the time.
@@ -274,15 +270,7 @@ def _in_steady_flow(fluid, protocol, grid, observe):
 
 @compiled
 def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
-    """Return the stresses of one fluid in a batch of runs, on fixed grids.
-
-    Parameters
-    ----------
-    fluid
-        The fluid, shared by all runs.
-    flows
-        From `lay_out`.
-    """
+    """Return the stresses of one fluid in a batch of runs, on fixed grids."""
     return flows.over(partial(solve_on_grid, fluid))
 
 
@@ -322,8 +310,6 @@ def simulate_homogeneous_flow(
 
     Parameters
     ----------
-    law
-        A dimensionless law.
     velocity_gradient
         Function of time that returns L, shape (3, 3). Flows that differ in the arrays of a
         `jax.tree_util.Partial` alone share a program.

@@ -56,17 +56,6 @@ def approach_step(
     """Return the way after one of `STEPS` steps.
 
     Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
-
-    Parameters
-    ----------
-    change
-        As in `linearly_implicit_step`.
-    way
-        Before it.
-    index
-        Of the step, from 0 on.
-    weissenberg_number
-        As in `pseudo_time_step`.
     """
     width = pseudo_time_step(way.number, weissenberg_number)
     moved = linearly_implicit_step(change, way.stress, width)
@@ -88,11 +77,6 @@ def arrived(
     """Return the modes where the way ends; not finite where that is no steady state of chains.
 
     A law may have a state of rest that no flow reaches: of FENE-P, springs of no strength.
-
-    Parameters
-    ----------
-    change, way, weissenberg_number
-        As in `approach_step`.
     """
     stress = way.stress
     most = (1.0 + weissenberg_number) * (1.0 + jnp.max(jnp.abs(stress), axis=0))
@@ -160,8 +144,6 @@ def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Arr
 
     Parameters
     ----------
-    fluid
-        The fluid.
     velocity_gradient
         The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
     """
@@ -189,8 +171,6 @@ def steady_modes(
         Dimensionless dσ/dt of a mode, of its σ and its λL.
     scaled_gradient
         λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
-    rest
-        The modes at rest.
     """
     # the shear rate, or of an extension the largest rate of stretching
     weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)

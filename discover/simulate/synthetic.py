@@ -135,8 +135,6 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
 
     Parameters
     ----------
-    fluid
-        The fluid.
     frequencies
         ω in rad/s, shape (n,); by default 25 over two decades to each side of the relaxation times.
     """

@@ -49,8 +49,6 @@ def least_squares_covariance(
     ----------
     columns
         Sensitivities S.
-    residual
-        Residual of the fit.
     sequences
         Rows of each sequence of observations, in the order of time.
     shared

@@ -11,11 +11,6 @@ def independent_samples(values: Float[np.ndarray, " n"]) -> float:
     1992, Stat. Sci. 7, 473, for sums that end where the correlation is lost]. Of a smooth sequence
     this counts its swings and not its samples, so it does not depend on how densely it was
     sampled; with the correlation of neighbours alone, the count would fall the more one measures.
-
-    Parameters
-    ----------
-    values
-        In order, about zero.
     """
     n = len(values)
     power = float(np.sum(values**2))

@@ -30,11 +30,6 @@ def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     Stat. Assoc. 69, 383, with lines for his median], and by more than the record without it bends.
     So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. The
     first and last three samples cannot be judged.
-
-    Parameters
-    ----------
-    record
-        Measured values of one run, in order.
     """
     values = np.asarray(record, dtype=float)
 
@@ -53,11 +48,6 @@ def stray(
     samples around, where the record too is off on its own: a step that a model takes a sample too
     late is missed as much, but the record is level on one side of it. Nothing is said of the first
     sample.
-
-    Parameters
-    ----------
-    residual, record
-        Prediction minus measurement, and the measurement, of one run, in order.
     """
     missed, values = np.asarray(residual, dtype=float), np.asarray(record, dtype=float)
     left = np.flatnonzero(~isolated(record))
@@ -164,15 +154,6 @@ def _local_spread(sizes: Float[np.ndarray, " m"], n: int, first: int) -> Float[n
 
     Near an end of the record it is that of the samples next to the end: a window that repeats the
     last one would take its size for that of all.
-
-    Parameters
-    ----------
-    sizes
-        Of what has that deviation, without its sign.
-    n
-        Number of samples.
-    first
-        The sample that the first size is of.
     """
     width = min(_NEIGHBOURHOOD, len(sizes))
     middle = np.clip(np.arange(n) - first - width // 2, 0, len(sizes) - width)

@@ -56,13 +56,7 @@ def smooth_misfit_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
 
 
 def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
-    """Return what a smooth part adds to the log likelihood, and the correlation without it.
-
-    Parameters
-    ----------
-    stacks
-        For each run any number of sequences; the first of every run belong together.
-    """
+    """Return what a smooth part adds to the log likelihood, and the correlation without it."""
     alone, beside = 0.0, 0.0
     for rows in stacks:
         n = rows.shape[-1]

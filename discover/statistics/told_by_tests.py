@@ -34,18 +34,9 @@ class Told:
     alone: Mapping[str, float]
     without: Mapping[str, float]
 
-    def to_json(self) -> dict[str, Any]:
-        """Return everything as JSON-able values, None where a number is not determined."""
-        return {
-            "name": self.name,
-            "together": _plain(self.together),
-            "alone": {kind: _plain(half) for kind, half in self.alone.items()},
-            "without": {kind: _plain(half) for kind, half in self.without.items()},
-        }
-
     @classmethod
     def from_json(cls, row: Mapping[str, Any]) -> "Told":
-        """Return what `to_json` was made of."""
+        """Return what JSON holds, in which None stands for an infinite half-width."""
 
         def halves(of: Mapping[str, float | None]) -> dict[str, float]:
             return {kind: _number(half) for kind, half in of.items()}
@@ -133,10 +124,6 @@ def told_by_tests(
         )
         for i, one in enumerate(numbers)
     )
-
-
-def _plain(half: float) -> float | None:
-    return half if np.isfinite(half) else None
 
 
 def _number(half: float | None) -> float:

@@ -55,13 +55,7 @@ class Unseen:
     correlation: Float[np.ndarray, " _"]
 
     def without_outliers(self, expectation: Expectation) -> "Unseen":
-        """Return the same without samples that are outliers, which refute no law.
-
-        Parameters
-        ----------
-        expectation
-            What a complete model may leave.
-        """
+        """Return the same without samples that are outliers, which refute no law."""
         outliers = what_is_left(self.residuals, self.records, expectation).outlier_samples
         residuals, records, columns = (
             [np.delete(row, list(off), axis=-1) for row, off in zip(part, outliers, strict=True)]

@@ -57,13 +57,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder for results, with its parents.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made or written to.
-    """
+    """Make a folder for results, with its parents."""
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -20,8 +20,6 @@ class StudyData:
 
     Attributes
     ----------
-    dataset
-        All runs.
     fit, held_out
         Runs that fits may see, and runs that only judge.
     each
@@ -44,8 +42,6 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
 
     Parameters
     ----------
-    study
-        The study.
     seed
         Overrides the seed of synthetic noise.
 

@@ -84,11 +84,6 @@ def result_file(written: str, study_file: Path | None) -> Path:
 def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
     """Return what an earlier result found, to be declared.
 
-    Parameters
-    ----------
-    written, study_file
-        As in `result_file`.
-
     Raises
     ------
     InputError

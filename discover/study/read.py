@@ -15,11 +15,6 @@ from discover.validation import validated
 def read_study(path: str | Path) -> Study:
     """Return the study in a TOML file.
 
-    Parameters
-    ----------
-    path
-        The file.
-
     Raises
     ------
     InputError

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from discover.cli import app
 from discover.dataset import load_dataset
 from discover.dataset.importing.mapping import read_mapping
-from discover.dataset.importing.text_export import read_blocks
+from discover.dataset.importing.text_export import blocks_of_rows
+from discover.dataset.importing.text_rows import read_rows
 from discover.errors import InputError
 
 # the mangled numbers are written with 17 digits; unit factors cost a rounding or two
@@ -303,7 +304,7 @@ def test_a_comma_that_may_be_decimal_or_thousands_is_asked_for(tmp_path):
     result = invoke(tmp_path / "a.txt", "--out", tmp_path / "data")
     assert result.exit_code == 2
     assert "--decimal" in result.stderr
-    (block,) = read_blocks(tmp_path / "a.txt", decimal=",")
+    (block,) = blocks_of_rows(read_rows(tmp_path / "a.txt", decimal=","))
     assert block.cells[0][:2] == ("1.234", "5.678")
 
 

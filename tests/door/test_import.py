@@ -101,3 +101,14 @@ import discover as dc
 print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
 """
     assert python(code, str(tmp_path)).split() == ["float64", str(tmp_path)]
+
+
+def test_where_a_simulation_is_used_first_no_error_inside_a_program_calls_back():
+    # equinox reads once, when it is imported, what becomes of an error; diffrax imports it
+    code = """
+import discover as dc
+dc.synthetic_dataset
+import equinox
+print(equinox._config.EQX_ON_ERROR)
+"""
+    assert python(code).strip() == "nan"

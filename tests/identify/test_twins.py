@@ -1,6 +1,5 @@
 """Twins checked in random histories, and what would separate them."""
 
-import json
 from fractions import Fraction
 
 import jax.numpy as jnp
@@ -62,7 +61,6 @@ def test_a_pair_on_33_is_a_twin_of_a_law_that_does_not_feel_33(slip_twins):
     assert pair.proof == "relation"
     assert pair.keeps_N1
     assert pair.difference.N2 > 0.01
-    json.dumps([t.to_json() for t in slip_twins], allow_nan=False)
 
 
 def test_a_fitted_coefficient_has_its_twin_too():

@@ -109,13 +109,6 @@ def turn_to_likelier(search: Search, carried: Sequence[Carried]) -> bool:
     A path that began with the wrong effect may end where no single exchange leads to the right
     ones, and a neighbour of what it passed by may. It has to be likelier than what is chosen by
     more than Occam's window, and to predict runs left out better, or to be a part of it.
-
-    Parameters
-    ----------
-    search
-        The search that has ended.
-    carried
-        What it was carried beside.
     """
     own = tuple(sorted(search.active))
     chosen = next(one for one in carried if tuple(sorted(one.effects)) == own)

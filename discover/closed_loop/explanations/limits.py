@@ -24,15 +24,6 @@ def names_of_limits(
     And in relaxation after steps of strain an effect that only multiplies each run by a number, to
     within what is left, is any damping function that has these values: stress relaxation whose time
     and strain separate tells no mechanism   [Wagner 1976, Rheol. Acta 15, 136].
-
-    Parameters
-    ----------
-    model, batch, runs
-        The model, and the fitted runs as a batch and as they are.
-    fit
-        To them.
-    names
-        Effects in it that are asked for.
     """
     at_rest = all(run.protocol.control == "rate" and not np.any(run.rate) for run in runs)
     found = {}

@@ -72,13 +72,6 @@ def other_times(
     Where the runs are explained, the factor takes the place of each effect of each explanation;
     where they are not, it is tried beside what was found, less one effect or not, and beside single
     effects.
-
-    Parameters
-    ----------
-    search
-        A search that has ended.
-    carried, judgement
-        Its explanations, and what is to be believed of what it chose.
     """
     refuted = not judgement.carries_over  # by runs that no fit saw, of which a fit says nothing
     if refuted or _FACTOR_AT in search.fit.free or not (search.active or judgement.structured):
@@ -130,11 +123,6 @@ def weighed_times(
     """Return sets beside a factor, and how much likelier each is than what was found.
 
     Those that the records tell from it are left out.
-
-    Parameters
-    ----------
-    others, carried, active
-        As in `compared_with_times`.
     """
     own = next((one.criterion for one in carried if set(one.effects) == set(active)), np.inf)
     return [

@@ -56,8 +56,6 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Possible
 
     Parameters
     ----------
-    runs
-        That were fitted.
     relaxation_time
         The longest, in s.
     """

@@ -91,13 +91,6 @@ def unexplained_probability(judgement: Judgement, effective_samples: float) -> f
     turns: at the level of the test, at the misfit, and at the error of the runs held out that are
     tolerated. So something is always left for what no dictionary holds, some 11 % where nothing
     speaks for it.
-
-    Parameters
-    ----------
-    judgement
-        The verdict on the best explanation, and its reasons.
-    effective_samples
-        Independent samples of what it leaves.
     """
     left = judgement.left
     logarithm = np.log(_least_bayes_factor(SIGNIFICANCE))

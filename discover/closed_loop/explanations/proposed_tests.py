@@ -53,15 +53,6 @@ def next_tests(
     """Return the tests that could be run, the most telling first.
 
     None for one explanation alone, or where it is hardly any of them.
-
-    Parameters
-    ----------
-    model, batch, carried, explanations
-        As in `explain`.
-    runs
-        That were fitted.
-    judgement
-        Of what the search chose.
     """
     weighed = contenders(carried, explanations)
     if len(weighed) < 2 or explanations.unexplained_probability > _NOT_BELIEVED:

@@ -36,8 +36,6 @@ def why_untested(
         With all candidates.
     fit, effects
         A fit, and the effects in it. One in which nothing was fitted was tested by any run.
-    runs
-        The runs.
     """
     if not fit.free:
         return None
@@ -50,11 +48,6 @@ def share_believed(model: AugmentedModel, fit: Fit, effects: Sequence[str], runs
     """Return how far an explanation is to be believed, by the flows that tested it.
 
     Runs held out are a test by themselves, and the verdict tells what they say.
-
-    Parameters
-    ----------
-    model, fit, effects, runs
-        As in `why_untested`.
     """
     if not fit.free or (runs[1] and not _are_states(runs)):
         return 1.0

@@ -30,17 +30,7 @@ def change_between_samples(
     active: Sequence[str],
     left: float,
 ) -> Float[np.ndarray, "runs n"] | None:
-    """Return how weighted residuals would change with other rates; None where that is nothing.
-
-    Parameters
-    ----------
-    model, batch, runs
-        The model, and the runs as a batch and as they are.
-    theta, active
-        Parameters, and the effects among them that are in the model.
-    left
-        Relative misfit, beside which it is looked at.
-    """
+    """Return how weighted residuals would change with other rates; None where that is nothing."""
     unknown = [unknown_between_samples(run.protocol, run.time) for run in runs]
     if not worth_a_look(unknown, left):
         return None
@@ -57,17 +47,7 @@ def coarse_rates(
     bounds: Bounds,
     change: Float[np.ndarray, "runs n"],
 ) -> tuple[CoarseRates, Bounds]:
-    """Return what other rates would change, and intervals that allow for it.
-
-    Parameters
-    ----------
-    model, batch, runs, fit
-        The fitted runs and their fit.
-    bounds
-        95 % intervals of constants, by position.
-    change
-        As from `change_between_samples`.
-    """
+    """Return what other rates would change, and intervals that allow for it."""
     shifts: dict[str, float] = {}
     names = {0: MODULUS, 1: RELAXATION_TIME}
     names |= {2 + i: parameter.name for i, parameter in enumerate(model.declared.free_parameters)}
@@ -116,15 +96,7 @@ def judged_with(judgement: Judgement, coarse: CoarseRates | None) -> Judgement:
 def wider_bands(
     records: Sequence[RunRecord], batch: Batch, change: Float[np.ndarray, "runs n"] | None
 ) -> list[RunRecord]:
-    """Return records whose bands give way by twice the most that changes along each run.
-
-    Parameters
-    ----------
-    records, batch
-        Runs, and the same as the model has them.
-    change
-        As from `change_between_samples`.
-    """
+    """Return records whose bands give way by twice the most that changes along each run."""
     if change is None:
         return list(records)
     weight = np.asarray(batch.weight)

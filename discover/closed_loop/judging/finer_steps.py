@@ -30,13 +30,6 @@ def on_finer_steps(
     than the noise to the compliance itself. One prediction on steps a fifth as long says how the
     residual would change, and one Gauss–Newton step what that does to the parameters. Fits without
     such an element are returned as they are.
-
-    Parameters
-    ----------
-    model, batch, runs
-        The model, and the fitted runs as a batch and as they are.
-    fit, active
-        The fit and the effects in it.
     """
     effects = _in_use(model, active)
     if not any(isinstance(effect, SeriesElement) for effect in effects):
@@ -54,13 +47,6 @@ def constants_that_follow(
     """Return how a change of the residuals moves the fitted constants, and what is left of it.
 
     One Gauss–Newton step.
-
-    Parameters
-    ----------
-    fit
-        With its Jacobian.
-    change
-        Of the weighted residuals.
     """
     if not fit.free:
         return np.zeros(0), change

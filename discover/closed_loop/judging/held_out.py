@@ -43,17 +43,7 @@ def held_out(
     theta: np.ndarray,
     resolution: NumericalResolution,
 ) -> HeldOut:
-    """Return what a final model leaves of runs that no fit saw.
-
-    Parameters
-    ----------
-    model, batch, fit
-        The model, the fitted runs and the fit.
-    theta
-        The parameters that predict.
-    resolution
-        Of the runs held out.
-    """
+    """Return what a final model leaves of runs that no fit saw."""
     residual = model.residuals([theta], resolution.batch)
     derivative = np.zeros((0, *residual[0].shape))
     root, correlation = np.zeros((0, 0)), np.ones(1)

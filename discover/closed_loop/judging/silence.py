@@ -41,13 +41,6 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
     constants as it has would lower noise by   [Wilks 1938, Ann. Math. Stat. 9, 60], on as many
     samples as the residual is worth. So an effect that lets no flow reach the fluid, or no stress
     of it the record, explains nothing, however small the misfit.
-
-    Parameters
-    ----------
-    model, batch
-        The model, and the fitted runs.
-    fit, active
-        The final fit and the effects in it.
     """
     declared = model.declared
     off = replace(declared, modulus=_OFF * declared.modulus, solvent_viscosity=0.0)

@@ -21,21 +21,7 @@ def told_by_kinds(
     held: tuple[Batch, Sequence[Run]] | None,
     shifts: Float[np.ndarray, "k runs n"],
 ) -> tuple[Told, ...]:
-    """Return what tests of each kind tell; nothing where all fitted runs are of one kind.
-
-    Parameters
-    ----------
-    model, batch, fit
-        The final model, the fitted runs and the fit.
-    runs
-        Those of the batch.
-    effects
-        Names of the effects of the model.
-    held
-        What no fit saw, as a batch and as runs.
-    shifts
-        What errors of the moduli change, from `modulus_shifts`.
-    """
+    """Return what tests of each kind tell; nothing where all fitted runs are of one kind."""
     kinds = [kind_of_record(run) for run in runs]
     if len(set(kinds)) < 2 or not fit.free:
         return ()

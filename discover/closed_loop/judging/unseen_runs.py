@@ -44,21 +44,7 @@ def what_unseen_runs_say(
     records: Sequence[RunRecord],
     held: HeldOut | None,
 ) -> UnseenRuns:
-    """Return how a final model predicts runs that no fit saw.
-
-    Parameters
-    ----------
-    tolerated
-        What a complete model may leave of the fitted runs.
-    fitted
-        What it does leave of them.
-    fit, active
-        The final fit and the effects in it.
-    records
-        All runs with their predictions.
-    held
-        Runs held out, if any.
-    """
+    """Return how a final model predicts runs that no fit saw."""
     error = _error([record for record in records if record.held_out])
     asked = max(fitted.left.misfit, fitted.left.expected, fitted.resolution)
     if held is None:

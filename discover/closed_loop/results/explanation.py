@@ -1,7 +1,7 @@
 """What a closed loop says of several explanations."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -80,8 +80,8 @@ class Explanations:
     def to_json(self) -> dict[str, Any]:
         """Return what ``loop.json`` holds of them."""
         return {
-            "explanations": [asdict(one) for one in self.likeliest_first],
+            "explanations": self.likeliest_first,
             "unexplained_probability": self.unexplained_probability,
-            "inclusion": dict(self.inclusion),
-            "inclusion_by_kind": dict(self.inclusion_by_kind),
+            "inclusion": self.inclusion,
+            "inclusion_by_kind": self.inclusion_by_kind,
         }

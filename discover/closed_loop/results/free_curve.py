@@ -2,8 +2,8 @@
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -59,10 +59,6 @@ class FreeForm:
     explains: bool
     error: ErrorPair
 
-    def to_json(self) -> dict[str, Any]:
-        """Return what ``loop.json`` holds of it."""
-        return asdict(self)
-
 
 def drawn_form(
     slot: Slot,
@@ -110,13 +106,7 @@ def drawn_form(
 
 
 def error_of(left: Float[np.ndarray, "runs n"]) -> float:
-    """Return the mean relative error of runs, infinite where a model runs away.
-
-    Parameters
-    ----------
-    left
-        Weighted residuals, padded.
-    """
+    """Return the mean relative error of runs, infinite where a model runs away."""
     if not np.all(np.isfinite(left)):
         return np.inf
     return float(np.mean(np.sqrt(np.sum(left**2, axis=1))))

@@ -22,11 +22,6 @@ _DECLARED = "declared"
 def labelled_loop(result: Any) -> "xarray.Dataset":
     """Return explanations, constants and predictions of a loop; see `LoopResult.to_xarray`.
 
-    Parameters
-    ----------
-    result
-        A `LoopResult`.
-
     Raises
     ------
     InputError

@@ -1,7 +1,6 @@
 """What a closed loop found, for people, pictures and other programs."""
 
 import json
-import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -44,6 +43,7 @@ from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
+from discover.plain_json import plain
 from discover.statistics import Told
 from discover.words import percent_of
 
@@ -329,21 +329,18 @@ class LoopResult(PageView, HasEquation, NotebookView):
         """Return the contents of ``loop.json``."""
         contents = {
             "verdict": self.verdict,
-            "error_before": asdict(self.error_before),
-            "error_after": asdict(self.error_after),
+            "error_before": self.error_before,
+            "error_after": self.error_after,
             "noise_floor": self.noise_floor,
-            "stages": [asdict(stage) for stage in self.stages],
+            "stages": self.stages,
             "remaining": self.remaining,
-            "residual": {
-                name: reading.to_json()
-                for name, reading in zip(("declared", "augmented"), self.readings, strict=True)
-            },
+            "residual": dict(zip(("declared", "augmented"), self.readings, strict=True)),
             "declared": {
                 "law": None if self.declared_law is None else equation_to_json(self.declared_law),
-                "effects": [asdict(effect) for effect in self.declared_effects],
-                "by_mode": list(self.differing_by_mode),
+                "effects": self.declared_effects,
+                "by_mode": self.differing_by_mode,
             },
-            "declared_parameters": {k: asdict(v) for k, v in self.declared_parameters.items()},
+            "declared_parameters": self.declared_parameters,
             "ranking": [
                 [{**_line_of(c), "aliases": c.aliases} for c in stage] for stage in self.rankings
             ],
@@ -352,16 +349,16 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 for record in self.records
             },
             **self.explanations.to_json(),
-            "next_tests": self.next_tests.to_json(),
+            "next_tests": self.next_tests,
             "held_out_in_band": self.held_in_band,
-            "laws": [one.to_json() for one in self.laws],
-            "free_form": [one.to_json() for one in self.free_form],
-            "told_by": [one.to_json() for one in self.told_by],
-            "folds": [asdict(fold) for fold in self.folds],
+            "laws": self.laws,
+            "free_form": self.free_form,
+            "told_by": self.told_by,
+            "folds": self.folds,
             "seconds": self.seconds,
             **self._law(),
         }
-        return _plain(contents)
+        return plain(contents)
 
     def write_json(self, path: str | Path) -> None:
         """Write ``loop.json``."""
@@ -378,16 +375,3 @@ def _line_of(candidate: CandidateScore) -> dict[str, Any]:
 
 def _numbers(record: RunRecord, time: float) -> tuple[float, float]:
     return flow_numbers(record.time, record.rate, time)
-
-
-def _plain(value: Any) -> Any:
-    # JSON knows neither arrays nor nan
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(item) for item in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return int(value) if isinstance(value, np.integer) else value

@@ -80,8 +80,8 @@ class NextTests:
     def to_json(self) -> dict[str, Any]:
         """Return what ``loop.json`` holds of them."""
         return {
-            "explanations": [list(effects) for effects in self.explanations],
-            "probabilities": list(self.probabilities),
+            "explanations": self.explanations,
+            "probabilities": self.probabilities,
             "open_nats": self.open_nats,
             "noise": self.noise,
             "tests": [
@@ -90,8 +90,7 @@ class NextTests:
                     "observe": one.quantity,
                     "nats": one.nats,
                     "separates": [
-                        [list(self.explanations[i]), list(self.explanations[j])]
-                        for i, j in one.pairs
+                        [self.explanations[i], self.explanations[j]] for i, j in one.pairs
                     ],
                 }
                 for one in self.tests

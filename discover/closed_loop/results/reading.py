@@ -144,12 +144,7 @@ class Reading:
 
     def to_json(self) -> dict[str, Any]:
         """Return the reading as JSON-able values."""
-        return {
-            "sentences": self.sentences,
-            "collapses": [asdict(c) for c in self.collapses],
-            "trends": [asdict(t) for t in self.trends],
-            "waves": [asdict(w) for w in self.waves],
-        }
+        return {"sentences": self.sentences, **asdict(self)}
 
 
 _HINTS = {

@@ -35,8 +35,6 @@ class CurrentModel(SearchState):
     ----------
     model
         The declared model with all candidates.
-    batch
-        Runs that are fitted.
     held_batch
         Flows through which a chosen law must be integrable; their stresses are not looked at.
     n_candidates
@@ -123,11 +121,6 @@ class CurrentModel(SearchState):
         ----------
         by_mode
             Whether constants may differ from mode to mode, as far as the model says so.
-
-        Raises
-        ------
-        InputError
-            If it cannot be integrated through the runs.
         """
         self.fit = self._problem.best_fit(first_starts(self.model), self.model.free_positions)
         if not self.fit.usable:

@@ -22,8 +22,6 @@ def first_starts(model: AugmentedModel, nothing_known: bool = False) -> list[np.
 
     Parameters
     ----------
-    model
-        The model.
     nothing_known
         Whether a law's only constant may be anywhere too, and from where it starts be a place where
         the law cannot be integrated.

@@ -65,15 +65,7 @@ class SeenSets:
         fit: Fit,
         weight: Float[np.ndarray, "runs n"],
     ) -> None:
-        """Keep a set of effects, unless it was fitted better before.
-
-        Parameters
-        ----------
-        effects, fit
-            The set and its fit.
-        weight
-            Weights of the runs.
-        """
+        """Keep a set of effects, unless it was fitted better before."""
         name = tuple(sorted(effects))
         cost = judged_cost(fit.residual, weight)
         if not np.isfinite(cost) or (name in self._sets and self._sets[name].cost <= cost):

@@ -80,12 +80,12 @@ class ClassicalFit:
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``comparison.json`` holds it."""
         return {
-            "parameters": dict(self.parameters),
+            "parameters": self.parameters,
             "misfit": self.misfit,
             "criterion": self.criterion,
             "at_bound": self.at_bound,
-            **({"fitted_along": dict(self.along)} if self.along else {}),
-            "errors": {name: dict(row) for name, row in self.errors.items()},
+            **({"fitted_along": self.along} if self.along else {}),
+            "errors": self.errors,
         }
 
 
@@ -103,8 +103,6 @@ def fit_classical_laws(
 
     Parameters
     ----------
-    model
-        The declared model.
     flows
         Training flows, with what was measured, and flows to judge in.
     known_relaxation

@@ -13,18 +13,7 @@ from discover.study.declared_model import DeclaredModel
 
 
 def prepared(data: StudyData) -> StudyData:
-    """Return data whose runs are as learners take them.
-
-    Parameters
-    ----------
-    data
-        Of a study, split.
-
-    Raises
-    ------
-    InputError
-        If every run is to be held out in turn.
-    """
+    """Return data whose runs are as learners take them."""
     if data.each:
         raise InputError(
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
@@ -53,13 +42,6 @@ def thinned_to(data: StudyData, most: int) -> StudyData:
 
     Every sample is a step of the integration, and a record of thousands says little more of a law
     than its hundreds do. What was thinned says so.
-
-    Parameters
-    ----------
-    data
-        Of a study, split.
-    most
-        Samples of a run, at most.
     """
     return with_each_run(data, lambda run: thin_run(run, most))
 
@@ -79,18 +61,7 @@ def _with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]
 
 
 def require_one_known_law(declared: DeclaredModel) -> None:
-    """Refuse a known part that only a closed loop can have.
-
-    Parameters
-    ----------
-    declared
-        The declared model.
-
-    Raises
-    ------
-    InputError
-        If its law is to be chosen, or has constants by mode.
-    """
+    """Refuse a known part that only a closed loop can have."""
     if declared.choice:
         raise InputError(
             "[model] law names several laws to choose from, which is for close-loop: a comparison "

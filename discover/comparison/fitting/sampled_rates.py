@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.coarse_rates import CoarseRates, of_json, samples_a_cycle, worth_a_look
+from discover.dataset.coarse_rates import CoarseRates, coarse_in, samples_a_cycle, worth_a_look
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 from discover.learners.recovered_term import RecoveredTerm
@@ -31,17 +31,6 @@ def with_sampled_rates(
 
     What another curve through the samples changes in σ12 is told under `KEY` of its details;
     coefficients with an interval get it wider by what that would do to them.
-
-    Parameters
-    ----------
-    outcome
-        Of a learner, with its predictions.
-    fluid
-        The law found.
-    declared
-        The known part.
-    flows
-        The flows of the comparison.
     """
     training = [flow for flow in flows if flow.kind == "training" and flow.measured is not None]
     if not training or any(not np.any(flow.measured) for flow in training):
@@ -77,9 +66,7 @@ def with_sampled_rates(
 
 def coarse_rates_of(outcome: LearnerOutcome) -> CoarseRates | None:
     """Return what rates read in too few samples leave open of a law; None where that is small."""
-    found = outcome.details.get(KEY)
-    coarse = None if found is None else of_json(found)
-    return coarse if coarse is not None and coarse.is_coarse else None
+    return coarse_in(outcome.details.get(KEY))
 
 
 def _changed(fluid: Fluid, flow: Flow, prediction: Stresses) -> np.ndarray:

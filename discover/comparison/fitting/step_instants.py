@@ -40,15 +40,6 @@ def with_step_instants(
     the same instants. It extrapolates badly, so those of runs held out are fitted to these runs
     with the few terms that fit best, as they are. Data without such steps, and data that this law
     cannot be integrated through, stay as they are.
-
-    Parameters
-    ----------
-    declared
-        The known part.
-    data
-        Of a study, split.
-    library
-        Candidate terms.
     """
     fitted = [with_rate_steps(run) for run in data.fit.runs]
     unseen = [with_rate_steps(run) for run in data.dataset.runs if run.name not in data.fit.names]

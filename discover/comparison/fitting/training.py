@@ -13,6 +13,7 @@ from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners.registry import LearningTask, learn_with
 from discover.learners.result import LearnerResult
+from discover.plain_json import plain
 from discover.progress import Progress, silent
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import Expectation
@@ -25,13 +26,7 @@ if TYPE_CHECKING:
 
 
 def require_numbers(model: DeclaredModel) -> None:
-    """Check that nothing of the declared law is left to be fitted.
-
-    Raises
-    ------
-    InputError
-        If something is.
-    """
+    """Check that nothing of the declared law is left to be fitted."""
     if model.free:
         raise InputError(
             f"compare needs a known part without free parameters, but {', '.join(model.free)} in "
@@ -59,10 +54,6 @@ def train(
         The study, for the learner's settings.
     model
         The known part.
-    runs
-        Runs to learn from.
-    seed
-        Seed of the learner.
     progress
         Called as it goes.
     searched_library
@@ -177,8 +168,7 @@ def searched(
         row.update(uncertainty_row(sparse.search_, rival.fit, seed))
     table["rivals_text"] = table.pop("text")
     if runs:
-        told_by = told_by_kinds(sparse.search_, chosen, runs)
-        table["told_by"] = [one.to_json() for one in told_by]
+        table["told_by"] = plain(told_by_kinds(sparse.search_, chosen, runs))
     return replace(result, details={**result.details, **table})
 
 

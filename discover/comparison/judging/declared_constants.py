@@ -32,8 +32,6 @@ class OtherConstant:
 
     Attributes
     ----------
-    term, coefficient
-        The term.
     declared
         What was declared, in s or Pa; None where there are several modes.
     factor, ci95
@@ -83,13 +81,6 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
 
     What differs by less than an experiment can be expected to see is none; nor is a term that
     leaves no positive time or modulus, or one without an interval, which other terms may replace.
-
-    Parameters
-    ----------
-    terms
-        What was found beside the known part.
-    model
-        The known part.
     """
     found = []
     for term in terms:
@@ -147,28 +138,14 @@ def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> d
 
 
 def other_gain(others: Iterable[OtherConstant]) -> float | None:
-    """Return the gain of the transducer that the linear terms may stand for; None: there is none.
-
-    Parameters
-    ----------
-    others
-        From `other_constants`.
-    """
+    """Return the gain of the transducer that linear terms may stand for; None if there is none."""
     return next((other.factor for other in others if other.term == _MODULUS), None)
 
 
 def with_other_gain(
     bands: Mapping[str, PredictionBand], others: Sequence[OtherConstant]
 ) -> dict[str, PredictionBand]:
-    """Return bands of N1 and N2 that hold for a fluid behind a transducer of that gain as well.
-
-    Parameters
-    ----------
-    bands
-        By the key of the flow.
-    others
-        From `other_constants`.
-    """
+    """Return bands of N1 and N2 that hold for a fluid behind a transducer of that gain as well."""
     gain = other_gain(others)
     if gain is None:
         return dict(bands)
@@ -189,19 +166,7 @@ def with_other_constants(
     others: Sequence[OtherConstant],
     known: DeclaredModel,
 ) -> list[Statement]:
-    """Return the statements with what linear terms say of the declared constants.
-
-    Parameters
-    ----------
-    statements
-        On N1 and N2.
-    terms
-        What was found beside the known part.
-    others
-        From `other_constants`.
-    known
-        The known part.
-    """
+    """Return the statements with what linear terms say of the declared constants."""
     rest = ""
     if not known.effects and known.law_name in ("", "ucm"):
         named = [

@@ -62,13 +62,6 @@ def with_gain_in_dense(
     """Return the outcomes, the dense bands of N1 and N2 holding behind a transducer's gain as well.
 
     The dense library has the term γ̇ too, and its laws take a wrong gain for another modulus.
-
-    Parameters
-    ----------
-    outcomes
-        By learner; without ``"tensor_dense"`` they stay as they are.
-    others
-        Declared constants that the sparse law's linear terms amount to.
     """
     dense, gain = outcomes.get(DENSE), other_gain(others)
     if dense is None or gain is None:

@@ -37,8 +37,6 @@ def disagreements(
 
     Parameters
     ----------
-    outcomes
-        By learner.
     flows
         Flows to look at: tests and held-out runs.
     bands
@@ -109,15 +107,7 @@ def _which(sparse: LearnerOutcome, network: LearnerOutcome, flow: Flow, quantity
 def open_where_contested(
     statements: Sequence[Statement], reasons: Mapping[str, str]
 ) -> list[Statement]:
-    """Return the statements, with what the learners contest no longer determined.
-
-    Parameters
-    ----------
-    statements
-        On N1 and N2.
-    reasons
-        From `contested`.
-    """
+    """Return the statements, with what the learners contest no longer determined."""
     return [
         s
         if (reason := reasons.get(s.quantity)) is None

@@ -83,7 +83,7 @@ class Explanation:
                 "given": self.expectation.noise,
                 "sweep": self.sweep_error,
                 "repeats": None if self.repeats is None else self.repeats.error,
-                "repeated": [] if self.repeats is None else list(map(list, self.repeats.groups)),
+                "repeated": [] if self.repeats is None else self.repeats.groups,
             },
             "lack_of_fit": {
                 name: {

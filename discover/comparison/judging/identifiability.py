@@ -83,12 +83,12 @@ class Rival:
         """Return the rival as the contract spells it."""
         return {
             "terms": [
-                {"term": name, "coefficient": value, "inner": dict(self.inner)}
+                {"term": name, "coefficient": value, "inner": self.inner}
                 for name, value in self.terms.items()
             ],
             "reason": self.reason,
-            "errors_to_chosen": dict(self.errors_to_chosen),
-            "separated_by": None if self.separated_by is None else dict(self.separated_by),
+            "errors_to_chosen": self.errors_to_chosen,
+            "separated_by": self.separated_by,
         }
 
 
@@ -104,8 +104,6 @@ def find_rivals(
 
     Parameters
     ----------
-    terms
-        The chosen law.
     met
         Rivals that the sparse search met: ``support``, ``coefficients``, ``inner``, ``text``.
     model
@@ -231,21 +229,7 @@ def structure_of(
     model: DeclaredModel,
     use_normal_stresses: bool,
 ) -> Structure:
-    """Return what the flows of these runs determine, at the known part and at the law found.
-
-    Parameters
-    ----------
-    terms
-        The law found.
-    runs
-        Training runs.
-    library
-        Candidate terms.
-    model
-        The known part.
-    use_normal_stresses
-        Whether measured normal stresses take part in the fit.
-    """
+    """Return what the flows of these runs determine, at the known part and at the law found."""
     found = law_terms(terms)
     return analyse_structure(
         runs,
@@ -264,8 +248,6 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
 
     Parameters
     ----------
-    fluid
-        A learned fluid.
     flows
         The flows of the comparison; training ones set the box beyond which the law extrapolates.
     """

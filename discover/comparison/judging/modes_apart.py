@@ -17,15 +17,7 @@ from discover.words import listed, percent_of, plainly
 def with_intervals_of_modes(
     outcomes: Mapping[str, LearnerOutcome], modes: CoefficientsInModes
 ) -> dict[str, LearnerOutcome]:
-    """Return the outcomes, intervals of the sparse law holding coefficients that differ by mode.
-
-    Parameters
-    ----------
-    outcomes
-        By learner.
-    modes
-        What the runs say of each mode.
-    """
+    """Return the outcomes, intervals of the sparse law holding coefficients that differ by mode."""
     sparse = outcomes["tensor_sindy"]
     terms = []
     for term in sparse.terms:
@@ -44,13 +36,6 @@ def holding_modes_apart(
     """Return the bands of the sparse law, holding coefficients that differ by mode.
 
     There is none where those run away.
-
-    Parameters
-    ----------
-    bands
-        By the key of the flow.
-    modes
-        What the runs say of each mode.
     """
     return {key: _holding(band, modes.bands.get(key)) for key, band in bands.items()}
 

@@ -27,8 +27,6 @@ def left_open_by_modes(
     ----------
     path
         The best law of each size: ``size`` and relative ``misfit``.
-    n_terms, misfit
-        Of the law found.
     linear_error
         By which the modes miss the sweep, relative.
     network

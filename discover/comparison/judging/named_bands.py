@@ -27,15 +27,6 @@ def with_named_effects(
     explanations, unless σ12 of a run held out lies outside of theirs. They make it wider and never
     narrower: of two that explain σ12 alike, the wrong one may be the only one with a name. Where
     the library's laws have no band there is none.
-
-    Parameters
-    ----------
-    outcomes
-        By learner; without ``"tensor_dense"`` they stay as they are.
-    flows
-        All flows.
-    found
-        The named explanations, the most probable first.
     """
     dense = outcomes.get(DENSE)
     if dense is None or not dense.bands or not found:

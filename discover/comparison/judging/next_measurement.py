@@ -97,16 +97,16 @@ class NextMeasurement:
     def to_json(self) -> dict[str, Any]:
         """Return everything but the curves."""
         return {
-            "laws": list(self.laws),
+            "laws": self.laws,
             "noise": self.noise,
-            "proposals": [proposal.to_json() for proposal in self.proposals],
-            "bands": {key: band.to_json() for key, band in self.bands.items()},
+            "proposals": self.proposals,
+            "bands": self.bands,
             "pipkin": [
                 {
                     "Wi": cell.weissenberg,
                     "De": cell.deborah,
-                    "observed": list(cell.observed),
-                    "difference": dict(cell.difference),
+                    "observed": cell.observed,
+                    "difference": cell.difference,
                     "decides": cell.decides,
                 }
                 for cell in self.identifiability()
@@ -129,8 +129,6 @@ def bands_of_law(
 
     Parameters
     ----------
-    outcome
-        Of the sparse learner.
     rivals
         Laws with ``terms`` and ``inner``, closest first.
     declared

@@ -26,8 +26,6 @@ def with_small_strain_told(
 
     Parameters
     ----------
-    outcomes
-        By learner.
     explanation
         What each law leaves of the training runs.
     others

@@ -80,11 +80,6 @@ class Statement:
         """Return whether it says that a quantity is not determined in a flow.
 
         In extension the recorded stress is none of those that statements are about.
-
-        Parameters
-        ----------
-        quantity, flow
-            What is predicted, and where.
         """
         if not self.undetermined or self.quantity != quantity:
             return False
@@ -143,19 +138,7 @@ def check_band(
     bands: Mapping[str, PredictionBand],
     noise: float,
 ) -> BandCheck:
-    """Return how wide the bands of a quantity are, and whether what is known lies inside.
-
-    Parameters
-    ----------
-    quantity
-        ``"sigma12"``, ``"N1"`` or ``"N2"``.
-    flows
-        Flows that may have a band.
-    bands
-        By the key of the flow.
-    noise
-        Relative noise of the records.
-    """
+    """Return how wide the bands of a quantity are, and whether what is known lies inside."""
     column = QUANTITIES.index(quantity)
     relative_to = QUANTITIES.index("N1") if quantity == "N2" else column
     half_width, missed, off = None, "", 0.0
@@ -244,13 +227,6 @@ def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
     """Return whether a law was never asked of another flow than those that its terms take.
 
     As `discover.closed_loop.explanations.untested` asks of a loop; a law without terms takes one.
-
-    Parameters
-    ----------
-    flows
-        All flows.
-    n_terms
-        Of the law.
     """
     measured = _measured(flows)
     count = sum(len(flow.times) if flow.is_of_states else 1 for flow in measured)
@@ -258,13 +234,7 @@ def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
 
 
 def only_states(flows: Sequence[Flow]) -> bool:
-    """Return whether all that was measured are steady or periodic states, and no transient.
-
-    Parameters
-    ----------
-    flows
-        All flows.
-    """
+    """Return whether all that was measured are steady or periodic states, and no transient."""
     measured = _measured(flows)
     return bool(measured) and all(flow.is_of_states for flow in measured)
 
@@ -276,17 +246,7 @@ def _measured(flows: Sequence[Flow]) -> list[Flow]:
 def claimed(
     bands: Mapping[str, PredictionBand], statements: Sequence[Statement], flows: Sequence[Flow]
 ) -> dict[str, PredictionBand]:
-    """Return the bands without limits of what is not determined: no claim is made there.
-
-    Parameters
-    ----------
-    bands
-        By the key of the flow.
-    statements
-        What the data say of each quantity.
-    flows
-        The flows.
-    """
+    """Return the bands without limits of what is not determined: no claim is made there."""
     by_key = {flow.key: flow for flow in flows}
     found = {}
     for key, band in bands.items():

@@ -34,12 +34,6 @@ def hold_against_unseen(
 
     Parameters
     ----------
-    explanation
-        Of the training runs.
-    outcomes
-        By learner.
-    flows
-        All flows.
     bands
         Of one law, by the key of the flow.
     expectation

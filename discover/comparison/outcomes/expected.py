@@ -12,15 +12,6 @@ def expectation_of(
     """Return what a complete law may leave of a study's runs, as the closed loop has it.
 
     What repeated runs differ by is counted where nobody told the noise.
-
-    Parameters
-    ----------
-    study
-        The study.
-    model
-        The known part, with the spectrum that its modes come from.
-    repeats
-        Runs that repeat one another; None where none does.
     """
     linear_error = 0.0 if model.spectrum is None else model.spectrum.relative_error
     noise = study.loop.noise

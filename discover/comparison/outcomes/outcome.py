@@ -13,6 +13,7 @@ from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.term_tables import TermTables
 from discover.learners.weighted_laws import WeightedLaws
+from discover.plain_json import plain
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out
 
@@ -210,18 +211,3 @@ def _weighted_bands(
             middle[flow.key] = {q: band[q][1] for q in QUANTITIES}
             bands[flow.key] = {q: (band[q][0], band[q][2]) for q in QUANTITIES}
     return middle, bands
-
-
-def plain(value: Any) -> Any:
-    """Return nested details with numpy values as plain ones and what is not finite as None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value if isinstance(value, str | int | float | bool | None) else str(value)

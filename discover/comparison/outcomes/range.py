@@ -80,13 +80,6 @@ def place(flow: Flow, training: Sequence[Flow]) -> Placement:
 
     A slower or smaller flow is inside: there a fluid comes to its linear limit, which the declared
     modes hold. Ratios of rates and of frequencies are those of Wi and De.
-
-    Parameters
-    ----------
-    flow
-        Of any kind.
-    training
-        The fitted flows.
     """
     frequencies = [f for other in training if (f := other.frequency) is not None]
     kind = flow.protocol.flow

@@ -16,15 +16,7 @@ _SMALL, _APART = 0.1, 0.2
 
 
 def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[Finding]:
-    """Yield what is doubtful in an amplitude sweep.
-
-    Parameters
-    ----------
-    run
-        The sweep.
-    linear
-        G′ and G″ at small strain of the same fluid, if measured.
-    """
+    """Yield what is doubtful in an amplitude sweep."""
     if run.strain is None or run.storage_modulus is None or run.loss_modulus is None:
         return
     low, high = float(np.min(run.strain)), float(np.max(run.strain))

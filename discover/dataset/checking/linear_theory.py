@@ -99,15 +99,7 @@ def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
 def against_linear_theory(
     runs: Sequence[Run], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
 ) -> Iterator[Finding]:
-    """Yield where runs and the linear sweep, or runs among themselves, do not fit together.
-
-    Parameters
-    ----------
-    runs
-        Those that load.
-    sweep, spectrum
-        The linear sweep and its relaxation modes, if there are any.
-    """
+    """Yield where runs and the linear sweep, or runs among themselves, do not fit together."""
     fastest = max((np.max(np.abs(run.rate)) for run in runs), default=0.0)
     runs = [run for run in runs if run.flow == "shear" and run.from_rest]
     start_ups = [run for run in runs if _is_start_up(run)]

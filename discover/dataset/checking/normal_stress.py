@@ -46,15 +46,7 @@ def doubts_of_normal_stress(
 
 
 def impossible_normal_stress(runs: Sequence[Run], sweep: LinearSweep | None) -> dict[str, str]:
-    """Return why the N1 of runs cannot be right, by the names of runs of which that is so.
-
-    Parameters
-    ----------
-    runs
-        Of one data set.
-    sweep
-        Its linear sweep, if there is one.
-    """
+    """Return why the N1 of runs cannot be right, by the names of runs of which that is so."""
     there = [(run, n1) for run in runs if (n1 := run.first_normal_stress_difference) is not None]
     spectrum = _spectrum(sweep) if there and sweep is not None else None
     found = {run.name: next(_reasons(run, n1, sweep, spectrum), None) for run, n1 in there}

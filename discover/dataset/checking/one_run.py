@@ -23,13 +23,7 @@ _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic flu
 
 
 def doubts_of_run(run: Run) -> Iterator[Finding]:
-    """Yield what is doubtful about a run.
-
-    Parameters
-    ----------
-    run
-        A run that loads.
-    """
+    """Yield what is doubtful about a run."""
 
     def warn(subject: str, text: str) -> Finding:
         return Finding("warning", subject, run.name, text)

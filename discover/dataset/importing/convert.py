@@ -63,8 +63,6 @@ def import_files(
 
     Parameters
     ----------
-    paths
-        Files of tests.
     mapping
         What is known about them; what it leaves open is found from names, units and numbers.
     sweep

@@ -36,8 +36,6 @@ class NamedRecord:
     ----------
     name
         Of its file, if it is a run, without ending.
-    record
-        The test.
     source, block
         Name of the file, and what that calls the block.
     chosen
@@ -53,11 +51,6 @@ class NamedRecord:
 
 def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     """Return the text of every file of a folder by name, and what is to be said of them.
-
-    Parameters
-    ----------
-    found
-        The tests, in their order.
 
     Raises
     ------

@@ -32,13 +32,7 @@ class Constant:
 
 
 def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
-    """Return what lines say in the form of a name, a number and a unit; the last of a name counts.
-
-    Parameters
-    ----------
-    rows
-        The cells of each line above a block.
-    """
+    """Return what lines say as a name, a number and a unit; the last of a name counts."""
     found: dict[str, Constant] = {}
     for row in rows:
         for constant in _constants([cell for cell in row if cell]):

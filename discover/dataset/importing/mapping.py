@@ -152,8 +152,6 @@ class Mapping(Section):
 
         Parameters
         ----------
-        file
-            Its name.
         block
             Number of the block, from 1.
         """
@@ -163,13 +161,7 @@ class Mapping(Section):
 
 
 def key_of(file: str) -> str:
-    """Return the name of a file as a key of a mapping; percent-encoded if it is no UTF-8.
-
-    Parameters
-    ----------
-    file
-        Its name.
-    """
+    """Return the name of a file as a key of a mapping; percent-encoded if it is no UTF-8."""
     try:
         file.encode()
     except UnicodeEncodeError:

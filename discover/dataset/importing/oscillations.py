@@ -41,8 +41,6 @@ def frequency_of(time: Values, values: Values) -> float:
     ----------
     time
         In s, increasing.
-    values
-        The record.
     """
     span = float(time[-1] - time[0])
     centred = values - np.mean(values)
@@ -69,15 +67,7 @@ def _series(
 
 
 def purer(time: Values, stress: Values, strain: Values) -> bool:
-    """Return whether the stress is a sine and the strain is not, so that the stress was imposed.
-
-    Parameters
-    ----------
-    time
-        In s.
-    stress, strain
-        The records.
-    """
+    """Return whether the stress is a sine and the strain is not, so that the stress was imposed."""
     if np.any(np.diff(time) <= 0.0):
         return False
     omega = frequency_of(time, stress)

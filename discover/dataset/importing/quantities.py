@@ -57,8 +57,6 @@ def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
 
     Parameters
     ----------
-    block
-        The block.
     given
         Names of columns that the user gave; they win over guesses.
 
@@ -128,15 +126,7 @@ _SHORT = 3
 
 
 def to_celsius(value: float, unit: str) -> float | None:
-    """Return a temperature in °C, or None if the unit is none of temperature.
-
-    Parameters
-    ----------
-    value
-        In that unit.
-    unit
-        As the export writes it.
-    """
+    """Return a temperature in °C, or None if the unit is none of temperature."""
     scale = unit.replace("º", "°").replace("°", "").replace("deg", "").strip().upper()
     if scale in ("C", "CELSIUS"):
         return value

@@ -38,8 +38,6 @@ class Readings:
 
     Attributes
     ----------
-    block
-        The block.
     columns
         Place of each quantity among its columns.
     mapping
@@ -66,15 +64,6 @@ class Readings:
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return the readings of a block.
 
-        Parameters
-        ----------
-        block
-            The block.
-        mapping
-            What the user says of it.
-        name
-            Of the file.
-
         Raises
         ------
         InputError
@@ -91,11 +80,6 @@ class Readings:
 
     def get(self, key: str) -> Values | None:
         """Return a quantity in SI units (temperature in °C), nan where the block has no number.
-
-        Parameters
-        ----------
-        key
-            From `QUANTITIES`.
 
         Raises
         ------

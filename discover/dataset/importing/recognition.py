@@ -54,11 +54,6 @@ class Recognised:
 def recognise(readings: Readings) -> list[Recognised]:
     """Return which tests a block holds; several where its temperature goes in steps.
 
-    Parameters
-    ----------
-    readings
-        The block.
-
     Raises
     ------
     InputError

@@ -29,8 +29,6 @@ class Record:
 
     Attributes
     ----------
-    kind
-        Which test.
     table
         Columns in SI units by quantity, in the order of the file.
     conditions
@@ -63,15 +61,6 @@ class Record:
 
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
     """Return the test that some rows of a block hold.
-
-    Parameters
-    ----------
-    readings
-        The block.
-    found
-        What it is taken for.
-    before
-        The test before it in the same file; None if there is none.
 
     Raises
     ------
@@ -297,15 +286,7 @@ _WHOLE = {
 
 
 def clock_before(readings: Readings, last: float) -> tuple[float, float]:
-    """Return when a block began, if its clock goes on from the block before, and when it ended.
-
-    Parameters
-    ----------
-    readings
-        The block.
-    last
-        Of the clock in the block before, in s.
-    """
+    """Return when a block began, if its clock goes on from the block before, and when it ended."""
     at = readings.columns.get("time")
     if at is None or readings.mapping.start_time_s:
         return 0.0, last
@@ -323,15 +304,7 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
 
 
 def joined(creep: Record, recovery: Readings) -> Record | None:
-    """Return creep and the recovery after it as one test; None if a block is no such recovery.
-
-    Parameters
-    ----------
-    creep
-        The test before, at a given stress.
-    recovery
-        The block after it.
-    """
+    """Return creep and the recovery after it as one test; None if a block is no such recovery."""
     if creep.conditions.get("control") != "stress" or not recovery.has("time", "stress", "strain"):
         return None
     rows = whole(recovery, "time", "stress", "strain")

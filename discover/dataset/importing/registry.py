@@ -85,8 +85,6 @@ def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
 
     Parameters
     ----------
-    path
-        The file.
     form
         Name of the importer; by the suffix of the file if None.
 

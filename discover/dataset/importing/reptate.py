@@ -41,11 +41,6 @@ _TEMPERATURE = ("temperature", "°C")
 def read_reptate(path: Path) -> list[Block]:
     """Return the one block of a file of RepTate.
 
-    Parameters
-    ----------
-    path
-        The file; its suffix is one of `COLUMNS`.
-
     Raises
     ------
     InputError

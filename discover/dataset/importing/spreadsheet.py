@@ -10,11 +10,6 @@ from discover.errors import InputError
 def read_spreadsheet(path: Path) -> list[Block]:
     """Return the blocks of numbers in all sheets of a spreadsheet; a sheet names what has no name.
 
-    Parameters
-    ----------
-    path
-        The file.
-
     Raises
     ------
     InputError

@@ -13,13 +13,12 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from discover.dataset.importing.header_constants import Constant, constants_of, name_and_unit
-from discover.dataset.importing.text_rows import Decimal, is_number, read_rows
+from discover.dataset.importing.text_rows import is_number
 from discover.dataset.unit_text import read_unit
 from discover.errors import InputError
 
@@ -90,53 +89,8 @@ class Block:
         return cls(name, heads, cells, 1)
 
 
-def read_blocks(
-    path: Path,
-    delimiter: str | None = None,
-    decimal: Decimal | None = None,
-    header_row: int | None = None,
-    encoding: str | None = None,
-) -> list[Block]:
-    """Return the blocks of numbers in a text file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    delimiter
-        ``tab``, ``semicolon``, ``comma`` or ``space``; found from the file if None.
-    decimal
-        Decimal sign; found from the file if None.
-    header_row
-        Line of the names, if the line above the numbers is not it; then only the block below.
-    encoding
-        Of the text; found from the file if None.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, holds no numbers under names, or its decimal sign cannot be told
-        from its thousands separator.
-    """
-    rows = read_rows(path, delimiter, decimal, encoding)
-    return require_blocks(blocks_of_rows(rows, header_row), path.name)
-
-
 def require_blocks(blocks: list[Block], name: str) -> list[Block]:
-    """Return the blocks of a file.
-
-    Parameters
-    ----------
-    blocks
-        What was found.
-    name
-        Of the file.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
+    """Return the blocks of a file."""
     if not blocks:
         raise InputError(
             f"{name} holds no lines of numbers under a line of names. If it has no names, add "

@@ -34,8 +34,6 @@ def read_rows(
 
     Parameters
     ----------
-    path
-        The file.
     delimiter
         Name from `DELIMITERS`; found from the file if None.
     decimal

@@ -29,13 +29,6 @@ def waves_of(block: Block, mapping: Mapping, name: str) -> list[Block]:
     Time is counted from the first sample. Where the export gives none, the samples are whole cycles
     at the frequency of the point, closed with the first sample, and the rate is the derivative of
     the Fourier series, without harmonics that are noise.
-
-    Parameters
-    ----------
-    block
-        The block.
-    mapping, name
-        As in `Readings.of`.
     """
     readings = Readings.of(block, mapping, name)
     if not {"strain_wave", "stress_wave"} <= set(readings.columns):
@@ -85,11 +78,6 @@ def without_names(rows: Sequence[Sequence[str]]) -> Block | None:
 
     Time, strain and stress in SI units, or with the rate before the stress, which is checked to be
     the derivative of the strain.
-
-    Parameters
-    ----------
-    rows
-        The cells of each line.
     """
     filled = [[cell for cell in row if cell] for row in rows]
     numbers = [row for row in filled if row and all(map(is_number, row))]

@@ -45,15 +45,7 @@ class StressBatch(eqx.Module):
 
 
 def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
-    """Return runs at a given stress as a batch.
-
-    Parameters
-    ----------
-    runs
-        One or more, of this control.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return runs at a given stress as a batch."""
     grids = [stress_grid(run.protocol, run.time, strain_step) for run in runs]
     n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
     rows = []

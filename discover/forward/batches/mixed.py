@@ -22,10 +22,6 @@ class MixedBatch(eqx.Module):
 
     Attributes
     ----------
-    parts
-        The runs of each control.
-    rows
-        Which runs these are.
     moduli
         Of each run that is a modulus, which sweep of its part, and whether G′ (0) or G″ (1).
     weight, recorded
@@ -48,15 +44,7 @@ Batch = Part | MixedBatch
 
 
 def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
-    """Return runs as a batch.
-
-    Parameters
-    ----------
-    runs
-        One or more runs.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return runs as a batch."""
     make = {
         "rate": lambda some: transients(some, strain_step),
         "steady": steady_states,

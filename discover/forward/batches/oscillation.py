@@ -36,15 +36,7 @@ class OscillationBatch(eqx.Module):
 def oscillations(
     runs: Sequence[Run], strain_step: float
 ) -> tuple[OscillationBatch, tuple[tuple[int, int], ...]]:
-    """Return the sweeps, and of each run which of them it is and which modulus of it.
-
-    Parameters
-    ----------
-    runs
-        One or more moduli over a frequency or amplitude sweep.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return the sweeps, and of each run which of them it is and which modulus of it."""
     sweeps: list[tuple[np.ndarray, np.ndarray]] = []
     moduli = []
     for run in runs:

@@ -74,13 +74,7 @@ class RateSteps(eqx.Module):
 
 
 def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
-    """Return the steps of runs whose instants are fitted or were; None where there is none.
-
-    Parameters
-    ----------
-    runs
-        Runs at a given rate.
-    """
+    """Return the steps of runs whose instants are fitted or were; None where there is none."""
     most = max(len(run.rate_steps) for run in runs)
     if not most:
         return None

@@ -7,15 +7,7 @@ from discover.dataset import Run
 
 
 def measured(run: Run, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return weights and values of a run's samples, padded with zeros.
-
-    Parameters
-    ----------
-    run
-        The run.
-    n
-        Length to which it is padded.
-    """
+    """Return weights and values of a run's samples, padded with zeros."""
     scale = run.weight / (run.sizes(run.recorded) * np.sqrt(len(run)))
     pad = (0, n - len(run))
     return np.pad(scale, pad), np.pad(run.recorded, pad)

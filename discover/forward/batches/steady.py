@@ -38,13 +38,7 @@ class SteadyBatch(eqx.Module):
 
 
 def steady_states(runs: Sequence[Run]) -> SteadyBatch:
-    """Return flow curves as a batch.
-
-    Parameters
-    ----------
-    runs
-        One or more, of this control.
-    """
+    """Return flow curves as a batch."""
     n = max(len(run) for run in runs)
     # a padded sample is one more of the last
     rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]

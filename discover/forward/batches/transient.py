@@ -76,15 +76,7 @@ class RunBatch(eqx.Module):
 
 
 def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
-    """Return runs at a given rate as a batch.
-
-    Parameters
-    ----------
-    runs
-        One or more, of this control.
-    strain_step
-        Largest strain of one step.
-    """
+    """Return runs at a given rate as a batch."""
     grids = []
     for run in runs:
         # a window may have cut the first samples off, but not what the instrument did by then

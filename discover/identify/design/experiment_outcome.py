@@ -23,8 +23,6 @@ class LawOutcome:
 
     Attributes
     ----------
-    name
-        Of the law.
     chi_squared
         Squared deviation in units of noise and of the law's own uncertainty.
     n_observations
@@ -67,14 +65,10 @@ def judge_laws(
         The laws, with the covariance of their parameters.
     declared
         The known part that they share.
-    experiment
-        What was run.
     measured
         ``sigma12``, ``N1``, ``N2``: those that were measured, in Pa.
     noise
         Standard deviation of each, in Pa.
-    n_draws, seed
-        Of the parameters.
     """
     rng = np.random.default_rng(seed)
     weights = []

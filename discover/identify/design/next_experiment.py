@@ -43,8 +43,6 @@ class Proposal:
 
     Attributes
     ----------
-    experiment
-        The flow.
     observed
         What has to be measured: ``sigma12``, with ``N1``, with ``N2``.
     evidence
@@ -113,8 +111,6 @@ def propose_experiments(
         What could be measured, of `OBSERVED`.
     n_draws
         Of each law's parameters, where its covariance does not serve.
-    seed
-        Of the draws.
     """
     laws = [chosen, *rivals]
     rng = np.random.default_rng(seed)

@@ -1,7 +1,7 @@
 """Directions in the space of coefficients that data see little or nothing of."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -68,14 +68,7 @@ class Direction:
 
     def to_json(self) -> dict[str, Any]:
         """Return the direction as JSON-able values."""
-        return {
-            "coefficients": dict(self.coefficients),
-            "exact": self.exact,
-            "noise_for_tenth": self.noise_for_tenth,
-            "changes": dict(self.changes),
-            "at_any_size": self.at_any_size,
-            "text": self.text,
-        }
+        return {**asdict(self), "text": self.text}
 
 
 def weak_directions(

@@ -63,8 +63,6 @@ def exact_terms(
 
     Parameters
     ----------
-    terms
-        The terms.
     stress
         σ11, σ22, σ33, σ12: integers, fractions, or anything else that adds and multiplies.
     rate

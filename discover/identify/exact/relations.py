@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import lru_cache
 from math import gcd, lcm
@@ -49,11 +49,7 @@ class TermRelation:
 
     def to_json(self) -> dict[str, Any]:
         """Return the relation as JSON-able values."""
-        return {
-            "coefficients": dict(self.coefficients),
-            "touches": self.touches,
-            "text": self.text,
-        }
+        return {**asdict(self), "text": self.text}
 
 
 def spell(coefficients: Mapping[str, float | int]) -> str:
@@ -88,11 +84,6 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     The terms are evaluated at random integer states; the null space is found modulo a large
     prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
     count as independent of every polynomial.
-
-    Parameters
-    ----------
-    library
-        The terms.
 
     Returns
     -------

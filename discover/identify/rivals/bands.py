@@ -97,8 +97,6 @@ def prediction_bands(
         The flows and their sampling times.
     n_draws
         Draws of each law's parameters.
-    seed
-        Of the draws.
     """
     rng = np.random.default_rng(seed)
     modulus = np.asarray(declared.modulus)

@@ -57,8 +57,6 @@ def compare_residuals(
     ----------
     chosen, other
         Weighted residuals of the two fitted laws, in the order of time within a run.
-    run_of_row
-        Run of each residual.
     nested
         Number of coefficients of the chosen law that the other lacks, if it is otherwise the same;
         0 where neither holds the other.

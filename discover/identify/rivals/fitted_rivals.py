@@ -155,15 +155,7 @@ class RivalTable(SentenceAndTable):
 
 
 def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
-    """Return the rivals of a fit among all that a search refitted, by the rule of this module.
-
-    Parameters
-    ----------
-    search
-        The finished search.
-    chosen
-        The fit that was chosen.
-    """
+    """Return the rivals of a fit among all that a search refitted, by the rule of this module."""
     problem = search.problem
     seen = np.asarray(problem.weight).reshape(-1) > 0
     rows, target = _in_time_order(problem, seen)

@@ -118,10 +118,6 @@ class Difference:
     N1: float
     N2: float
 
-    def to_json(self) -> dict[str, float]:
-        """Return the differences by quantity."""
-        return {"sigma12": self.sigma12, "N1": self.N1, "N2": self.N2}
-
 
 def differences(
     library: TermLibrary,
@@ -137,8 +133,6 @@ def differences(
     ----------
     library
         Holds every term of the laws.
-    reference, others
-        The laws.
     base
         The known part; by default UCM.
     """

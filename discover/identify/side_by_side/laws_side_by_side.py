@@ -28,8 +28,6 @@ class LawTerms:
 
     Attributes
     ----------
-    coefficients
-        Term → coefficient.
     inner
         Inner parameters of closed forms by name.
     """
@@ -39,13 +37,7 @@ class LawTerms:
 
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
-    """Return a library that also holds the terms of some laws.
-
-    Raises
-    ------
-    InputError
-        If a term cannot be read.
-    """
+    """Return a library that also holds the terms of some laws."""
     names = [name for law in laws for name in law.coefficients]
     try:
         terms = [parse_term(name) for name in names]
@@ -88,8 +80,6 @@ def stresses_of_laws(
     ----------
     library
         Holds every term of the laws.
-    laws
-        The laws.
     protocols, grids
         From `stack_protocols` and `make_grids`.
     base

@@ -37,8 +37,6 @@ class Contender:
         For tables and pictures.
     terms
         Canonical spelling → coefficient; empty for h = 0.
-    inner
-        Inner parameters by name.
     covariance
         Of the coefficients in the order of `terms`, then of the inner parameters in the order of
         `inner`, shape (p, p); None where the parameters count as exact.
@@ -71,8 +69,6 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
 
     Parameters
     ----------
-    contenders
-        The laws.
     declared
         The known part: its law is the base, its modes are shared where a law has no own.
     """
@@ -138,8 +134,6 @@ def sigma_points(
 
     Parameters
     ----------
-    contender
-        The law.
     most
         So many besides itself.
     rng
@@ -198,8 +192,6 @@ def predict_laws(
     ----------
     fluids
         A fluid with a leading axis of laws on every array.
-    protocols, times
-        The flows and their sampling times.
     **limits
         Limits of steps, as `make_grids` takes them.
     """

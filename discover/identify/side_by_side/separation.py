@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -53,10 +52,6 @@ class Separation:
         )
         return f"{self.quantity} in {self.flow} ({size})"
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the experiment as JSON-able values."""
-        return {"flow": self.flow, "quantity": self.quantity, "difference": self.difference}
-
 
 def separations(
     library: TermLibrary,
@@ -68,11 +63,6 @@ def separations(
 
     Oscillations and start-ups of shear, and the start of uniaxial and planar extension. A shear
     quantity comes first where one differs, as it needs the fewest new instruments.
-
-    Parameters
-    ----------
-    library, reference, others, base
-        As in `differences`.
     """
     laws = [reference, *others]
     flows = histories_for(base)

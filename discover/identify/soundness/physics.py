@@ -5,7 +5,7 @@ simulation of other flows without a second thought.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import jax
@@ -56,8 +56,6 @@ class PhysicsCheck:
 
     Attributes
     ----------
-    name
-        Of the check.
     passed
         Whether the law passes; None where the check could not be made.
     value
@@ -77,16 +75,6 @@ class PhysicsCheck:
     def line(self) -> dict[str, Any]:
         """Return the check as one line of a table."""
         return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the check as JSON-able values."""
-        return {
-            "name": self.name,
-            "passed": None if self.passed is None else bool(self.passed),
-            "value": None if self.value is None else float(self.value),
-            "where": self.where,
-            "text": self.text,
-        }
 
 
 @dataclass(frozen=True)
@@ -118,7 +106,7 @@ class PhysicsReport(SentenceAndTable):
 
     def to_json(self) -> dict[str, Any]:
         """Return the report as ``comparison.json`` holds it."""
-        return {"text": self.text, "checks": [check.to_json() for check in self.checks]}
+        return {"text": self.text, "checks": [asdict(check) for check in self.checks]}
 
 
 def check_physics(
@@ -132,12 +120,8 @@ def check_physics(
 
     Parameters
     ----------
-    fluid
-        The fluid.
     flows
         Flows along which stresses are looked at.
-    names
-        Of the flows.
     weissenberg, deborah
         Largest shear rate and frequency of training, times the mean relaxation time: the corner of
         the box beyond which the law extrapolates.

@@ -49,15 +49,7 @@ class Trajectories:
 
 
 def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
-    """Return conformation and dissipation of a fluid along flows.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    flows
-        The flows.
-    """
+    """Return conformation and dissipation of a fluid along flows."""
     states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
     sampled = np.asarray(flows.sample_mask)[..., None]
     whole = np.all(np.isfinite(states), axis=(1, 2, 3))
@@ -120,8 +112,6 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
 
     Parameters
     ----------
-    fluid
-        The fluid.
     weissenberg, deborah
         Amplitudes of the shear rate and frequencies, times the mean relaxation time.
     """

@@ -25,8 +25,6 @@ def steady_shear(
 
     Parameters
     ----------
-    law
-        A dimensionless law.
     rates
         Dimensionless shear rates, increasing, close enough for Newton's method to follow.
 

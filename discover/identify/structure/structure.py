@@ -8,7 +8,7 @@ arithmetic where the law is a polynomial.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -93,8 +93,6 @@ class LawStructure(NotebookView):
 
     Attributes
     ----------
-    name
-        Of the law.
     law
         Its terms beyond the known part.
     hidden
@@ -149,10 +147,7 @@ class LawStructure(NotebookView):
             "hidden_stresses": self.hidden.to_json(),
             "unseen_directions": [d.to_json() for d in self.exact],
             "weak_directions": [d.to_json() for d in self.weak],
-            "quantities": [
-                {"quantity": q.quantity, "verdict": q.verdict, "text": q.text}
-                for q in self.quantities
-            ],
+            "quantities": [asdict(q) for q in self.quantities],
             "unseen_directions_with_N1": self.n_exact_with_N1,
             "N2_with_N1": self.N2_with_N1,
             "text": self.text,

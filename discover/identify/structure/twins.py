@@ -107,22 +107,6 @@ class Twin(NotebookView):
     def _shown(self) -> Iterable[Any]:
         yield self.text
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the twin as JSON-able values."""
-        return {
-            "terms": [
-                {"term": name, "coefficient": value, "inner": dict(self.law.inner)}
-                for name, value in self.law.coefficients.items()
-            ],
-            "proof": self.proof,
-            "keeps_N1": self.keeps_N1,
-            "difference": self.difference.to_json(),
-            "separated_by": [s.to_json() for s in self.separated_by],
-            "order": self.order,
-            "change_of_hidden_stresses": dict(self.change),
-            "text": self.text,
-        }
-
 
 def find_twins(
     library: TermLibrary,

@@ -47,19 +47,7 @@ def train_others(
     recipe: DefaultRecipe,
     progress: Progress | None = None,
 ) -> tuple[list[Trained], str]:
-    """Return one more member for each key, and in words how they came about.
-
-    Parameters
-    ----------
-    problem
-        The training data.
-    first
-        The member that `train_default` found.
-    keys
-        For the initial weights, shape (others,).
-    recipe, progress
-        As in `train_default`.
-    """
+    """Return one more member for each key, and in words how they came about."""
     n_runs = problem.target.shape[0]
     if not first.varies and n_runs < 2:
         return [first] * len(keys), "a single run has no halves: members do not differ"

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
@@ -22,18 +21,12 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import KnownPart, known_part, require_known_rate
-from discover.learners.provenance import Provenance, provenance_of
+from discover.learners.known_part import KnownPart
+from discover.learners.provenance import Provenance
 from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.runs import as_runs
-from discover.learners.settings import PerMode, check_settings
-from discover.learners.shorter_holds import (
-    apart,
-    shortened_in_words,
-    shortened_rightly,
-    shorter_where_it_pays,
-)
+from discover.learners.settings import PerMode
+from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import law_misfit
@@ -58,7 +51,7 @@ from tensor_library.library import TermLibrary, build_library
 RECIPES = ("default", "thorough", "paper")
 
 
-class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
+class TBNNUDE(RunPrediction):
     """A tensor-basis neural network inside the differential equation, from shear stress alone.
 
     Parameters
@@ -167,37 +160,13 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.base = base
         self.solvent_viscosity = solvent_viscosity
 
-    def fit(self, X: Iterable[Run], y=None) -> "TBNNUDE":
-        """Train on σ12 of these runs.
-
-        Parameters
-        ----------
-        X
-            Runs (`Run`), or a data set.
-        y
-            Ignored: the observations are part of the runs.
-
-        Raises
-        ------
-        InputError
-            If a parameter or a run is unusable.
-        """
-        del y
-        check_settings(self.get_params(deep=False))
-        known = known_part(self)
-        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
-        require_known_rate(known, runs)
-        return self._fitted(X, runs, known, known.linear_relaxation)
-
-    def _fitted(
-        self, X: Iterable[Run], runs: list[Run], known: KnownPart, shorten: bool
-    ) -> "TBNNUDE":
+    def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
         started = time.perf_counter()
         recipe = self._recipe()
         whole = held = problem = _problem(runs, known)
         followed, fitted = runs, ""
         if isinstance(recipe, DefaultRecipe):
-            if shorten:
+            if shorten and known.linear_relaxation:
                 followed, problem = shorter_where_it_pays(
                     runs,
                     whole,
@@ -220,9 +189,6 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         chosen, fits = choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
-        self.n_features_in_ = 1
-        self.runs_ = tuple(runs)
-        self.provenance_ = provenance_of(X, runs)
         self.members_ = members
         self.ensemble_ = agreement
         self.law_ = best.law
@@ -233,10 +199,11 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
         shortened = ""
         if followed is not runs:
-            off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
-            if not shortened_rightly(off, best.misfit):
-                return self._fitted(X, runs, known, shorten=False)
-            shortened = shortened_in_words(whole, held, off)
+            recorded = self._predict_runs(runs), self._predict_runs(list(followed))
+            shortened = shortened_rightly(whole, held, recorded, best.misfit)
+            if not shortened:
+                self._learn(runs, known, shorten=False)
+                return
         cloud = sample_states(best.law, problem)
         library = self.projection_library or build_library(degree=1)
         projection = project(best.law, cloud, library)
@@ -269,7 +236,6 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
             message="; ".join(filter(None, (best.message, trained[0].left_out, fitted, shortened))),
             members=tuple(self.fitting_) if len(self.fitting_) > 1 else (),
         )
-        return self
 
     def predict_members(
         self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
@@ -285,7 +251,6 @@ class TBNNUDE(RunPrediction, RegressorMixin, BaseEstimator):
         return member_predictions(self.ensemble_fluids_, protocol, times)
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        check_is_fitted(self, "fluid_")
         flows = lay_out(
             [run.protocol for run in runs],
             [run.time for run in runs],

@@ -35,13 +35,6 @@ def surprises(
 
     The noise is what the best of them leaves. Where that is correlated, so that no law of these is
     the whole one, its samples count as fewer, as a first-order autoregression has it.
-
-    Parameters
-    ----------
-    laws
-        Trained on the problem; at least one varies somewhere.
-    problem
-        The training data.
     """
     along = [trajectories(law, problem) for law in laws]
     misses = [np.asarray(relative_misses(one, problem)) for one in along]
@@ -83,8 +76,6 @@ def posterior_draws(
     ----------
     law
         Trained on the problem, with coefficients that vary.
-    problem
-        The training data.
     keys
         One for each draw.
     fits

@@ -25,15 +25,7 @@ _STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds m
 def race_of_functions(
     session: Session, start: TensorBasisNetwork
 ) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
-    """Return the best law of few tensors with varying coefficients, before and after polish.
-
-    Parameters
-    ----------
-    session
-        Of the training.
-    start
-        A law with h = 0.
-    """
+    """Return the best law of few tensors with varying coefficients, before and after polish."""
     chosen = np.zeros(N_COEFFICIENTS, bool)
     law, misfit = start, np.inf
     penalised = law
@@ -95,15 +87,6 @@ def nearly_constant_functions(
     """Return laws whose coefficients vary as little as the residual allows, the last the best.
 
     Those before it are held to less variation still.
-
-    Parameters
-    ----------
-    session
-        Of the training.
-    start
-        A law with h = 0.
-    constants
-        From which its coefficients begin, in the order of the tensors.
     """
     everything = np.ones(N_COEFFICIENTS, bool)
     law = with_tensors(start, everything)
@@ -128,17 +111,7 @@ def nearly_constant_functions(
 def functions_along(
     session: Session, start: TensorBasisNetwork, groups: Sequence[Sequence[int]]
 ) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
-    """Return a law that takes tensors group by group, without a race, as far as that pays.
-
-    Parameters
-    ----------
-    session
-        Of the training.
-    start
-        A law with h = 0.
-    groups
-        Tensors, group by group.
-    """
+    """Return a law that takes tensors group by group, without a race, as far as that pays."""
     chosen = np.zeros(N_COEFFICIENTS, bool)
     law, misfit = start, np.inf
     penalised = law

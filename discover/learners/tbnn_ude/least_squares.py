@@ -49,8 +49,6 @@ class Objective(eqx.Module):
 
     Attributes
     ----------
-    problem
-        The data.
     rebuild
         Which weights move, and the law around them.
     cloud, prior
@@ -218,8 +216,6 @@ def minimise(
     ----------
     weights
         Where to start.
-    objective
-        What to minimise.
     steps
         Largest number of steps.
     callback

@@ -126,17 +126,7 @@ def reweighted(
     strength: float | Float[Array, ""],
     variation_share: float = 1.0,
 ) -> PriorWeights:
-    """Return the weights of the next round, from the root mean squares of this one.
-
-    Parameters
-    ----------
-    law, cloud
-        The law of this round and where it is looked at.
-    strength
-        κ.
-    variation_share
-        Strength of the second sum over that of the first.
-    """
+    """Return the weights of the next round, from the root mean squares of this one."""
     amount, variation = parts(law, cloud)
 
     def reciprocal(rows):

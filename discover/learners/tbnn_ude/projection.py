@@ -27,8 +27,6 @@ class Projection:
 
     Attributes
     ----------
-    library
-        The terms chosen.
     coefficients
         Their least-squares coefficients, shape (n,).
     inner
@@ -52,17 +50,6 @@ def project(
     Forward selection with backward elimination on the value of h at the states of `cloud`. The
     result describes the network; it is not fitted to the data. There is one term at least, however
     badly it describes h: the misfit says how badly.
-
-    Parameters
-    ----------
-    law
-        The trained law.
-    cloud
-        States that training visited.
-    library
-        Candidate terms.
-    max_terms
-        Largest number of terms.
     """
     # of several modes each counts as the record shows it: a slow one's h may be a million
     weight = np.asarray(cloud.weight)[:, None]

@@ -64,14 +64,10 @@ def train_default(
 
     Parameters
     ----------
-    problem
-        The training data.
     key
         For the initial weights.
     linear_relaxation
         Whether −σ is known.
-    recipe
-        Settings.
     progress
         Called after every step with step, total number of steps (at most) and misfit.
     base_law
@@ -152,10 +148,6 @@ def train_along(
 
     Parameters
     ----------
-    problem
-        The training data.
-    key
-        For the initial weights.
     found
         A trained law: its invariant scale, base and known relaxation are taken over.
     groups

@@ -131,8 +131,6 @@ def train_paper(
         For the initial weights.
     linear_relaxation
         Whether −σ is known.
-    recipe
-        Settings.
     progress
         Called every 50 iterations with iteration, total and loss.
     base_law

@@ -37,11 +37,6 @@ class MemberPredictions:
     N1: Float[np.ndarray, "members n"]
     N2: Float[np.ndarray, "members n"]
 
-    @property
-    def ran_away(self) -> int:
-        """Number of members that could not be integrated through the flow."""
-        return int(np.sum(np.any(np.isnan(self.sigma12), axis=1)))
-
     def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """Return the lowest and the highest prediction at each time; nan where all ran away.
 
@@ -79,15 +74,7 @@ def member_predictions(
 
 
 def coefficient_spread(members: Sequence[TensorBasisNetwork], cloud: Cloud) -> dict[str, float]:
-    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training.
-
-    Parameters
-    ----------
-    members
-        The laws.
-    cloud
-        States at which all of them are looked at.
-    """
+    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training."""
     values = np.stack([np.asarray(cloud.coefficients(member)) for member in members])
     rms = np.sqrt(np.mean(np.var(values, axis=0), axis=0))
     return dict(zip(TENSOR_NAMES, map(float, rms), strict=True))

@@ -92,17 +92,7 @@ def states_and_jacobian(
     count: int | None = None,
     first: Int[Array, ""] | np.int32 | int = 0,
 ) -> tuple[Along, Float[Array, "runs n p"]]:
-    """Return what is recorded and the states at the samples, and what each weight changes of it.
-
-    Parameters
-    ----------
-    weights, rebuild
-        The numbers that move, and how they make a law.
-    problem
-        The training data.
-    count, first
-        How many runs, and the first of them; by default all.
-    """
+    """Return what is recorded and the states at the samples, and what each weight changes of it."""
     flows, looked_at = problem.flows, problem.sample_mask
     if count is not None:
         flows = flows.some(first, count)

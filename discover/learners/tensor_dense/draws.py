@@ -39,15 +39,7 @@ class DenseDraws:
     moduli: Float[np.ndarray, "draws k"] | None = None
 
     def laws(self, library: TermLibrary, base: AbstractConstitutiveLaw) -> WeightedLaws:
-        """Return the laws, dimensionless, the known one included.
-
-        Parameters
-        ----------
-        library
-            The terms.
-        base
-            The known law.
-        """
+        """Return the laws, dimensionless, the known one included."""
 
         def law(constants, coefficients):
             reference = ReferenceLaw(

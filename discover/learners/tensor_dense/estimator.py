@@ -7,7 +7,6 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
@@ -17,11 +16,10 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import known_part, require_known_rate
-from discover.learners.provenance import Provenance, provenance_of
+from discover.learners.known_part import KnownPart, known_part
+from discover.learners.provenance import Provenance
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.runs import as_runs
-from discover.learners.settings import PerMode, check_library, check_settings
+from discover.learners.settings import PerMode, check_library
 from discover.learners.tensor_dense.draws import DenseDraws
 from discover.learners.tensor_dense.mixture import Mixture, Optimum, explore
 from discover.learners.tensor_dense.reference_laws import (
@@ -41,7 +39,7 @@ from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 
 
-class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
+class TensorDense(RunPrediction):
     """Every term of a library at once, with a Gaussian prior: what σ12 leaves open.
 
     A sparse law's band holds if the law is in the library. Here no term is left out: each has a
@@ -156,29 +154,9 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         self.base = base
         self.modulus_covariance = modulus_covariance
 
-    def fit(self, X: Iterable[Run], y=None) -> "TensorDense":
-        """Find the laws that fit these runs.
-
-        Parameters
-        ----------
-        X
-            Runs (`Run`), or a data set.
-        y
-            Ignored: the observations are part of the runs.
-
-        Raises
-        ------
-        InputError
-            If a parameter or a run is unusable.
-        """
-        del y
+    def _learn(self, runs: list[Run], known: KnownPart) -> None:
         started = time.perf_counter()
-        check_settings(self.get_params(deep=False))
-        self._check_parameters()
-        known = known_part(self)
-        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
-        require_known_rate(known, runs)
-        problem = self._problem(runs)
+        problem = self._problem(runs, known)
 
         def sizes(constants):
             return term_sizes(with_reference(problem, constants))
@@ -187,10 +165,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         found = explore(problem, sizes, self.misfit_floor, self.random_state or 0, say)
         at = _point(found)
         library = problem.library
-        self.runs_ = tuple(runs)
-        self.provenance_ = provenance_of(X, runs)
         self.library_, self.coefficients_ = _whole(library, found, at, problem)
-        self.n_features_in_ = 1
         self.noise_ = found.noise
         constants = np.stack([o.constants for o in found.optima])[found.optimum_of_draw]
         self.draws_ = DenseDraws(
@@ -205,7 +180,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
             inner=jnp.zeros(0),
             library=self.library_,
             linear_relaxation=_reference(problem).linear_relaxation,
-            base=known_part(self).law,
+            base=known.law,
         )
         self.fluid_ = Fluid(
             self.law_, problem.modulus, problem.relaxation_time, problem.solvent_viscosity
@@ -223,7 +198,6 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
                 f"{len({o.reference for o in found.optima})} named laws fit as well."
             ),
         )
-        return self
 
     def laws_that_fit(self) -> WeightedLaws:
         """Return the laws that make the band, dimensionless, with their weights."""
@@ -247,8 +221,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         its samples, shape (3, n). None where laws of more than half of the weight run away.
         """
         check_is_fitted(self, "fluid_")
-        fluid = self.fluid_
-        runs = as_runs(X, fluid.relaxation_time, fluid.law.linear_relaxation)
+        fluid, runs = self.fluid_, self._runs(X)
         flows = lay_out(
             [r.protocol for r in runs],
             [r.time for r in runs],
@@ -261,8 +234,7 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
             [len(run) for run in runs],
         )
 
-    def _problem(self, runs: list[Run]) -> TrajectoryProblem:
-        known = known_part(self)
+    def _problem(self, runs: list[Run], known: KnownPart) -> TrajectoryProblem:
         library = build_library(degree=1) if self.library is None else self.library
         base = UpperConvectedMaxwell(known.linear_relaxation) if known.law is None else known.law
         # every named law relaxes: where the known part does not, the reference brings −σ along
@@ -286,7 +258,6 @@ class TensorDense(RunPrediction, RegressorMixin, BaseEstimator):
         )
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        check_is_fitted(self, "fluid_")
         return predict_runs(self.fluid_, self.library_, runs, self.strain_step)
 
     def _check_parameters(self) -> None:

@@ -142,8 +142,6 @@ def explore(
         its constants.
     noise_floor
         Relative misfit that no data are taken to go below.
-    seed
-        Of the draws.
     progress
         Called with a line of text, or None.
 

@@ -47,8 +47,6 @@ class ReferenceLaw(AbstractExtendedLaw):
         α, ξ, ε, k and m.
     relaxation
         r: one where the known law lacks −σ, else zero.
-    base
-        The known law.
     linear_relaxation
         Whether the known law holds −σ.
     """
@@ -123,15 +121,7 @@ def with_reference(
 
 
 def fit_reference(problem: TrajectoryProblem, name: str) -> tuple[Float[np.ndarray, " 5"], float]:
-    """Return the constants of a reference law that fit best, and the relative misfit.
-
-    Parameters
-    ----------
-    problem
-        Data; its known law is a `ReferenceLaw`.
-    name
-        Key of `REFERENCES`.
-    """
+    """Return the constants of a reference law that fit best, and the relative misfit."""
     target = np.asarray(problem.weight * problem.target).reshape(-1)
     free = REFERENCES[name].free
     places = list(free)

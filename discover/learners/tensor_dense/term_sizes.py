@@ -16,13 +16,7 @@ _COUNTS = (1.0, 1.0, 1.0, 2.0)
 
 
 def term_sizes(problem: TrajectoryProblem) -> Float[np.ndarray, " n"]:
-    """Return the root-mean-square Frobenius norm of every term, dimensionless.
-
-    Parameters
-    ----------
-    problem
-        Runs, library, and the known law whose trajectories these are.
-    """
+    """Return the root-mean-square Frobenius norm of every term, dimensionless."""
     return np.asarray(_sizes(problem))
 
 

@@ -18,15 +18,7 @@ from discover.learners.trajectories.modulus_errors import modulus_columns
 
 
 def criteria_beside_modes(search: SupportSearch, path: Sequence[Fit]) -> Float[np.ndarray, " path"]:
-    """Return the criterion of each member of a path, each with the moduli that suit it best.
-
-    Parameters
-    ----------
-    search
-        The search that made the fits.
-    path
-        Fits on all rows.
-    """
+    """Return the criterion of each member of a path, each with the moduli that suit it best."""
     plain = np.array([search.criterion(fit) for fit in path])
     if not np.any(np.asarray(search.problem.modulus_error)):
         return plain

@@ -27,16 +27,12 @@ def draws_of_fit(
 
     Parameters
     ----------
-    problem
-        The data.
     fit
         A fit on all rows, with at least one term.
     uncertainty
         Of the fit, linearised.
     slots
         Largest size of a support; sets the shape of the compiled program.
-    seed
-        Of the draws.
     """
     residual, columns, inner = sensitivities_at(problem, fit)
     centre = np.append(fit.coefficients, fit.inner[list(inner)])

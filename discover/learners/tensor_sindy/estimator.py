@@ -1,15 +1,13 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.errors import InputError
@@ -17,17 +15,11 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.known_part import KnownPart, known_part, require_known_rate
-from discover.learners.provenance import Provenance, provenance_of
+from discover.learners.known_part import KnownPart
+from discover.learners.provenance import Provenance
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.runs import as_runs
-from discover.learners.settings import PerMode, check_library, check_settings
-from discover.learners.shorter_holds import (
-    apart,
-    shortened_in_words,
-    shortened_rightly,
-    shorter_where_it_pays,
-)
+from discover.learners.settings import PerMode, check_library
+from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
@@ -66,7 +58,7 @@ SCREENINGS = ("auto", "exact")
 SELECTIONS = ("bic", "held_out", "one_standard_error")
 
 
-class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
+class TensorSINDy(RunPrediction):
     """Sparse regression on a frame-invariant library, from shear stress alone.
 
     The normal stresses are integrated, never observed. Along a trial law's trajectory the data
@@ -228,34 +220,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         self.modulus_covariance = modulus_covariance
         self.screening = screening
 
-    def fit(self, X: Iterable[Run], y=None) -> "TensorSINDy":
-        """Find the law of these runs.
-
-        Parameters
-        ----------
-        X
-            Runs (`Run`), or a data set.
-        y
-            Ignored: the observations are part of the runs.
-
-        Raises
-        ------
-        InputError
-            If a parameter or a run is unusable.
-        """
-        del y
-        check_settings(self.get_params(deep=False))
-        self._check_parameters()
-        known = known_part(self)
-        # once, for it may be read only once
-        runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
-        require_known_rate(known, runs)
-        shorten = self.screening == "auto" and known.linear_relaxation
-        return self._fitted(X, runs, known, shorten)
-
-    def _fitted(
-        self, X: Iterable[Run], runs: list[Run], known: KnownPart, shorten: bool
-    ) -> "TensorSINDy":
+    def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
         started = time.perf_counter()
         library = build_library() if self.library is None else self.library
 
@@ -275,7 +240,7 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
 
         whole = problem = make(runs, strain_step=self.strain_step)
         followed, rough = runs, None
-        if shorten:
+        if shorten and self.screening == "auto" and known.linear_relaxation:
             followed, problem = shorter_where_it_pays(
                 runs, whole, partial(make, strain_step=self.strain_step), known.relaxation_time
             )
@@ -313,12 +278,9 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         fit = path[chosen]
         search.bring_near(fit)
 
-        self.runs_ = tuple(runs)
-        self.provenance_ = provenance_of(X, runs)
         self.search_ = search
         self.path_ = path
         self.library_ = library
-        self.n_features_in_ = 1
         self.coefficients_ = fit.dense(len(library))
         self.inner_ = fit.inner
         self.law_ = _law(library, fit, known)
@@ -327,10 +289,11 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
         )
         shortened = ""
         if followed is not runs:
-            off = apart(self._predict_runs(runs), self._predict_runs(list(followed)))
-            if not shortened_rightly(off, fit.misfit):
-                return self._fitted(X, runs, known, shorten=False)
-            shortened = f"; {shortened_in_words(whole, problem, off)}"
+            recorded = self._predict_runs(runs), self._predict_runs(list(followed))
+            shortened = shortened_rightly(whole, problem, recorded, fit.misfit)
+            if not shortened:
+                self._learn(runs, known, shorten=False)
+                return
         self.stability_ = None
         if self.n_stability:
             self.stability_ = selection_stability(
@@ -391,13 +354,12 @@ class TensorSINDy(RunPrediction, RegressorMixin, BaseEstimator):
             message=(
                 f"{len(fit.support)} of {len(library)} terms leave a relative misfit of "
                 f"{fit.misfit:.2g}; {search.n_refitted} supports were refitted"
-                f"{ranked_in_words(problem, rough, len(search.fits))}{shortened}."
+                f"{ranked_in_words(problem, rough, len(search.fits))}"
+                f"{'; ' if shortened else ''}{shortened}."
             ),
         )
-        return self
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        check_is_fitted(self, "fluid_")
         return predict_runs(self.fluid_, self.library_, runs, self.strain_step)
 
     def _check_parameters(self) -> None:

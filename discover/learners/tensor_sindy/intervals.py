@@ -97,8 +97,6 @@ def parameter_uncertainty(
 
     Parameters
     ----------
-    problem
-        The data.
     fit
         A fit on all rows, with at least one term.
     misfit_floor

@@ -18,17 +18,7 @@ def recovered_terms(
     uncertainty: ParameterUncertainty | None,
     draws: WeighedDraws | None,
 ) -> tuple[RecoveredTerm, ...]:
-    """Return the terms of a fit; none of an empty law.
-
-    Parameters
-    ----------
-    search, fit
-        The search, and the fit of the support that was chosen.
-    optimizer
-        Which gives the penalised coefficients.
-    uncertainty, draws
-        Of the fit; None for an empty law.
-    """
+    """Return the terms of a fit; none of an empty law."""
     library = search.problem.library
     if not fit.support:
         return ()

@@ -90,17 +90,7 @@ def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:
 
 
 def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str, Any]:
-    """Return the covariance of a law's parameters and, where it does not serve, their draws.
-
-    Parameters
-    ----------
-    search
-        The search that made the fit.
-    fit
-        The law.
-    seed
-        Of the draws.
-    """
+    """Return the covariance of a law's parameters and, where it does not serve, their draws."""
     if not fit.support:
         return {"covariance": None, "draws": None}
     uncertainty = parameter_uncertainty(search.problem, fit, search.floor, search.slots)
@@ -109,13 +99,7 @@ def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str,
 
 
 def frequency_table(library: TermLibrary, stability: Stability | None) -> list[dict[str, Any]]:
-    """Return how often each term was chosen from halves of the data, the most often first.
-
-    Parameters
-    ----------
-    library, stability
-        What was searched, and how often each of its terms was chosen; None where nobody asked.
-    """
+    """Return how often each term was chosen from halves of the data, the most often first."""
     if stability is None:
         return []
     rows = [
@@ -131,13 +115,7 @@ def frequency_table(library: TermLibrary, stability: Stability | None) -> list[d
 
 
 def noise_of(uncertainty: ParameterUncertainty | None) -> dict[str, Any] | None:
-    """Return what is known of the noise, as numbers; None for an empty law.
-
-    Parameters
-    ----------
-    uncertainty
-        Of the law.
-    """
+    """Return what is known of the noise, as numbers; None for an empty law."""
     if uncertainty is None:
         return None
     noise = uncertainty.noise

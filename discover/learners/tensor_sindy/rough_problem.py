@@ -22,17 +22,7 @@ def rough_problem(
     runs: Sequence[Run],
     make: Callable[..., TrajectoryProblem],
 ) -> TrajectoryProblem | None:
-    """Return the problem with fewer samples and longer steps; None where that saves little.
-
-    Parameters
-    ----------
-    problem
-        On the fine grid.
-    runs
-        What it was made of.
-    make
-        Returns the problem of runs, given limits of steps as `make_grid` takes them.
-    """
+    """Return the problem with fewer samples and longer steps; None where that saves little."""
     steps = problem.flows.n_steps
     if problem.modulus.size * steps <= AFFORDABLE:
         return None
@@ -48,15 +38,7 @@ def _most_samples(run: Run) -> int:
 
 
 def ranked_in_words(fine: TrajectoryProblem, rough: TrajectoryProblem | None, fitted: int) -> str:
-    """Return what was left out of a search to save time; empty if nothing.
-
-    Parameters
-    ----------
-    fine, rough
-        Its problems; no rough one where every support was fitted on the fine one.
-    fitted
-        Number of supports that were fitted on the fine one.
-    """
+    """Return what was left out of a search to save time; empty if nothing."""
     if rough is None:
         return ""
     share = fine.flows.n_steps / rough.flows.n_steps

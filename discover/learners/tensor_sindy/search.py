@@ -27,8 +27,8 @@ BREADTH = 8
 _FEWEST_SLOTS = 5
 
 # Of each size, what a rough grid ranks first is fitted again: at least so many, and those that
-# leave little more. Of laws that may rival the one chosen, so many at most.
-_FEWEST_TAKEN, _CLOSE_BEHIND, _MOST_NEAR = 3, 1.01, 24
+# leave little more. Laws may rival the one chosen up to so many times its misfit, so many at most.
+_FEWEST_TAKEN, _CLOSE_BEHIND, _WITHIN, _MOST_NEAR = 3, 1.01, 1.5, 24
 
 
 def _silent(line: str) -> None:
@@ -190,19 +190,11 @@ class SupportSearch:
             chosen += [fit.support for fit in ranked[: min(max(close, _FEWEST_TAKEN), BREADTH)]]
         self._refit(chosen, {s: scout.fits[s] for s in chosen})
 
-    def bring_near(self, chosen: Fit, within: float = 1.5) -> None:
-        """Fit on the grid of this search every law that may rival a chosen one.
-
-        Parameters
-        ----------
-        chosen
-            A fit of this search.
-        within
-            Misfit over that of the chosen law up to which a law may.
-        """
+    def bring_near(self, chosen: Fit) -> None:
+        """Fit on the grid of this search every law that may rival a chosen one."""
         if self.scout is None or chosen.support not in self.scout.fits:
             return
-        limit = within * self.scout.fits[chosen.support].misfit
+        limit = _WITHIN * self.scout.fits[chosen.support].misfit
         self._far = {s for s, fit in self.scout.fits.items() if fit.misfit > limit}
         near = [
             fit

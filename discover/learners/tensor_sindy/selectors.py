@@ -35,8 +35,6 @@ def compare_selectors(
 
     Parameters
     ----------
-    names
-        Terms of the library.
     path
         Best fit of each size.
     criterion, held_out

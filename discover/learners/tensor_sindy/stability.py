@@ -60,8 +60,6 @@ def selection_stability(
 
     Parameters
     ----------
-    problem
-        The data.
     fit
         Law at which the trajectory is linearised.
     optimizer

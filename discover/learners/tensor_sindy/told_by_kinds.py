@@ -22,17 +22,7 @@ _observe = compiled(observe)
 
 
 def told_by_kinds(search: SupportSearch, fit: Fit, runs: Sequence[Run]) -> tuple[Told, ...]:
-    """Return what tests of each kind tell; nothing where all runs are of one kind.
-
-    Parameters
-    ----------
-    search
-        The search that made the fit.
-    fit
-        The law.
-    runs
-        That were fitted.
-    """
+    """Return what tests of each kind tell; nothing where all runs are of one kind."""
     problem = search.problem
     kinds = [kind_of_record(run) for run in runs]
     seen = np.any(np.asarray(problem.weight) > 0, axis=1)

@@ -33,17 +33,7 @@ def held_out_misfits(
     scale: Float[np.ndarray, " n"],
     slots: int,
 ) -> tuple[Float[np.ndarray, "path folds"], Float[np.ndarray, "path runs"]]:
-    """Return the relative misfit of each member on each fold and run, refitted on other folds.
-
-    Parameters
-    ----------
-    problem, scale, slots
-        As in `refit`.
-    path
-        Fits on all runs; refits start from them.
-    folds
-        Fold of each run, from 0.
-    """
+    """Return the relative misfit of each member on each fold and run, refitted on other folds."""
     n_folds = int(np.max(folds)) + 1
     n_terms = len(problem.library)
     samples = problem.target.shape[1]

@@ -88,19 +88,7 @@ def weighed_draws(
     deviance: Deviance,
     seed: int = 0,
 ) -> WeighedDraws:
-    """Return draws of parameters that fit the data, or say why there are none.
-
-    Parameters
-    ----------
-    centre
-        The fit.
-    covariance
-        Of its linearisation.
-    deviance
-        Of any laws from the fit.
-    seed
-        Of the draws.
-    """
+    """Return draws of parameters that fit the data, or say why there are none."""
     size = centre.size
     scale = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     if not np.all(np.isfinite(covariance)) or np.any(scale <= 0.0):

@@ -21,15 +21,6 @@ def evaluate_active(
 
     The cost grows with the number of active terms, not with the library: each term is looked up
     in a table of its factors.
-
-    Parameters
-    ----------
-    library
-        The library.
-    active
-        Positions of the terms.
-    stress, rate, inner
-        As in `TermLibrary.evaluate`.
     """
     factors, forms, tensors = _factor_table(library)
     invariants = scalar_invariants(stress, rate)

@@ -18,17 +18,6 @@ def predict_runs(
     """Return what each run records of a fluid at the times of its samples.
 
     The same padded layout as in the fit, so that folds share a compilation.
-
-    Parameters
-    ----------
-    fluid
-        The fluid.
-    library
-        The terms that were searched.
-    runs
-        Where to predict.
-    strain_step
-        Largest strain between steps of the integration.
     """
     problem = make_problem(
         runs,

@@ -212,8 +212,6 @@ def observe(
         Data and known physics.
     active
         Positions in the library of the terms with a sensitivity; repeated positions add up.
-    coefficients
-        Their coefficients.
     inner
         Inner parameters of the closed forms.
 

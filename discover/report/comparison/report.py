@@ -33,10 +33,6 @@ def write_comparison(
 
     Parameters
     ----------
-    comparison
-        What to report.
-    folder
-        Where to.
     linear_relaxation
         Whether −σ was part of the known law.
     study_text

@@ -87,17 +87,7 @@ class Section:
 
 
 def sections(comparison: Comparison, run: Content, linear_relaxation: bool) -> list[Section]:
-    """Return the sections between the pictures and how it was learned, without the empty ones.
-
-    Parameters
-    ----------
-    comparison
-        What to report.
-    run
-        From `made_by`.
-    linear_relaxation
-        Whether −σ was part of the known law.
-    """
+    """Return the sections between the pictures and how it was learned, without the empty ones."""
     drawn = []
     for anchor, heading, link, parts in _outline(comparison, linear_relaxation):
         shown = [part.draw(comparison, run) for part in parts]

@@ -9,13 +9,7 @@ from discover.report.wording import percent
 
 
 def agreement_words(agreements: Sequence[Agreement]) -> list[str]:
-    """Return whether linear tests predict one another, a sentence for each two.
-
-    Parameters
-    ----------
-    agreements
-        One for each two tests and each temperature.
-    """
+    """Return whether linear tests predict one another, a sentence for each two."""
     groups = groupby(sorted(agreements, key=_pair), key=_pair)
     said = [_sentence(list(group)) for _, group in groups]
     return [*said, *_apart(agreements)]
@@ -81,13 +75,7 @@ def _degrees(group: Sequence[Agreement]) -> str:
 
 
 def agreement_lines(agreements: Sequence[Agreement]) -> list[dict[str, str]]:
-    """Return the lines of the table on the page.
-
-    Parameters
-    ----------
-    agreements
-        One for each two tests and each temperature.
-    """
+    """Return the lines of the table on the page."""
     return [
         {
             "source": NAMES[one.source],

@@ -26,19 +26,7 @@ _ENOUGH_TO_HOLD_OUT = 3
 def data_page(
     dataset: Dataset, findings: Sequence[Finding], folder: str, imported: Sequence[str] = ()
 ) -> str:
-    """Return a page with every test drawn, what is doubtful, and a study to start from.
-
-    Parameters
-    ----------
-    dataset
-        The data.
-    findings
-        Of the check of its folder.
-    folder
-        As the study names it.
-    imported
-        What an import said of the files.
-    """
+    """Return a page with every test drawn, what is doubtful, and a study to start from."""
     try:
         spectrum = None
         if dataset.linear_sweep is not None:
@@ -98,15 +86,7 @@ def _ends(values: np.ndarray, unit: str) -> str:
 
 
 def first_study(dataset: Dataset, folder: str) -> str:
-    """Return a study of these data that runs as it is, as TOML.
-
-    Parameters
-    ----------
-    dataset
-        The data.
-    folder
-        As the study names it.
-    """
+    """Return a study of these data that runs as it is, as TOML."""
     lines = ["[data]", f"folder = {_quoted(folder)}"]
     if len(dataset) >= _ENOUGH_TO_HOLD_OUT:
         fastest = max(dataset, key=lambda run: float(np.max(np.abs(run.rate))))

@@ -137,19 +137,7 @@ def superposition_page(
     agreements: Sequence[Agreement] = (),
     own: Mapping[str, Superposition] | None = None,
 ) -> str:
-    """Return the page.
-
-    Parameters
-    ----------
-    found
-        Tests and shifts.
-    name
-        Of the data.
-    agreements
-        Of linear tests with one another.
-    own
-        What tables over time ask for by themselves.
-    """
+    """Return the page."""
     pictures = attempt("The pictures", lambda: superposition_pictures(found))
     kinds = [kind for kind in found.tests if found.misfits(kind)]
     misfits = {kind: found.misfits(kind) for kind in kinds}

@@ -39,10 +39,6 @@ def write_loop(
 
     Parameters
     ----------
-    result
-        What to report.
-    folder
-        Where to.
     name, summary
         Title, and the data and declared model in words.
     study_text

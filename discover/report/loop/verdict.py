@@ -7,7 +7,7 @@ import numpy as np
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Stage
-from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates, of_json
+from discover.dataset.coarse_rates import MORE_SAMPLES, CoarseRates, coarse_in
 from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.protocols.kinematics import ONLY_STATES
@@ -262,9 +262,7 @@ def _several(names: Sequence[str], word: str) -> str:
 
 def _coarse(result: LoopResult) -> CoarseRates | None:
     """Return what rates read in too few samples leave open, if that is not small."""
-    found = result.remaining.get("sampled_rate")
-    coarse = of_json(found) if found else None
-    return coarse if coarse is not None and coarse.is_coarse else None
+    return coarse_in(result.remaining.get("sampled_rate"))
 
 
 def _loop_next(result: LoopResult) -> str:

@@ -36,15 +36,7 @@ _MOST_POINTS = 300
 
 
 def data_pictures(dataset: Dataset, spectrum: RelaxationSpectrum | None) -> list[Picture]:
-    """Return what can be drawn of a data set, the tests that say most of the columns first.
-
-    Parameters
-    ----------
-    dataset
-        The data.
-    spectrum
-        The modes of its linear sweep, if it has one.
-    """
+    """Return what can be drawn of a data set, the tests that say most of the columns first."""
     drawn = [_runs(dataset.runs)] if len(dataset) else []
     sweep, tables = dataset.linear_sweep, dataset.material_functions
     if sweep is not None:

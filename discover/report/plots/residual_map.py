@@ -36,8 +36,6 @@ class ResidualRow:
 
     Attributes
     ----------
-    name
-        Of the run.
     along
         Time or strain, increasing, shape (n,).
     values

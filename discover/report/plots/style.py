@@ -252,15 +252,7 @@ def literal(text: str) -> str:
 
 
 def picture(drawing: Figure, name: str, caption: str, switched: tuple[str, ...] = ()) -> Picture:
-    """Return the figure as SVG, the same bytes every time.
-
-    Parameters
-    ----------
-    drawing
-        The figure.
-    name, caption, switched
-        As in `Picture`.
-    """
+    """Return the figure as SVG, the same bytes every time."""
     buffer = io.StringIO()
     # as savefig does, which draws once more before, to no effect on these figures
     canvas = FigureCanvasSVG(drawing)

@@ -25,13 +25,7 @@ _LINES = {"WLF": ("-", NETWORK), "Arrhenius": ("--", SPARSE)}
 
 
 def superposition_pictures(found: Superposition) -> list[Picture]:
-    """Return the pictures of a superposition.
-
-    Parameters
-    ----------
-    found
-        Tests and shifts.
-    """
+    """Return the pictures of a superposition."""
     pictures = [_overlap(found), _van_gurp(found)] if SWEEP in found.tests else []
     if any(kind != SWEEP for kind in found.tests):
         pictures.append(_over_time(found))

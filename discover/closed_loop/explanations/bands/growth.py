@@ -19,8 +19,6 @@ def growth(
 
     Parameters
     ----------
-    errors
-        Relative errors of the fitted runs.
     rates, others
         Largest rates of these and of other runs in 1/s; zero where a run has none.
     """

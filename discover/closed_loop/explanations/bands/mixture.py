@@ -39,8 +39,6 @@ def mixed_bands(
 
     Parameters
     ----------
-    model, fitted
-        The model, and the runs that were fitted.
     carried, probabilities
         The explanations, and how probable each is.
     batches

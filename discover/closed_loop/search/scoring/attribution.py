@@ -64,8 +64,6 @@ def attribute(
         How many candidates with signatures of their own lead, how many more whose signature one
         of those has already, and, where constants of the declared model are fitted, how many of
         the simplest that seem to do nothing.
-    admitted
-        Which effects are candidates.
     """
     waiting = [e for e in model.effects if e.name not in active and admitted(e)]
     if not waiting:

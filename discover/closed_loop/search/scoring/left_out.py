@@ -22,7 +22,7 @@ def run_errors(
     parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
     weight: Float[np.ndarray, "runs n"],
 ) -> Float[np.ndarray, " runs"]:
-    """Return the relative error of each run, from parts as in `part_errors`."""
+    """Return the relative error of each run, from the parts of `left_out_parts`."""
     squares = np.zeros(len(weight))
     for held, missed in parts:
         squares += np.sum(np.where(held, missed, 0.0), axis=1)
@@ -42,13 +42,6 @@ def left_out_parts(
 
     A fit without some samples is one Gauss–Newton step from the fit with them, and they are then
     predicted with the whole nonlinear model. What cannot be predicted counts as missed by far.
-
-    Parameters
-    ----------
-    problem
-        What is fitted to what.
-    fit
-        The fit to all of it.
     """
     model, weighted = problem.model, problem.weight > 0
     folds = _folds(weighted, problem.alone)
@@ -81,15 +74,7 @@ def part_errors(
     parts: Sequence[tuple[Bool[np.ndarray, "runs n"], Float[np.ndarray, "runs n"]]],
     weight: Float[np.ndarray, "runs n"],
 ) -> Float[np.ndarray, " parts"]:
-    """Return the relative error of each part, from squared weighted residuals.
-
-    Parameters
-    ----------
-    parts
-        Which samples it holds, and squared residuals.
-    weight
-        Weights of the runs, zero at padding.
-    """
+    """Return the relative error of each part, from squared weighted residuals."""
     samples = np.count_nonzero(np.asarray(weight) > 0, axis=1)
     shares = [
         float(np.sum(np.sum(np.where(held, squares, 0.0), axis=1) * samples)) / held.sum()
@@ -107,7 +92,7 @@ _PARTS = 8
 def _folds(
     weighted: Bool[np.ndarray, "runs n"], alone: Sequence[int]
 ) -> list[Bool[np.ndarray, "runs n"]]:
-    """Return which samples are left out together; parameters as in `left_out_parts`."""
+    """Return which samples are left out together."""
     n_runs = len(weighted)
     parts = 1 if n_runs >= FEWEST_FOLDS else -(-_PARTS // n_runs)
     folds = []

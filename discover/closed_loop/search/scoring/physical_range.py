@@ -26,13 +26,6 @@ def at_an_end(model: AugmentedModel, theta: np.ndarray, names: Sequence[str]) ->
     """Return in a sentence which parameter stands at an end of its range; empty if none does.
 
     An amplitude at zero is no matter of a range; see `drop_undecided`.
-
-    Parameters
-    ----------
-    model
-        The model with all candidates.
-    theta, names
-        Parameters, and the effects among them that are asked for.
     """
     for name in names:
         effect = effect_of(model, name)
@@ -60,12 +53,8 @@ def undetermined(
 
     Parameters
     ----------
-    model, theta
-        The model and the parameters.
     bounds
         95 % interval of each fitted parameter, by position.
-    name
-        The effect.
     longest
         Length of the longest run in s. A time beyond it that may be endless is known well enough,
         but not from steady states, which know no time: there it is zero.

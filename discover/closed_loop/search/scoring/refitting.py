@@ -48,8 +48,6 @@ class Choice:
 
     Attributes
     ----------
-    candidate, fit
-        The candidate and the fit with it.
     left_out
         Error of each fitted run when left out.
     parts
@@ -68,13 +66,6 @@ def refit(problem: FitProblem, fit: Fit, leaders: Sequence[CandidateScore]) -> l
 
     The refit carries no penalty, so its coefficients are not biased towards zero; it is as sharp as
     a ranking needs (`RANKING`). Fills in the candidates' errors and evidence.
-
-    Parameters
-    ----------
-    problem, fit
-        What is fitted to what, and the current fit.
-    leaders
-        Candidates to refit.
     """
     if not leaders:
         return []
@@ -180,17 +171,7 @@ def simplest(choices: Sequence[Choice], model: AugmentedModel) -> Choice:
 def choose(
     model: AugmentedModel, choices: Sequence[Choice], left_out_before: float
 ) -> Choice | None:
-    """Return the choice with the strongest evidence that also predicts runs left out better.
-
-    Parameters
-    ----------
-    model
-        The model.
-    choices
-        Refitted candidates.
-    left_out_before
-        Mean error of the runs left out before adding anything.
-    """
+    """Return the choice with the strongest evidence that also predicts runs left out better."""
     earned = [
         choice
         for choice in choices

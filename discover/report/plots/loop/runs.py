@@ -125,8 +125,6 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     ----------
     panel
         Axes of matplotlib.
-    record
-        The run.
     along
         What the stress is drawn against, shape (n,).
     marked, shown
@@ -167,13 +165,7 @@ def draw_overlays(
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
-    """Return the models that a picture shows, by their place among the stages.
-
-    Parameters
-    ----------
-    records
-        Of one loop. Where nothing was added there is the declared model alone.
-    """
+    """Return the models that a picture shows, by their place among the stages."""
     augmented = [(-1, "augmented model")] * any(len(r.predicted) > 1 for r in records)
     return [(0, "declared model"), *augmented]
 
@@ -188,13 +180,7 @@ def short_title(record: RunRecord) -> str:
 
 
 def shortened(name: str) -> str:
-    """Return the name of a run as it fits over a panel: its beginning and its end.
-
-    Parameters
-    ----------
-    name
-        Of the run, which may be a file's.
-    """
+    """Return the name of a run as it fits over a panel: its beginning and its end."""
     for modulus in MODULI:
         name = name.replace(f".csv ({modulus})", f" {FIGURE_SYMBOLS[modulus]}")
     name = name.removesuffix(".csv")
