@@ -185,7 +185,7 @@ def run_loop(
         records=tuple(beyond.records),
         declared_parameters=own | of_law,
         declared_effects=declared_effects(final.model, final.fit, bounds, by_mode),
-        declared_law=None if differ & {*of_law} else declared_law(declared, final.fit),
+        declared_law=declared_law(declared, final.fit, {n: by_mode[n] for n in differ & {*of_law}}),
         explanations=side_by_side,
         next_tests=beyond.next_tests,
         laws=ended.laws,

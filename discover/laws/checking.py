@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import law_of_mode
 
 
 def check_law(law: AbstractConstitutiveLaw) -> None:
@@ -17,6 +18,7 @@ def check_law(law: AbstractConstitutiveLaw) -> None:
     InputError
         If it does not, or cannot be computed.
     """
+    law = law_of_mode(law, 0)
     name = type(law).__name__
     stress, rate = law.rest(), jnp.zeros(())
     try:
