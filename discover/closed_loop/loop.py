@@ -37,7 +37,7 @@ from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import Store
-from discover.closed_loop.searching import SearchTask
+from discover.closed_loop.searching import SearchResult, SearchTask
 from discover.closed_loop.verdict import FinalVerdict, verdict_on
 from discover.dataset import Dataset, Run
 from discover.effects import AbstractEffect
@@ -130,7 +130,7 @@ def run_loop(
     candidates = [effect for effect in candidates if effect.name not in known]
     require_possible(declared, [*fitted_runs, *held_runs])
     silent = records_are_silent(fitted_runs)
-    ended = SearchTask(
+    task = SearchTask(
         candidates,
         fitted_runs,
         held_runs,
@@ -141,13 +141,18 @@ def run_loop(
         store=store,
         name=name,
         say=say,
-    ).search(declared, laws)
-    declared, search = ended.declared, ended.search
-    final = final_fit(ended, fitted_runs, held_runs, dataset.names)
-    constants = final_constants(final, ended.by_mode)
+    )
     whole = dataset.select([run.name for run in fitted_runs]).runs
-    verdict = verdict_on(final, constants, silent, whole)
-    judgement = verdict.judgement
+
+    def judged(ended: SearchResult) -> Ended:
+        final = final_fit(ended, fitted_runs, held_runs, dataset.names)
+        constants = final_constants(final, ended.by_mode)
+        return ended, final, constants, verdict_on(final, constants, silent, whole)
+
+    ended, final, constants, verdict = _carrying_over(
+        task, judged(task.search(declared, laws)), judged
+    )
+    declared, search, judgement = ended.declared, ended.search, verdict.judgement
     tested = final.fitted, final.fitted if left_out_in_turn else final.held_out
     side_by_side = Explanations()
     if final.carried:
@@ -199,6 +204,28 @@ def run_loop(
         states=states or (),
         seconds=time.perf_counter() - started,
     )  # fmt: skip
+
+
+Ended = tuple[SearchResult, FinalFit, FinalConstants, FinalVerdict]
+"""A search that has ended, its final model, and what is to be believed of that."""
+
+
+def _carrying_over(
+    task: SearchTask, first: Ended, judged: Callable[[SearchResult], Ended]
+) -> Ended:
+    """Return a search whose constants by mode carry over to the runs held out, or the first.
+
+    A line in log λ may fit as well as a parabola, and be refuted by faster runs. That refutes the
+    line. So the next degree is fitted to the same runs and held against the same others, as long as
+    there is one; one that these refute too is taken for none.
+    """
+    last = first
+    while not last[-1].judgement.carries_over:
+        ended = task.one_degree_more(last[0])
+        if ended is None:
+            return first
+        last = judged(ended)
+    return first if last[-1].judgement.structured else last
 
 
 def _remaining(

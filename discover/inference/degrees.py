@@ -1,6 +1,6 @@
-"""How constants by mode depend on the relaxation time: constant, linear or quadratic in log λ."""
+"""How constants by mode depend on the relaxation time: a polynomial in log λ, or free."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import Fit
+from discover.inference.alone import half_widths_alone, is_told
 from discover.inference.evidence import BARE_MENTION
 from discover.inference.problem import FitProblem
 
@@ -19,6 +20,11 @@ _END = 1e-6
 """Share of its range within which a constant stands at an end, where no coefficient moves it."""
 
 
+FREE = DEGREE + 1
+"""The rung above the highest degree: each mode that the runs tell by itself has a constant of its
+own, and the polynomial stays for the others."""
+
+
 @dataclass(frozen=True)
 class Degree:
     """The degree of a constant by mode.
@@ -26,29 +32,69 @@ class Degree:
     Attributes
     ----------
     degree
-        0 for one constant of all modes.
+        0 for one constant of all modes, `FREE` where modes deviate from a polynomial.
     evidence
         For each degree over one constant, see `discover.inference.evidence`.
+    own
+        Modes that deviate: as many as there are told modes beyond what a polynomial follows.
+    is_raised
+        Whether a lower one fits as well, and was not to be taken.
     """
 
     degree: int = 0
     evidence: tuple[float, ...] = (0.0,)
+    own: tuple[int, ...] = ()
+    is_raised: bool = False
+
+    @property
+    def coefficients(self) -> int:
+        """Number of coefficients in log λ."""
+        return min(self.degree, DEGREE)
+
+    @property
+    def places(self) -> list[int]:
+        """Places of what varies the constant, among all that may."""
+        return [*range(self.coefficients), *(DEGREE + mode for mode in self.own)]
 
 
 def positions_of(model: AugmentedModel, degrees: Mapping[str, Degree]) -> list[int]:
-    """Return the positions of the coefficients that these degrees have."""
+    """Return the positions of the coefficients and deviations that these degrees have."""
     slices = model.declared.by_mode_slices
-    return [slices[n].start + i for n, found in degrees.items() for i in range(found.degree)]
+    return [slices[n].start + i for n, found in degrees.items() for i in found.places]
+
+
+def one_degree_more(model: AugmentedModel, degrees: Mapping[str, Degree]) -> dict[str, int]:
+    """Return the next rung of each constant by mode; empty where none has one.
+
+    Parameters
+    ----------
+    model
+        The model.
+    degrees
+        Degree of each constant by mode.
+    """
+    highest = _highest(model)
+    top = FREE if highest < len(model.declared.modulus) - 1 else highest
+    more = {name: min(found.degree + 1, top) for name, found in degrees.items()}
+    return more if any(more[n] > found.degree for n, found in degrees.items()) else {}
+
+
+def _highest(model: AugmentedModel) -> int:
+    return min(DEGREE, len(model.declared.modulus) - 1)
 
 
 def choose_degrees(
-    problem: FitProblem, fit: Fit, degrees: Mapping[str, Degree]
+    problem: FitProblem,
+    fit: Fit,
+    degrees: Mapping[str, Degree],
+    least: Mapping[str, int] | None = None,
 ) -> tuple[Fit, dict[str, Degree]]:
     """Return a fit in which constants by mode have the degree that evidence asks for, and these.
 
     One constant after the other: all degrees are fitted, each from the best of the lower one, and
     the lowest is taken of those about as strong as the strongest (`BARE_MENTION`). Of k modes no
-    more than k constants are to be had, so the degree ends at k − 1.
+    more than k constants are to be had, so the degree ends at k − 1. Of more modes than that each
+    that the runs tell by itself may be free (`FREE`): asked where the highest degree is taken.
 
     Parameters
     ----------
@@ -56,17 +102,20 @@ def choose_degrees(
         What is fitted to what, and a fit with the degrees so far.
     degrees
         By name of the constant.
+    least
+        Degrees below which none is taken, by name; by default 0.
     """
+    least = least or {}
     model, chosen = problem.model, dict(degrees)
     alone = replace(problem, n_candidates=1)  # a degree is not chosen among the candidates
     # an effect that is not in the model has no amplitude to vary
     waiting = [name for name in chosen if model.constant(name)[1] not in fit.free]
-    highest = min(DEGREE, len(model.declared.modulus) - 1)
+    highest = _highest(model)
     for name in chosen:
         if name in waiting:
             chosen[name] = Degree()
             continue
-        at = [model.declared.by_mode_slices[name].start + i for i in range(highest)]
+        at = model.varying(name)
         rest = tuple(p for p in fit.free if p not in at)
         plain = fit.theta.copy()
         plain[at] = 0.0
@@ -76,15 +125,51 @@ def choose_degrees(
             if chosen[name].degree == degree:
                 starts.append(fit.theta)
             fits.append(problem.best_fit(starts, (*rest, *at[:degree]), rivals=True))
-        best = min((trial for trial in fits if trial.usable), key=lambda trial: trial.cost)
-        effective = problem.independent_samples(best)
-        gains = [0.0] + [
-            alone.evidence(fits[0], trial, effective) if trial.usable else -np.inf
-            for trial in fits[1:]
-        ]
-        degree = next(i for i, gain in enumerate(gains) if gain >= max(gains) - BARE_MENTION)
-        chosen[name], fit = Degree(degree, tuple(map(float, gains))), fits[degree]
+        gains = _gains(alone, fits)
+        own: tuple[int, ...] = ()
+        if fits[-1].usable and (_lowest(gains) == highest or least.get(name, 0) == FREE):
+            own = _told_beyond_a_polynomial(problem, fits[-1], name)
+        if own:
+            deviating = [at[DEGREE + mode] for mode in own]
+            fits.append(problem.fit(fits[-1].theta, (*rest, *at[:highest], *deviating)))
+            gains = _gains(alone, fits)
+        lowest = _lowest(gains)
+        degree = max(lowest, min(least.get(name, 0), len(fits) - 1))
+        if not fits[degree].usable:
+            degree = lowest
+        free = own if degree == FREE else ()
+        chosen[name] = Degree(degree, tuple(map(float, gains)), free, degree > lowest)
+        fit = fits[degree]
     return fit, chosen
+
+
+def _gains(problem: FitProblem, fits: Sequence[Fit]) -> list[float]:
+    """Return the evidence for each fit over the first."""
+    best = min((trial for trial in fits if trial.usable), key=lambda trial: trial.cost)
+    effective = problem.independent_samples(best)
+    more = (
+        problem.evidence(fits[0], trial, effective) if trial.usable else -np.inf
+        for trial in fits[1:]
+    )
+    return [0.0, *map(float, more)]
+
+
+def _lowest(gains: Sequence[float]) -> int:
+    return next(i for i, gain in enumerate(gains) if gain >= max(gains) - BARE_MENTION)
+
+
+def _told_beyond_a_polynomial(problem: FitProblem, fit: Fit, name: str) -> tuple[int, ...]:
+    """Return which of the modes that the runs tell by themselves no polynomial need follow.
+
+    One passes through three of them: the fastest, the slowest and the one in their middle.
+    """
+    model = problem.model
+    told = np.flatnonzero(is_told(half_widths_alone(model, problem.batch, fit, name)))
+    if len(told) <= DEGREE + 1:
+        return ()
+    order = told[np.argsort(model.declared.relaxation_time[told])]
+    held = {int(order[0]), int(order[len(order) // 2]), int(order[-1])}
+    return tuple(int(mode) for mode in told if int(mode) not in held)
 
 
 def _starts(model: AugmentedModel, name: str, theta: np.ndarray, at: int) -> list[np.ndarray]:

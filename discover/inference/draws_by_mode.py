@@ -94,7 +94,7 @@ def _about(
     moved = (quantile / _TWO_SIDED) * even @ root_of(covariance).T
     columns = []
     for name, constant in constants.items():
-        gradient = constant.gradient(fit, degrees[name].degree)
+        gradient = constant.gradient(fit, degrees[name])
         if gradient is None:
             return None
         shifts = [np.zeros(len(constant.places)), *(moved @ gradient.T)]

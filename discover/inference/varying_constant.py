@@ -30,17 +30,20 @@ class VaryingConstant:
         Position of the first coefficient in log λ.
     places
         Of the modes, from `decades`.
+    deviate
+        Whether these are the modes, which may deviate from the polynomial.
     """
 
     law: FreeParameter
     at: int
     start: int
     places: Float[np.ndarray, " k"]
+    deviate: bool = True
 
     @property
     def at_the_mean(self) -> "VaryingConstant":
         """The same constant at the mean time alone."""
-        return replace(self, places=np.zeros(1))
+        return replace(self, places=np.zeros(1), deviate=False)
 
     def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
         """Return the constant of each mode, moved on the link's scale.
@@ -54,13 +57,15 @@ class VaryingConstant:
         """
         # one that stands far beyond an end must come back from there too
         farthest = _ACROSS if np.isfinite(self.law.high - self.law.low) else _FARTHEST
-        moved = np.clip(np.broadcast_to(shift, self.places.shape), -farthest, farthest)
+        first = self.start + DEGREE
+        own = fit.theta[first : first + len(self.places)] if self.deviate else 0.0
+        moved = np.clip(np.broadcast_to(shift, self.places.shape) + own, -farthest, farthest)
         coefficients = fit.theta[self.start : self.start + DEGREE]
         given = map(jnp.asarray, (coefficients, moved, self.places))
         mean = jnp.asarray(fit.theta[self.at])
         return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
 
-    def gradient(self, fit: Fit, degree: int) -> Float[np.ndarray, "k free"] | None:
+    def gradient(self, fit: Fit, degree: Degree) -> Float[np.ndarray, "k free"] | None:
         """Return the derivative of each mode's link in what was fitted; None at an end of a range.
 
         Parameters
@@ -68,19 +73,21 @@ class VaryingConstant:
         fit
             The fit.
         degree
-            How many coefficients in log λ are free in it.
+            What of the constant is free in it.
         """
         slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
         if not np.isfinite(slope):
             return None
         gradient = np.zeros((len(self.places), len(fit.free)))
         gradient[:, fit.free.index(self.at)] = slope
-        for i in range(degree):
+        for i in range(degree.coefficients):
             gradient[:, fit.free.index(self.start + i)] = self.places ** (i + 1)
+        for mode in degree.own if self.deviate else ():
+            gradient[mode, fit.free.index(self.start + DEGREE + mode)] = 1.0
         return gradient
 
     def band(
-        self, batch: Batch, fit: Fit, degree: int
+        self, batch: Batch, fit: Fit, degree: Degree
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the 95 % interval of each mode, and half its width on the link's scale.
 
@@ -89,7 +96,7 @@ class VaryingConstant:
         Parameters
         ----------
         batch, fit, degree
-            The fitted runs, the fit, and how many coefficients in log λ are free in it.
+            The fitted runs, the fit, and what of the constant is free in it.
         """
         covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
         gradient = self.gradient(fit, degree)
@@ -133,7 +140,8 @@ def fits_of_one_degree_more(
     """Return the fits in which one constant has its next coefficient too, by its name.
 
     Evidence for the lower degree does not say that the next coefficient is zero. A constant of the
-    highest degree has none, nor has one whose fit is not usable.
+    highest degree has none, nor has one whose fit is not usable; that modes deviate from a
+    polynomial is no coefficient more.
 
     Parameters
     ----------
@@ -147,7 +155,7 @@ def fits_of_one_degree_more(
     found = {}
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
-        if of.degree + 1 >= len(of.evidence):
+        if of.degree + 1 >= min(len(of.evidence), DEGREE + 1):
             continue
         free = (*fit.free, constant.start + of.degree)
         wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]

@@ -137,8 +137,8 @@ def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callab
 
 
 def of_each_mode(
-    function: Callable[[AbstractConstitutiveLaw], Array], law: AbstractConstitutiveLaw, count: int
-) -> Array:
+    function: Callable[[AbstractConstitutiveLaw], Tree], law: AbstractConstitutiveLaw, count: int
+) -> Tree:
     """Return what a law says of each of so many modes, along a first axis."""
     return over_modes(lambda law, _: function(law), law)(jnp.arange(count))
 

@@ -10,7 +10,7 @@ from discover.comparison.fitting.law_by_mode import (
     LawByMode,
     SparseLaw,
     coefficients_in_modes,
-    fit_law_by_mode,
+    fit_laws_by_mode,
 )
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
@@ -96,8 +96,7 @@ def ask_of_modes(
                 return OfModes(alike, None, said)
         elif alike is not None and _holds(frame, alike, explanation):
             said = _BY_MODES_APART
-    law = _law_by_mode(chosen, frame, expectation, n_candidates)
-    law = None if law is None else _held_against_unseen(law, flows, expectation)
+    law = _law_by_mode(chosen, frame, expectation, n_candidates, flows)
     return OfModes(alike, law, said if law is None else "")
 
 
@@ -116,8 +115,17 @@ def _inside(flow: Flow, alike: CoefficientsInModes, noise: float) -> bool:
 
 
 def _law_by_mode(
-    chosen: LearnerOutcome, frame: Frame, expectation: Expectation, n_candidates: int
+    chosen: LearnerOutcome,
+    frame: Frame,
+    expectation: Expectation,
+    n_candidates: int,
+    flows: Sequence[Flow],
 ) -> LawByMode | None:
+    """Return the law by mode of the lowest degree that runs held out do not refute, or the first.
+
+    A line in log λ may fit as well as a parabola, and be refuted by faster runs: that refutes the
+    line alone.
+    """
     model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
     predicted = [chosen.predictions[flow.key] for flow in training]
     seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
@@ -130,8 +138,16 @@ def _law_by_mode(
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())
-    law = fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
-    return None if law is None else replace(law, bands=frame.bands(law.bands))
+    first = None
+    for law in fit_laws_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows):
+        recorded = replace(law, bands=frame.bands(law.bands))
+        held = _held_against_unseen(recorded, flows, expectation)
+        if held.explains:
+            return held
+        first = held if first is None else first
+        if not held.refuted:
+            break
+    return first
 
 
 def _held_against_unseen(
