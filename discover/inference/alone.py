@@ -40,3 +40,24 @@ def half_widths_alone(
 def is_told(half: Float[np.ndarray, " k"]) -> Bool[np.ndarray, " k"]:
     """Return where half of an interval on the link's scale tells a constant."""
     return half < _OPEN
+
+
+def told_beyond_a_polynomial(
+    model: AugmentedModel, batch: Batch, fit: Fit, name: str
+) -> tuple[int, ...]:
+    """Return which of the modes that the runs tell by themselves no polynomial need follow.
+
+    One of the highest degree passes through three of them: the fastest, the slowest and the one in
+    their middle.
+
+    Parameters
+    ----------
+    model, batch, fit, name
+        As in `half_widths_alone`.
+    """
+    told = np.flatnonzero(is_told(half_widths_alone(model, batch, fit, name)))
+    if len(told) <= DEGREE + 1:
+        return ()
+    order = told[np.argsort(model.declared.relaxation_time[told])]
+    held = {int(order[0]), int(order[len(order) // 2]), int(order[-1])}
+    return tuple(int(mode) for mode in told if int(mode) not in held)

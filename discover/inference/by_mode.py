@@ -1,7 +1,6 @@
 """The constant of each mode as finally fitted, and whether the data say anything of it."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +10,7 @@ from discover.forward.least_squares import Fit
 from discover.inference.alone import half_widths_alone, is_told
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.inference.degrees import Degree
-from discover.inference.varying_constant import varying_constants
+from discover.inference.varying_constant import FreerFit, varying_constants
 
 _AT_THE_END = 1e-3
 """Share of the range from its upper end within which a constant stands at that end: no finding, for
@@ -27,12 +26,12 @@ def constants_by_mode(
     fit: Fit,
     bounds: Mapping[int, tuple[float, float]],
     degrees: Mapping[str, Degree],
-    wider: Mapping[str, Fit],
+    freer: Sequence[FreerFit],
 ) -> dict[str, ConstantByMode]:
     """Return the constants by mode of a final fit.
 
-    The interval of a mode, and that at the mean time, holds that of the chosen degree and that of
-    one degree more, where there is one.
+    The interval of a mode, and that at the mean time, holds that of the chosen degree and those of
+    freer fits.
 
     Parameters
     ----------
@@ -42,8 +41,8 @@ def constants_by_mode(
         95 % interval of each fitted parameter, by position.
     degrees
         Degree of each constant by mode.
-    wider
-        From `fits_of_one_degree_more`.
+    freer
+        From `freer_fits`.
     """
     found = {}
     times = model.declared.relaxation_time * np.exp(fit.theta[1])
@@ -51,12 +50,11 @@ def constants_by_mode(
         of = degrees[name]
         low, high, half = constant.band(batch, fit, of)
         mean = bounds[constant.at]
-        if name in wider:
-            next_of = replace(of, degree=of.degree + 1)
-            more = constant.band(batch, wider[name], next_of)
+        for one in (one for one in freer if one.name == name):
+            more = constant.band(batch, one.fit, one.degree)
             low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
             half = np.maximum(half, more[2])
-            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider[name], next_of)
+            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, one.fit, one.degree)
             mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
         own = half_widths_alone(model, batch, fit, name)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)

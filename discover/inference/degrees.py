@@ -8,7 +8,7 @@ import numpy as np
 from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
 from discover.forward.least_squares import Fit
-from discover.inference.alone import half_widths_alone, is_told
+from discover.inference.alone import told_beyond_a_polynomial
 from discover.inference.evidence import BARE_MENTION
 from discover.inference.problem import FitProblem
 
@@ -128,7 +128,7 @@ def choose_degrees(
         gains = _gains(alone, fits)
         own: tuple[int, ...] = ()
         if fits[-1].usable and (_lowest(gains) == highest or least.get(name, 0) == FREE):
-            own = _told_beyond_a_polynomial(problem, fits[-1], name)
+            own = told_beyond_a_polynomial(model, problem.batch, fits[-1], name)
         if own:
             deviating = [at[DEGREE + mode] for mode in own]
             fits.append(problem.fit(fits[-1].theta, (*rest, *at[:highest], *deviating)))
@@ -156,20 +156,6 @@ def _gains(problem: FitProblem, fits: Sequence[Fit]) -> list[float]:
 
 def _lowest(gains: Sequence[float]) -> int:
     return next(i for i, gain in enumerate(gains) if gain >= max(gains) - BARE_MENTION)
-
-
-def _told_beyond_a_polynomial(problem: FitProblem, fit: Fit, name: str) -> tuple[int, ...]:
-    """Return which of the modes that the runs tell by themselves no polynomial need follow.
-
-    One passes through three of them: the fastest, the slowest and the one in their middle.
-    """
-    model = problem.model
-    told = np.flatnonzero(is_told(half_widths_alone(model, problem.batch, fit, name)))
-    if len(told) <= DEGREE + 1:
-        return ()
-    order = told[np.argsort(model.declared.relaxation_time[told])]
-    held = {int(order[0]), int(order[len(order) // 2]), int(order[-1])}
-    return tuple(int(mode) for mode in told if int(mode) not in held)
 
 
 def _starts(model: AugmentedModel, name: str, theta: np.ndarray, at: int) -> list[np.ndarray]:

@@ -10,7 +10,8 @@ from jaxtyping import Float
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, uncertainty
-from discover.inference.degrees import Degree
+from discover.inference.alone import told_beyond_a_polynomial
+from discover.inference.degrees import FREE, Degree
 
 _FARTHEST = 50.0  # e^50 of a constant is any
 _ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began
@@ -130,18 +131,37 @@ def varying_constants(
     return found
 
 
-def fits_of_one_degree_more(
+@dataclass(frozen=True)
+class FreerFit:
+    """A fit in which one constant by mode is freer than evidence asks for.
+
+    Attributes
+    ----------
+    name
+        Of the constant.
+    fit
+        The fit.
+    degree
+        What of the constant is free in it.
+    """
+
+    name: str
+    fit: Fit
+    degree: Degree
+
+
+def freer_fits(
     model: AugmentedModel,
     batch: Batch,
     fit: Fit,
     degrees: Mapping[str, Degree],
     prior: Prior = NO_PRIOR,
-) -> dict[str, Fit]:
-    """Return the fits in which one constant has its next coefficient too, by its name.
+) -> list[FreerFit]:
+    """Return the fits in which one constant has its next coefficient too, or is free in each mode.
 
-    Evidence for the lower degree does not say that the next coefficient is zero. A constant of the
-    highest degree has none, nor has one whose fit is not usable; that modes deviate from a
-    polynomial is no coefficient more.
+    Evidence for the lower degree does not say that the next coefficient is zero, nor evidence for a
+    smooth function that the constants lie on it. One constant for all modes has its first
+    coefficient alone. A fit that is not usable is left out.
 
     Parameters
     ----------
@@ -152,13 +172,19 @@ def fits_of_one_degree_more(
     prior
         What is known of some parameters.
     """
-    found = {}
+    found = []
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
-        if of.degree + 1 >= min(len(of.evidence), DEGREE + 1):
-            continue
-        free = (*fit.free, constant.start + of.degree)
-        wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
-        if wider.usable:
-            found[name] = wider
+        freer = []
+        if of.degree < min(len(of.evidence) - 1, DEGREE):
+            freer.append(replace(of, degree=of.degree + 1))
+        own = told_beyond_a_polynomial(model, batch, fit, name) if 0 < of.degree < FREE else ()
+        if own:
+            freer.append(replace(of, degree=FREE, own=own))
+        for degree in freer:
+            varied = [constant.start + place for place in degree.places]
+            free = tuple(dict.fromkeys([*fit.free, *varied]))
+            wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
+            if wider.usable:
+                found.append(FreerFit(name, wider, degree))
     return found

@@ -19,7 +19,7 @@ from discover.inference.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.varying_constant import fits_of_one_degree_more
+from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
@@ -251,10 +251,10 @@ def _told(
 ) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
     """Return the constants of a fit by name, and its bands by the key of the flow."""
     forward = problem.model
-    wider = fits_of_one_degree_more(forward, problem.batch, fit, degrees)
+    freer = freer_fits(forward, problem.batch, fit, degrees)
     bounds = intervals(forward, problem.batch, fit)
-    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, wider)
-    drawn = draw_constants(problem, fit, degrees, wider, _DRAWS)
+    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer)
+    drawn = draw_constants(problem, fit, degrees, freer, _DRAWS)
     if drawn is None:
         return constants, {}
     found = (effect_of(forward, name) for name in drawn.names)
