@@ -44,6 +44,7 @@ from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import instants_found, with_places
+from discover.inference.degrees import lowest_not_refuted
 from discover.statistics.residual import summarise
 
 
@@ -215,16 +216,14 @@ def _carrying_over(
 ) -> Ended:
     """Return a search whose constants by mode carry over to the runs held out, or the first.
 
-    A line in log λ may fit as well as a parabola, and be refuted by faster runs. That refutes the
-    line. So the next degree is fitted to the same runs and held against the same others, as long as
-    there is one; one that these refute too is taken for none.
+    One that no more explains the fitted runs is taken for none.
     """
-    last = first
-    while not last[-1].judgement.carries_over:
-        ended = task.one_degree_more(last[0])
-        if ended is None:
-            return first
-        last = judged(ended)
+
+    def more(before: Ended) -> Ended | None:
+        ended = task.one_degree_more(before[0])
+        return None if ended is None else judged(ended)
+
+    last = lowest_not_refuted(first, more, lambda one: not one[-1].judgement.carries_over)
     return first if last[-1].judgement.structured else last
 
 

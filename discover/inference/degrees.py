@@ -1,7 +1,8 @@
 """How constants by mode depend on the relaxation time: a polynomial in log λ, or free."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from discover.forward.least_squares import Fit
 from discover.inference.alone import told_beyond_a_polynomial
 from discover.inference.evidence import BARE_MENTION
 from discover.inference.problem import FitProblem
+
+Tried = TypeVar("Tried")
 
 _STEPS = (0.0, -1.0, 1.0)
 """From where a new coefficient starts, as a change of the constant by itself for each power of a
@@ -81,6 +84,29 @@ def one_degree_more(model: AugmentedModel, degrees: Mapping[str, Degree]) -> dic
 
 def _highest(model: AugmentedModel) -> int:
     return min(DEGREE, len(model.declared.modulus) - 1)
+
+
+def lowest_not_refuted(
+    first: Tried, more: Callable[[Tried], Tried | None], is_refuted: Callable[[Tried], bool]
+) -> Tried:
+    """Return what has the lowest degree that runs held out do not refute; the first where none has.
+
+    A line in log λ may fit as well as a parabola, and be refuted by faster runs. That refutes the
+    line. So the next degree is fitted to the same runs, and held against the same others.
+
+    Parameters
+    ----------
+    first
+        What has the degrees that evidence asks for.
+    more
+        Returns what has one degree more, or None for nothing.
+    is_refuted
+        Whether it explains the fitted runs, and runs held out speak against it.
+    """
+    last: Tried | None = first
+    while last is not None and is_refuted(last):
+        last = more(last)
+    return first if last is None else last
 
 
 def choose_degrees(

@@ -18,6 +18,7 @@ from discover.comparison.judging.modes_apart import said_of_each_mode
 from discover.comparison.judging.unseen_runs import hold_against_unseen, misses
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.inference.degrees import lowest_not_refuted
 from discover.statistics.residual import Expectation
 
 _LAW = "constants_by_mode"
@@ -121,11 +122,6 @@ def _law_by_mode(
     n_candidates: int,
     flows: Sequence[Flow],
 ) -> LawByMode | None:
-    """Return the law by mode of the lowest degree that runs held out do not refute, or the first.
-
-    A line in log λ may fit as well as a parabola, and be refuted by faster runs: that refutes the
-    line alone.
-    """
     model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
     predicted = [chosen.predictions[flow.key] for flow in training]
     seen = [np.asarray(one["sigma12"]) for one in predicted if one is not None]
@@ -138,16 +134,16 @@ def _law_by_mode(
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())
-    first = None
-    for law in fit_laws_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows):
-        recorded = replace(law, bands=frame.bands(law.bands))
-        held = _held_against_unseen(recorded, flows, expectation)
-        if held.explains:
-            return held
-        first = held if first is None else first
-        if not held.refuted:
-            break
-    return first
+    laws = fit_laws_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
+    held = (
+        _held_against_unseen(replace(law, bands=frame.bands(law.bands)), flows, expectation)
+        for law in laws
+    )
+    first = next(held, None)
+    if first is None:
+        return None
+    found = lowest_not_refuted(first, lambda _: next(held, None), lambda law: law.refuted)
+    return found if found.explains else first
 
 
 def _held_against_unseen(
