@@ -32,7 +32,7 @@ from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
-from discover.inference.varying_constant import fits_of_one_degree_more
+from discover.inference.varying_constant import freer_fits
 
 
 @dataclass(frozen=True)
@@ -215,8 +215,8 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
-    wider = fits_of_one_degree_more(model, batch, fit, search.degrees, search.prior)
-    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, wider)
+    freer = freer_fits(model, batch, fit, search.degrees, search.prior)
+    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer)
     return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart}, profile.possible)
 
 

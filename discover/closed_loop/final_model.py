@@ -15,13 +15,14 @@ from discover.closed_loop.results.stages import (
 )
 from discover.closed_loop.search import Search
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
-from discover.equations import AugmentedLaw, Equation, StatePart, law_parts
+from discover.equations import AugmentedLaw, Equation, NamedPart, StatePart, law_parts
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch, DeclaredModel
 from discover.forward.least_squares import Fit
 from discover.inference.constants import ConstantByMode, StageParameter, ToldTogether
 from discover.inference.told_together import product_or_ratio
-from discover.laws import Fluid
+from discover.laws import LAWS, Fluid
+from discover.laws.each_mode import with_modes
 
 Bounds = Mapping[int, tuple[float, float]]
 """Ends of the 95 % interval of what is fitted, by its position."""
@@ -175,11 +176,25 @@ def declared_effects(
     return tuple(found)
 
 
-def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
-    """Return the declared law with its modes as fitted; None where it cannot be written out."""
+def declared_law(
+    declared: DeclaredModel, fit: Fit, by_mode: Mapping[str, ConstantByMode]
+) -> Equation | None:
+    """Return the declared law with its modes as fitted; None where it cannot be written out.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+    fit
+        The final fit.
+    by_mode
+        Constants of the law that differ from mode to mode.
+    """
     law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
     try:
         named, terms = law_parts(law)
+        if by_mode:
+            named, terms = _named_by_mode(declared, fit, by_mode), ()
     except InputError:
         return None
     return Equation(
@@ -190,6 +205,21 @@ def declared_law(declared: DeclaredModel, fit: Fit) -> Equation | None:
         float(declared.solvent_viscosity),
         named=named,
     )
+
+
+def _named_by_mode(
+    declared: DeclaredModel, fit: Fit, by_mode: Mapping[str, ConstantByMode]
+) -> NamedPart:
+    ranges = LAWS[declared.law_name].parameters
+    known = dict(declared.parameters)
+    for i, parameter in enumerate(declared.free_parameters):
+        known[parameter.name] = float(fit.theta[2 + i])
+    of_modes = []
+    for number in range(len(declared.modulus)):
+        own = known | {name: one.modes[number].value for name, one in by_mode.items()}
+        # at an end of its range a constant may be beyond it by a rounding
+        of_modes.append({n: float(np.clip(value, *ranges[n])) for n, value in own.items()})
+    return NamedPart(declared.law_name, tuple(of_modes))
 
 
 def states_of(
@@ -235,9 +265,10 @@ def augmented_fluid(model: AugmentedModel, fit: Fit, active: Sequence[str]) -> F
     modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
     modulus = declared.modulus * np.exp(fit.theta[0])
     relaxation_time = declared.relaxation_time * np.exp(fit.theta[1])
+    every_time = np.append(relaxation_time, [float(pair[1]) for pair in modes])
     return Fluid(
-        law,
+        with_modes(law, relaxation_time, every_time),
         np.append(modulus, [float(pair[0]) for pair in modes]),
-        np.append(relaxation_time, [float(pair[1]) for pair in modes]),
+        every_time,
         viscosity,
     )

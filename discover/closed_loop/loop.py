@@ -38,13 +38,14 @@ from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import Store
-from discover.closed_loop.searching import SearchTask
+from discover.closed_loop.searching import SearchResult, SearchTask
 from discover.closed_loop.verdict import FinalVerdict, verdict_on
 from discover.dataset import Dataset, Run
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import instants_found, with_places
+from discover.inference.degrees import lowest_not_refuted
 from discover.statistics.residual import summarise
 
 
@@ -142,12 +143,16 @@ def run_loop(
         say=say,
     )
     task, ended = searched_by_noise(task, task.search(declared, laws), declared, laws)
-    fitted_runs, declared, search = list(task.fitted), ended.declared, ended.search
-    final = final_fit(ended, fitted_runs, held_runs, dataset.names)
-    constants = final_constants(final, ended.by_mode)
+    fitted_runs = list(task.fitted)
     whole = dataset.select([run.name for run in fitted_runs]).runs
-    verdict = verdict_on(final, constants, silent, whole)
-    judgement = verdict.judgement
+
+    def judged(ended: SearchResult) -> Ended:
+        final = final_fit(ended, fitted_runs, held_runs, dataset.names)
+        constants = final_constants(final, ended.by_mode)
+        return ended, final, constants, verdict_on(final, constants, silent, whole)
+
+    ended, final, constants, verdict = _carrying_over(task, judged(ended), judged)
+    declared, search, judgement = ended.declared, ended.search, verdict.judgement
     tested = final.fitted, final.fitted if left_out_in_turn else final.held_out
     side_by_side = Explanations()
     if final.carried:
@@ -185,7 +190,7 @@ def run_loop(
         records=tuple(beyond.records),
         declared_parameters=own | of_law,
         declared_effects=declared_effects(final.model, final.fit, bounds, by_mode),
-        declared_law=None if differ & {*of_law} else declared_law(declared, final.fit),
+        declared_law=declared_law(declared, final.fit, {n: by_mode[n] for n in differ & {*of_law}}),
         explanations=side_by_side,
         next_tests=beyond.next_tests,
         laws=ended.laws,
@@ -199,6 +204,26 @@ def run_loop(
         states=states or (),
         seconds=time.perf_counter() - started,
     )  # fmt: skip
+
+
+Ended = tuple[SearchResult, FinalFit, FinalConstants, FinalVerdict]
+"""A search that has ended, its final model, and what is to be believed of that."""
+
+
+def _carrying_over(
+    task: SearchTask, first: Ended, judged: Callable[[SearchResult], Ended]
+) -> Ended:
+    """Return a search whose constants by mode carry over to the runs held out, or the first.
+
+    One that no more explains the fitted runs is taken for none.
+    """
+
+    def more(before: Ended) -> Ended | None:
+        ended = task.one_degree_more(before[0])
+        return None if ended is None else judged(ended)
+
+    last = lowest_not_refuted(first, more, lambda one: not one[-1].judgement.carries_over)
+    return first if last[-1].judgement.structured else last
 
 
 def _remaining(

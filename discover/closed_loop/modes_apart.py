@@ -16,7 +16,7 @@ from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.varying_constant import fits_of_one_degree_more
+from discover.inference.varying_constant import freer_fits
 
 
 def modes_apart(
@@ -59,8 +59,8 @@ def modes_apart(
     alike = {name: Degree(0, one.evidence) for name, one in chosen.items()}
     shifts = modulus_shifts(model, fit.theta, search.batch)
     bounds = intervals(model, search.batch, fit, shifts)
-    wider = fits_of_one_degree_more(model, search.batch, fit, alike, known)
-    return constants_by_mode(model, search.batch, fit, bounds, alike, wider)
+    freer = freer_fits(model, search.batch, fit, alike, known)
+    return constants_by_mode(model, search.batch, fit, bounds, alike, freer)
 
 
 def _places(before: AugmentedModel, model: AugmentedModel, active: Sequence[str]) -> dict[int, int]:

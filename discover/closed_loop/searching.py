@@ -19,6 +19,7 @@ from discover.effects import BY_MODE, AbstractEffect
 from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.forward.declared import may_differ_by_mode
 from discover.inference.constants import ConstantByMode
+from discover.inference.degrees import one_degree_more
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.problem import effect_of
 from discover.statistics.residual import Expectation
@@ -139,6 +140,22 @@ class SearchTask:
         differ = any(one.degree for one in again.search.degrees.values())
         return again if differ and _is_likelier(again.search, search, INDISTINGUISHABLE) else first
 
+    def one_degree_more(self, before: SearchResult) -> SearchResult | None:
+        """Search once more with constants by mode of one degree more; None where there is none.
+
+        Parameters
+        ----------
+        before
+            A search whose constants by mode explain the fitted runs, and no others.
+        """
+        least = one_degree_more(before.search.model, before.search.degrees)
+        if not least:
+            return None
+        degrees = ", ".join(f"{name} of degree {degree}" for name, degree in least.items())
+        self.say(f"constants that may differ from mode to mode once more: {degrees}")
+        name = f"{self.name}_by_mode_{'_'.join(map(str, least.values()))}"
+        return self._from(before.declared, before.laws, name, least)
+
     @cached_property
     def _batch(self) -> Batch:
         return make_batch(self.fitted)
@@ -147,7 +164,13 @@ class SearchTask:
     def _held_batch(self) -> Batch | None:
         return make_batch(self.held_out) if self.held_out else None
 
-    def _from(self, declared: DeclaredModel, laws: tuple[LawFit, ...], name: str) -> SearchResult:
+    def _from(
+        self,
+        declared: DeclaredModel,
+        laws: tuple[LawFit, ...],
+        name: str,
+        least: Mapping[str, int] | None = None,
+    ) -> SearchResult:
         # of one mode nothing can differ from another's
         asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
         model = AugmentedModel(declared, asked, data_scales(self.fitted))
@@ -163,6 +186,7 @@ class SearchTask:
             ),
             SearchCheckpoint(self.store, name),
         )
+        search.least_degrees = dict(least or {})
         if self.silent:
             self.say("the records are noise about a constant: there is nothing to search in")
             search.start()

@@ -342,9 +342,7 @@ class Comparison(PageView, NotebookView):
             "truth": self.truth,
             "stood_for_by_constants": self.stood_for,
             "classical": {fit.law: fit for fit in self.classical},
-            "by_mode": None
-            if self.by_mode is None
-            else {**self.by_mode.to_json(), "errors_by_quantity": self.errors_by_mode()},
+            "by_mode": None if self.by_mode is None else self._by_mode(self.by_mode),
             "range": {flow.name: self.placement(flow) for flow in self.judged},
             "rivals": self.rivals,
             "undetermined": self.undetermined,
@@ -362,6 +360,15 @@ class Comparison(PageView, NotebookView):
             "next_measurement": self.next_measurement,
         }
         return plain(content)
+
+    def _by_mode(self, law: LawByMode) -> dict[str, Any]:
+        """Return the law with constants by mode, with the known part that it adds to."""
+        known = self.known_of.get("tensor_sindy", self.known)
+        return {
+            **law.to_json(),
+            "errors_by_quantity": self.errors_by_mode(),
+            "known_part": None if known is None else equation_to_json(known),
+        }
 
     @staticmethod
     def _effect(known: KnownEffect, outcome: LearnerOutcome) -> dict[str, Any]:

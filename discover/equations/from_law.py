@@ -3,11 +3,9 @@
 import numpy as np
 
 from discover.effects.base import ConstitutiveEffect
-from discover.equations.named_part import NamedPart
 from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.registry import name_of
 from tensor_library.closed_forms import CLOSED_FORMS
 
 EXPONENTIAL = f"{CLOSED_FORMS.present['exp'].spelling}*sigma"
@@ -23,23 +21,6 @@ def law_terms(law: AbstractConstitutiveLaw) -> tuple[EquationTerm, ...]:
             "method as_terms if it is such a sum."
         )
     return combined(tuple(EquationTerm(*share) for share in shares))
-
-
-def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[EquationTerm, ...]]:
-    """Return h of a law as a law with a name, where it is no sum of terms, and a sum of terms.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
-    if law.as_terms() is not None:
-        return None, law_terms(law)
-    core, added = law.split()
-    named = name_of(core)
-    if named is None:
-        return None, law_terms(core)
-    return NamedPart(named[0], (named[1],)), combined(tuple(EquationTerm(*one) for one in added))
 
 
 def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[EquationTerm, ...]:

@@ -5,8 +5,8 @@ import re
 from typing import Any
 
 from discover.equations.equation import Equation
-from discover.equations.from_law import law_parts
 from discover.equations.named_part import NamedPart
+from discover.equations.parts import law_parts
 from discover.equations.rheotool import extension_factor, rheotool_law, unit_of
 from discover.errors import InputError
 

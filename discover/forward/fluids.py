@@ -20,6 +20,7 @@ from jaxtyping import Array, Float, Inexact
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.periodic_states import periodic_state
+from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
@@ -194,7 +195,7 @@ def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Arra
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
     """Return a fluid as the integrators take it."""
     dynamics = dynamics_of_modes(
-        fluid.law.stress_rate,
+        over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law, -1),
         fluid.modulus,
         fluid.relaxation_time,
         fluid.solvent_viscosity,
@@ -203,31 +204,32 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
     )
     law, count = fluid.law, fluid.n_modes
 
-    def of_modes(values):
+    def of_modes(name):
+        values = of_each_mode(lambda law: getattr(law, name)(), law, count)
         # a choice of method, through which no derivative passes
-        return jax.lax.stop_gradient(jnp.repeat(values[..., None], count, axis=-1))
+        return jax.lax.stop_gradient(jnp.moveaxis(values, 0, -1))
 
     return dynamics._replace(
         linear_relaxation=law.linear_relaxation,
-        relaxations=of_modes(law.relaxations()) if law.retracts else None,
-        shares=of_modes(law.shares()) if law.tensors else None,
+        relaxations=of_modes("relaxations") if law.retracts else None,
+        shares=of_modes("shares") if law.tensors else None,
     )
 
 
 def dynamics_of_modes(
-    stress_rate: Callable[[Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
+    slope: Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "s k"]],
     modulus: Float[Array, " k"],
     relaxation_time: Float[Array, " k"],
     solvent_viscosity: Float[Array, ""] | float,
     protocol: FlowProtocol,
     variables: int = 0,
 ) -> Dynamics:
-    """Return modes of one law as the integrators take them.
+    """Return modes as the integrators take them.
 
     Parameters
     ----------
-    stress_rate
-        Dimensionless dσ/dt of a mode, of its σ and its λL.
+    slope
+        Dimensionless dσ/dt of all modes, of their σ and their λL, modes along the last axis.
     modulus, relaxation_time, solvent_viscosity
         In Pa, s and Pa s.
     variables
@@ -235,7 +237,7 @@ def dynamics_of_modes(
     """
     viscous = 1.0 if protocol.kinematics is None else protocol.kinematics.viscous
     return Dynamics(
-        slope=jax.vmap(stress_rate, in_axes=-1, out_axes=-1),
+        slope=slope,
         # the natural split in any case; where it lies decides accuracy only
         linear_relaxation=True,
         declared=Modes(modulus, relaxation_time),

@@ -35,6 +35,7 @@ from discover.forward.integrator import integrate
 from discover.forward.periodic_states import complex_modulus, first_harmonic
 from discover.forward.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
+from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
 from discover.simulate.periodic_start import Cycle
@@ -272,7 +273,7 @@ class Program:
         return constants_of_modes(mean, low, high, coefficients, deviations, places)
 
     def _law(self, theta, numbers, places):
-        """Return the law with the values of its free parameters, or one for each mode as one tree.
+        """Return the law with the values of its free parameters, which may differ by mode.
 
         Of constants by mode, a mode that an effect adds has the one of its own time.
         """
@@ -288,12 +289,8 @@ class Program:
         for name, at in self._varying_law.items():
             known[name] = self._varied(theta, known[name], named.parameters[name], at, places)
         columns = [jnp.broadcast_to(value, places.shape) for value in known.values()]
-        return jax.vmap(named.build)(*columns)
-
-    def _over_modes(self, of_mode):
-        """Return a function of a law and of one mode as one of all modes."""
-        law = 0 if self._varying_law else None
-        return jax.vmap(of_mode, in_axes=(law, -1, -1), out_axes=-1)
+        built = jax.vmap(named.build)(*columns)
+        return LawOfEachMode(law=built, linear_relaxation=built.linear_relaxation)
 
     def _terms_by_mode(self, law, added, theta, modes: Modes):
         """Return the function by how much h of each mode differs from that of equal constants."""
@@ -304,12 +301,12 @@ class Program:
         def of_mode(law, stress, gradient):
             return law.extra_term(stress, rate_of_deformation(gradient))
 
-        of_law = self._over_modes(of_mode)
+        of_law = over_modes(of_mode, law, -1)
 
         def differing(stress, gradient):
             # a mode that an effect adds stands after the declared ones, and is as they are in mean
             declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
-            extra = of_law(law, stress, gradient) + added(stress, gradient)
+            extra = of_law(stress, gradient) + added(stress, gradient)
             return (declared - 1.0) * extra.at[4:].set(0.0)
 
         return differing
@@ -326,13 +323,16 @@ class Program:
                 declared = numbers.modulus, numbers.relaxation_time
                 places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
         law = self._law(theta, numbers, places)
+        if extra is not None and not self._varying_law:
+            every = jnp.append(numbers.relaxation_time, extra.relaxation_time)
+            law = with_modes(law, numbers.relaxation_time, every)
         modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
         # a factor that is not fitted stays a constant: no trial and no derivative passes through
         if self.structure.fit_modulus:
             modulus = modulus * jnp.exp(theta[0])
         # that on the times is tried where it is not fitted too
         relaxation_time = relaxation_time * jnp.exp(theta[1])
-        of_law = self._over_modes(lambda law, *flow: law.stress_rate(*flow))
+        of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
         amplitudes = {
             e.name: self._varied(
                 theta,
@@ -346,7 +346,7 @@ class Program:
         added = self.added.rate(theta, used, amplitudes)
 
         def modes_rate(stress, gradient):
-            same = of_law(law, stress, gradient) - added(stress, gradient)
+            same = of_law(stress, gradient) - added(stress, gradient)
             if self._by_mode is None:
                 return same
             differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))
@@ -394,9 +394,8 @@ class Program:
     ):
         """Return what decides how modes are stepped through; no gradient passes through that."""
         count = len(modulus) + (0 if extra is None else len(extra.modulus))
-        rest = jnp.zeros((4 + law.variables, count))
-        of_law = self._over_modes(lambda law, *_: getattr(law, name)())
-        return jax.lax.stop_gradient(of_law(law, rest, rest))
+        values = of_each_mode(lambda law: getattr(law, name)(), law, count)
+        return jax.lax.stop_gradient(jnp.moveaxis(values, 0, -1))
 
 
 def _where_in_shear(flow: Kinematics | None, changed, unchanged):

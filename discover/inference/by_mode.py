@@ -1,20 +1,16 @@
 """The constant of each mode as finally fitted, and whether the data say anything of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
-from discover.forward.by_mode import DEGREE
-from discover.forward.least_squares import Fit, jacobians, uncertainty
+from discover.forward.least_squares import Fit
+from discover.inference.alone import half_widths_alone, is_told
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.inference.degrees import Degree
-from discover.inference.varying_constant import varying_constants
-
-_OPEN = float(np.log(0.95 / 0.05))
-"""Half width of an interval, on the link's scale, from which on nothing is determined: about the
-middle of a range it holds nine tenths of it, about a small constant a factor of 19 either way."""
+from discover.inference.varying_constant import FreerFit, varying_constants
 
 _AT_THE_END = 1e-3
 """Share of the range from its upper end within which a constant stands at that end: no finding, for
@@ -30,26 +26,37 @@ def constants_by_mode(
     fit: Fit,
     bounds: Mapping[int, tuple[float, float]],
     degrees: Mapping[str, Degree],
-    wider: Mapping[str, Fit],
+    freer: Sequence[FreerFit],
 ) -> dict[str, ConstantByMode]:
     """Return the constants by mode of a final fit.
 
-    The interval of a mode, and that at the mean time, holds that of the chosen degree and that of
-    one degree more, where there is one.
+    The interval of a mode, and that at the mean time, holds that of the chosen degree and those of
+    freer fits.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    bounds
+        95 % interval of each fitted parameter, by position.
+    degrees
+        Degree of each constant by mode.
+    freer
+        From `freer_fits`.
     """
     found = {}
     times = model.declared.relaxation_time * np.exp(fit.theta[1])
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
-        low, high, half = constant.band(batch, fit, of.degree)
+        low, high, half = constant.band(batch, fit, of)
         mean = bounds[constant.at]
-        if name in wider:
-            more = constant.band(batch, wider[name], of.degree + 1)
+        for one in (one for one in freer if one.name == name):
+            more = constant.band(batch, one.fit, one.degree)
             low, high = np.minimum(low, more[0]), np.maximum(high, more[1])
             half = np.maximum(half, more[2])
-            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, wider[name], of.degree + 1)
+            (lowest,), (highest,), _ = constant.at_the_mean.band(batch, one.fit, one.degree)
             mean = min(mean[0], float(lowest)), max(mean[1], float(highest))
-        own = _own_half_widths(model, batch, fit, constant.start + DEGREE)
+        own = half_widths_alone(model, batch, fit, name)
         alone = constant.of_modes(fit, -own), constant.of_modes(fit, own)
         values = constant.of_modes(fit)
         known = _says(low, high, half, constant.law) & _says(*alone, own, constant.law)
@@ -66,30 +73,16 @@ def constants_by_mode(
                 ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
                 for t, v, a, b, k in each
             ),
+            own=len(of.own),
+            is_raised=of.is_raised,
         )
     return found
-
-
-def _own_half_widths(model, batch, fit, first: int) -> Float[np.ndarray, " k"]:
-    """Return half the interval of each mode's constant, were nothing else fitted.
-
-    On the link's scale. No other question of one mode alone is easier for the data, so that what
-    is open here is open indeed.
-    """
-    at = range(first, first + len(model.declared.modulus))
-    columns = jacobians(model, batch, [fit.theta], fit.residual[None], [list(at)])[0]
-    half = np.full(len(columns), np.inf)
-    for i, column in enumerate(columns):
-        if np.any(column) and np.all(np.isfinite(column)):
-            variance, quantile = uncertainty(batch, fit.residual, column[None])
-            half[i] = quantile * float(np.sqrt(variance[0, 0]))
-    return half
 
 
 def _says(low, high, half, law: FreeParameter):
     """Return where an interval tells a constant."""
     width = law.high - law.low
-    return (half < _OPEN) | (np.isfinite(width) & (high - low < _SMALL * width))
+    return is_told(half) | (np.isfinite(width) & (high - low < _SMALL * width))
 
 
 def _at_upper_end(values: Float[np.ndarray, " k"], law: FreeParameter) -> np.ndarray:

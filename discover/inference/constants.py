@@ -11,6 +11,8 @@ tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."
 
 _ROUNDING = 1e-9
 
+_POLYNOMIAL = 2  # highest degree in log λ
+
 
 @dataclass(frozen=True)
 class StageParameter:
@@ -109,17 +111,29 @@ class ConstantByMode(StageParameter):
     mean_time_s
         Mean relaxation time by viscosity.
     degree
-        Of the polynomial in log λ; 0 for one constant of all modes.
+        Of the polynomial in log λ; 0 for one constant of all modes, 3 where modes that the runs
+        tell by themselves are free.
     evidence
         For each degree over one constant.
     modes
         In the order of the declared modes.
+    own
+        How many modes deviate from the polynomial.
+    is_raised
+        Whether a lower degree fits these runs as well, and runs held out refute it.
     """
 
     mean_time_s: float
     degree: int
     evidence: tuple[float, ...]
     modes: tuple[ModeConstant, ...]
+    own: int = field(default=0, kw_only=True)
+    is_raised: bool = field(default=False, kw_only=True)
+
+    @property
+    def n_constants(self) -> int:
+        """Number of constants fitted."""
+        return 1 + min(self.degree, _POLYNOMIAL) + self.own
 
     @property
     def told(self) -> list[ModeConstant]:

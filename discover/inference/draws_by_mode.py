@@ -1,7 +1,7 @@
 """Constants by mode drawn from what the runs leave of them."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,11 @@ from discover.forward import Batch
 from discover.forward.least_squares import Fit, uncertainty
 from discover.inference.degrees import Degree
 from discover.inference.problem import FitProblem
-from discover.inference.varying_constant import VaryingConstant, varying_constants
+from discover.inference.varying_constant import (
+    FreerFit,
+    VaryingConstant,
+    varying_constants,
+)
 from discover.statistics import root_of
 
 _TWO_SIDED = float(norm.ppf(0.975))
@@ -28,7 +32,7 @@ class ConstantsDrawn:
         Shape (draws, constants, k). Each group begins with the fit that it is drawn about.
     sizes
         Length of each group. The first has the degrees that evidence asked for; in every other one
-        constant has one degree more.
+        constant is freer.
     """
 
     names: tuple[str, ...]
@@ -40,23 +44,33 @@ def draw_constants(
     problem: FitProblem,
     fit: Fit,
     degrees: Mapping[str, Degree],
-    wider: Mapping[str, Fit],
+    freer: Sequence[FreerFit],
     n_draws: int,
     seed: int = 0,
 ) -> ConstantsDrawn | None:
     """Return constants by mode drawn about a fit, on the scale of their link.
 
-    Of the fit itself, and of one with one degree more for each constant that may have it, as
-    intervals hold both. None where a constant stands at an end of its range, from where no first
-    order leads anywhere.
+    Of the fit itself, and of the freer ones, as intervals hold all. None where a constant stands at
+    an end of its range, from where no first order leads anywhere.
+
+    Parameters
+    ----------
+    problem, fit
+        What is fitted to what, and the final fit.
+    degrees
+        Degree of each constant by mode.
+    freer
+        From `freer_fits`.
+    n_draws
+        About each fit.
+    seed
+        Of the draws.
     """
     constants = varying_constants(problem.model, fit, degrees)
     if not constants:
         return None
     fits = [(fit, dict(degrees))]
-    for name, more in wider.items():
-        of = degrees[name]
-        fits.append((more, {**degrees, name: replace(of, degree=of.degree + 1)}))
+    fits += [(one.fit, {**degrees, one.name: one.degree}) for one in freer]
     rng = np.random.default_rng(seed)
     groups = [_about(problem.batch, one, constants, of, n_draws, rng) for one, of in fits]
     drawn = [group for group in groups if group is not None]
@@ -79,7 +93,7 @@ def _about(
     moved = (quantile / _TWO_SIDED) * even @ root_of(covariance).T
     columns = []
     for name, constant in constants.items():
-        gradient = constant.gradient(fit, degrees[name].degree)
+        gradient = constant.gradient(fit, degrees[name])
         if gradient is None:
             return None
         shifts = [np.zeros(len(constant.places)), *(moved @ gradient.T)]

@@ -10,7 +10,8 @@ from jaxtyping import Float
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, uncertainty
-from discover.inference.degrees import Degree
+from discover.inference.alone import told_beyond_a_polynomial
+from discover.inference.degrees import FREE, Degree
 
 _FARTHEST = 50.0  # e^50 of a constant is any
 _ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began
@@ -30,17 +31,20 @@ class VaryingConstant:
         Position of the first coefficient in log λ.
     places
         Of the modes, from `decades`.
+    deviate
+        Whether these are the modes, which may deviate from the polynomial.
     """
 
     law: FreeParameter
     at: int
     start: int
     places: Float[np.ndarray, " k"]
+    deviate: bool = True
 
     @property
     def at_the_mean(self) -> "VaryingConstant":
         """The same constant at the mean time alone."""
-        return replace(self, places=np.zeros(1))
+        return replace(self, places=np.zeros(1), deviate=False)
 
     def of_modes(self, fit: Fit, shift: np.ndarray | float = 0.0) -> Float[np.ndarray, " k"]:
         """Return the constant of each mode, moved on the link's scale.
@@ -52,29 +56,46 @@ class VaryingConstant:
         """
         # one that stands far beyond an end must come back from there too
         farthest = _ACROSS if np.isfinite(self.law.high - self.law.low) else _FARTHEST
-        moved = np.clip(np.broadcast_to(shift, self.places.shape), -farthest, farthest)
+        first = self.start + DEGREE
+        own = fit.theta[first : first + len(self.places)] if self.deviate else 0.0
+        moved = np.clip(np.broadcast_to(shift, self.places.shape) + own, -farthest, farthest)
         coefficients = fit.theta[self.start : self.start + DEGREE]
         given = map(jnp.asarray, (coefficients, moved, self.places))
         mean = jnp.asarray(fit.theta[self.at])
         return np.asarray(constants_of_modes(mean, self.law.low, self.law.high, *given))
 
-    def gradient(self, fit: Fit, degree: int) -> Float[np.ndarray, "k free"] | None:
-        """Return the slope of each mode's link in what was fitted; None at an end of a range."""
+    def gradient(self, fit: Fit, degree: Degree) -> Float[np.ndarray, "k free"] | None:
+        """Return the derivative of each mode's link in what was fitted; None at an end of a range.
+
+        Parameters
+        ----------
+        fit
+            The fit.
+        degree
+            What of the constant is free in it.
+        """
         slope = link_slope(float(fit.theta[self.at]), self.law.low, self.law.high)
         if not np.isfinite(slope):
             return None
         gradient = np.zeros((len(self.places), len(fit.free)))
         gradient[:, fit.free.index(self.at)] = slope
-        for i in range(degree):
+        for i in range(degree.coefficients):
             gradient[:, fit.free.index(self.start + i)] = self.places ** (i + 1)
+        for mode in degree.own if self.deviate else ():
+            gradient[mode, fit.free.index(self.start + DEGREE + mode)] = 1.0
         return gradient
 
     def band(
-        self, batch: Batch, fit: Fit, degree: int
+        self, batch: Batch, fit: Fit, degree: Degree
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the 95 % interval of each mode, and half its width on the link's scale.
 
         To first order there, so that it keeps the range.
+
+        Parameters
+        ----------
+        batch, fit, degree
+            The fitted runs, the fit, and what of the constant is free in it.
         """
         covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
         gradient = self.gradient(fit, degree)
@@ -100,25 +121,60 @@ def varying_constants(
     return found
 
 
-def fits_of_one_degree_more(
+@dataclass(frozen=True)
+class FreerFit:
+    """A fit in which one constant by mode is freer than evidence asks for.
+
+    Attributes
+    ----------
+    name
+        Of the constant.
+    fit
+        The fit.
+    degree
+        What of the constant is free in it.
+    """
+
+    name: str
+    fit: Fit
+    degree: Degree
+
+
+def freer_fits(
     model: AugmentedModel,
     batch: Batch,
     fit: Fit,
     degrees: Mapping[str, Degree],
     prior: Prior = NO_PRIOR,
-) -> dict[str, Fit]:
-    """Return the fits in which one constant has its next coefficient too, by its name.
+) -> list[FreerFit]:
+    """Return the fits in which one constant has its next coefficient too, or is free in each mode.
 
-    Evidence for the lower degree does not say that the next coefficient is zero. A constant of the
-    highest degree has none, nor has one whose fit is not usable.
+    Evidence for the lower degree does not say that the next coefficient is zero, nor evidence for a
+    smooth function that the constants lie on it. One constant for all modes has its first
+    coefficient alone. A fit that is not usable is left out.
+
+    Parameters
+    ----------
+    model, batch, fit
+        The model, the fitted runs and the fit.
+    degrees
+        Degree of each constant by mode.
+    prior
+        What is known of some parameters.
     """
-    found = {}
+    found = []
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
-        if of.degree + 1 >= len(of.evidence):
-            continue
-        free = (*fit.free, constant.start + of.degree)
-        wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
-        if wider.usable:
-            found[name] = wider
+        freer = []
+        if of.degree < min(len(of.evidence) - 1, DEGREE):
+            freer.append(replace(of, degree=of.degree + 1))
+        own = told_beyond_a_polynomial(model, batch, fit, name) if 0 < of.degree < FREE else ()
+        if own:
+            freer.append(replace(of, degree=FREE, own=own))
+        for degree in freer:
+            varied = [constant.start + place for place in degree.places]
+            free = tuple(dict.fromkeys([*fit.free, *varied]))
+            wider = fit_batch(model, batch, [fit.theta], [free], prior=prior)[0]
+            if wider.usable:
+                found.append(FreerFit(name, wider, degree))
     return found

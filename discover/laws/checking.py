@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import law_of_mode
 
 
 def check_law(law: AbstractConstitutiveLaw) -> None:
@@ -12,6 +13,7 @@ def check_law(law: AbstractConstitutiveLaw) -> None:
 
     A term of another shape would be spread over all components without a word.
     """
+    law = law_of_mode(law, 0)
     name = type(law).__name__
     stress, rate = law.rest(), jnp.zeros(())
     try:

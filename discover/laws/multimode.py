@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -13,6 +12,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
+from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.maxwell import UpperConvectedMaxwell
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
 
@@ -46,7 +46,7 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-        The dimensionless law.
+        The dimensionless law; a `LawOfEachMode` where its constants differ from mode to mode.
     modulus
         G_k, shape (k,), in Pa.
     relaxation_time
@@ -85,6 +85,7 @@ class Fluid(eqx.Module):
                 "modulus and relaxation_time of a fluid must have one value for each mode; got the "
                 f"shapes {self.modulus.shape} and {shape}."
             )
+        require_modes(self.law, *shape)
         for label, values, least in (
             ("modulus", self.modulus, np.nextafter(0.0, 1.0)),
             ("relaxation_time", self.relaxation_time, np.nextafter(0.0, 1.0)),
@@ -178,10 +179,14 @@ class Fluid(eqx.Module):
         rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
         if not self.law.retracts:
             return rate
-        faster = self.law.relaxations()
-        of_each = jnp.repeat(faster[:, :1], 4, axis=1).at[:, 0].add(faster[:, 1]).ravel()
-        beside = jnp.zeros_like(self.law.rest()).at[: len(of_each)].set(of_each)
-        return rate + beside / self.relaxation_time[:, None]
+
+        def beside(law: AbstractConstitutiveLaw) -> Float[Array, " s"]:
+            faster = law.relaxations()
+            of_each = jnp.repeat(faster[:, :1], 4, axis=1).at[:, 0].add(faster[:, 1]).ravel()
+            return jnp.zeros_like(law.rest()).at[: len(of_each)].set(of_each)
+
+        of_modes = of_each_mode(beside, self.law, self.n_modes)
+        return rate + of_modes / self.relaxation_time[:, None]
 
     def state_rate(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
@@ -197,7 +202,8 @@ class Fluid(eqx.Module):
             The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
         """
         scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
-        return jax.vmap(self.law.stress_rate)(state, scaled) / self.relaxation_time[:, None]
+        of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), self.law)
+        return of_modes(state, scaled) / self.relaxation_time[:, None]
 
     def stress(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
 from tensor_library.kinematics import VelocityGradient
 
@@ -148,11 +149,12 @@ def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Arr
         The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
     """
     scaled = jnp.multiply.outer(fluid.relaxation_time, velocity_gradient)
-    return steady_modes(fluid.law.stress_rate, scaled, fluid.rest())
+    of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law)
+    return steady_modes(of_modes, scaled, fluid.rest())
 
 
 def steady_modes(
-    stress_rate: Callable[[Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
+    stress_rate: Callable[[Float[Array, "k s"], Float[Array, "k ..."]], Float[Array, "k s"]],
     scaled_gradient: Float[Array, " k"] | Float[Array, "k 4"],
     rest: Float[Array, "k s"],
 ) -> Float[Array, "k s"]:
@@ -168,7 +170,7 @@ def steady_modes(
     Parameters
     ----------
     stress_rate
-        Dimensionless dσ/dt of a mode, of its σ and its λL.
+        Dimensionless dσ/dt of all modes, of their σ and their λL.
     scaled_gradient
         λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
     """
@@ -176,7 +178,7 @@ def steady_modes(
     weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)
 
     def change(stress):
-        return jax.vmap(stress_rate)(stress.T, scaled_gradient).T
+        return stress_rate(stress.T, scaled_gradient).T
 
     def step(way, index):
         return approach_step(change, way, index, weissenberg), None

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.errors import InputError
+from discover.laws.each_mode import of_each_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.programs import compiled
@@ -142,9 +143,11 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
     if frequencies is not None:
         omega = frequencies
-    decay, drive = (np.asarray(part) for part in _at_rest(fluid.law))
+    of_modes = _at_rest(fluid.law, fluid.n_modes)
+    decays, every_drive = (np.asarray(part) for part in of_modes)
     modulus = np.zeros(len(omega), dtype=complex)
-    for size, time in zip(np.asarray(fluid.modulus), times, strict=True):
+    modes = zip(np.asarray(fluid.modulus), times, decays, every_drive, strict=True)
+    for size, time, decay, drive in modes:
         # iωλ s = A s + b λγ̇, so that G* = iωλ s12/(λγ̇) of a mode with G = 1
         left = 1j * time * omega[:, None, None] * np.eye(len(drive)) - decay
         drives = np.broadcast_to(drive[:, None], (len(omega), len(drive), 1))
@@ -155,6 +158,10 @@ def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = Non
 
 
 @compiled
-def _at_rest(law):
-    """Return the derivatives of the stress rate to state and shear rate, (s, s) and (s,)."""
-    return jax.jacfwd(law.stress_rate, argnums=(0, 1))(law.rest(), jnp.zeros(()))
+def _at_rest(law, count):
+    """Return the derivatives of the stress rate of each mode to its state and shear rate."""
+
+    def of_mode(law):
+        return jax.jacfwd(law.stress_rate, argnums=(0, 1))(law.rest(), jnp.zeros(()))
+
+    return of_each_mode(of_mode, law, count)

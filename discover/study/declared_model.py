@@ -4,15 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from discover.dataset import Dataset, LinearSweep
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import SLOWEST_RATE, Run
-from discover.effects import KnownEffect, known_effects
+from discover.effects import ConstitutiveEffect, KnownEffect, known_effects
+from discover.equations import AugmentedLaw, Equation
 from discover.errors import InputError
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import law_of_each_mode
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
@@ -207,11 +210,16 @@ def _from_earlier(
     equation = found.equation
     names = {known.name for known in own}
     kept = (known for known in found.effects if known.name not in names)
-    law, name, constants = equation.law(), FOUND_LAW, {}
-    if not equation.terms and equation.named is None:
+    of_modes = [of for of in found.of_modes if of[0].name not in names]
+    name, constants = FOUND_LAW, {}
+    if of_modes or (equation.named is not None and equation.named.differing):
+        law = _law_of_each_mode(equation, of_modes)
+    elif not equation.terms and equation.named is None:
         law, name = UpperConvectedMaxwell(equation.linear_relaxation), "ucm"
-    elif equation.named is not None and not equation.terms:
-        name, constants = equation.named.law, dict(equation.named.constants[0])
+    else:
+        law = equation.law()
+        if equation.named is not None and not equation.terms:
+            name, constants = equation.named.law, dict(equation.named.constants[0])
     return DeclaredModel(
         law,
         name,
@@ -224,6 +232,35 @@ def _from_earlier(
         (*kept, *own),
         found.text,
     )
+
+
+def _law_of_each_mode(
+    equation: Equation, added: Sequence[Sequence[KnownEffect]]
+) -> AbstractConstitutiveLaw:
+    """Return the law of every mode, with constants of its own.
+
+    Parameters
+    ----------
+    equation
+        What all have, and constants of a law with a name.
+    added
+        Effects that add a term, with their values in every mode.
+    """
+    laws = []
+    for number in range(len(equation.modulus)):
+        base = equation.mode(number).law()
+        effects = [
+            (one.effect, [float(value) for value in one.values if value is not None])
+            for one in (of[number] for of in added)
+        ]
+        whole = AugmentedLaw(
+            base=base,
+            values=tuple(jnp.asarray(values) for _, values in effects),
+            effects=tuple(one for one, _ in effects if isinstance(one, ConstitutiveEffect)),
+            linear_relaxation=base.linear_relaxation,
+        )
+        laws.append(whole if effects else base)
+    return law_of_each_mode(laws)
 
 
 _SAME_MODES = 1e-6

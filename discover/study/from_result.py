@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discover.effects import KnownEffect, known_effects
+import numpy as np
+
+from discover.effects import KnownEffect, known_effects, make_effect
 from discover.equations import Equation
 from discover.equations.json_format import equation_from_json
 from discover.equations.read import COMPARISON, LOOP, read_json
@@ -30,6 +32,9 @@ class EarlierResult:
         The law with its modes.
     effects
         Effects beside the law, with their values.
+    of_modes
+        Terms that effects add to the law of each mode, with constants of its own: for every such
+        effect its values in the order of the modes.
     text
         What was taken, and how far it explained its own data, in words.
     """
@@ -37,6 +42,7 @@ class EarlierResult:
     file: Path
     equation: Equation
     effects: tuple[KnownEffect, ...]
+    of_modes: tuple[tuple[KnownEffect, ...], ...]
     text: str
 
 
@@ -108,11 +114,11 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
             f"[model] from: {file} does not say what its loop started from: it was written by an "
             f"earlier version. {_AGAIN}"
         )
-    if declared.get("by_mode"):
+    if declared.get("law") is None and declared.get("by_mode"):
         raise InputError(
             f"[model] from: in the loop of {file} {', '.join(map(str, declared['by_mode']))} "
-            "differs from one relaxation mode to the next, and from takes laws that are the same "
-            "in all. Declare the law in the study, with by_mode, and leave from out."
+            "differs from one relaxation mode to the next, and the file does not have the law of "
+            f"each mode: it was written by an earlier version. {_AGAIN}"
         )
     if declared.get("law") is None:
         raise InputError(
@@ -127,10 +133,11 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
             "there is nothing to take. Declare the law with law and its constants."
         )
     equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
-    effects = _effects([*declared.get("effects", ()), *content["stages"]], file)
-    text = _text(file, "the loop's declared law", equation, effects)
+    rows = [*declared.get("effects", ()), *content["stages"]]
+    effects, of_modes = _effects(rows, file, len(equation.modulus))
+    text = _text(file, "the loop's declared law", equation, effects, of_modes)
     doubt = " With them the loop did not explain its data." if unexplained else ""
-    return EarlierResult(file, equation, effects, text + doubt)
+    return EarlierResult(file, equation, effects, of_modes, text + doubt)
 
 
 def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
@@ -144,8 +151,13 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
     left = content.get("lack_of_fit")
     of_sparse = left.get(_SPARSE) if isinstance(left, dict) else None
     verdict = of_sparse.get("verdict") if isinstance(of_sparse, dict) else None
+    by_mode = content.get("by_mode")
+    by_mode = by_mode if isinstance(by_mode, dict) else {}
+    told = by_mode.get("verdict") == "explained" and by_mode.get("known_part") is not None
+    if verdict != "explained" and told:
+        return _of_law_by_mode(by_mode, sparse.get("effects", ()), file)
     equation = equation_from_json(sparse["law"], f"{file.name}: learners.{_SPARSE}.law")
-    effects = _effects(sparse.get("effects", ()), file)
+    effects, _ = _effects(sparse.get("effects", ()), file, len(equation.modulus))
     # without a term the known part is the law, and may be more than Maxwell's
     bare = not (sparse.get("terms") or equation.terms or equation.named or effects)
     if verdict != "explained" and bare:
@@ -155,32 +167,86 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
         )
     text = _text(file, "the law of sparse regression", equation, effects)
     doubt = "" if verdict == "explained" else " It did not explain the data that it was found in."
-    return EarlierResult(file, equation, effects, text + doubt)
+    return EarlierResult(file, equation, effects, (), text + doubt)
 
 
-def _effects(rows: Any, file: Path) -> tuple[KnownEffect, ...]:
-    written = {}
+def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> EarlierResult:
+    """Return the law with constants by mode of a comparison, which explained what no other did."""
+    equation = equation_from_json(law["known_part"], f"{file.name}: by_mode.known_part")
+    try:
+        added = [
+            {"effect": name, "parameters": {make_effect(name).parameters[0].name: constant}}
+            for name, constant in law["constants"].items()
+        ]
+    except (TypeError, KeyError, AttributeError):
+        raise _damaged(file) from None
+    effects, of_modes = _effects([*instrument, *added], file, len(equation.modulus))
+    text = _text(file, "the law with constants by mode", equation, effects, of_modes)
+    return EarlierResult(file, equation, effects, of_modes, text)
+
+
+def _effects(
+    rows: Any, file: Path, n_modes: int
+) -> tuple[tuple[KnownEffect, ...], tuple[tuple[KnownEffect, ...], ...]]:
+    """Return the effects, and those whose constants differ from mode to mode."""
+    written: dict[str, dict[str, float]] = {}
+    of_modes: dict[str, list[dict[str, float]]] = {}
     try:
         for row in rows:
-            values = {name: float(p["value"]) for name, p in row["parameters"].items()}
-            written[str(row["effect"])] = values
+            name, parameters = str(row["effect"]), row["parameters"]
+            values = {key: float(p["value"]) for key, p in parameters.items()}
+            differing = {
+                key: [float(mode["value"]) for mode in p["modes"]]
+                for key, p in parameters.items()
+                if p.get("degree")
+            }
+            if not differing:
+                written[name] = values
+                continue
+            if any(len(column) != n_modes for column in differing.values()):
+                raise ValueError("constants of other modes")
+            of_modes[name] = [
+                values | {key: column[number] for key, column in differing.items()}
+                for number in range(n_modes)
+            ]
     except (TypeError, KeyError, ValueError, AttributeError):
-        raise InputError(
-            f"[model] from: {file.name} is damaged where it says which effects were found. {_AGAIN}"
-        ) from None
-    return known_effects(written, f"[model] from: {file.name}")
+        raise _damaged(file) from None
+    where = f"[model] from: {file.name}"
+    each = ((known_effects({name: one}, where)[0] for one in of) for name, of in of_modes.items())
+    return known_effects(written, where), tuple(tuple(of) for of in each)
 
 
-def _text(file: Path, law: str, equation: Equation, effects: tuple[KnownEffect, ...]) -> str:
+def _damaged(file: Path) -> InputError:
+    return InputError(
+        f"[model] from: {file.name} is damaged where it says which effects were found. {_AGAIN}"
+    )
+
+
+def _text(
+    file: Path,
+    law: str,
+    equation: Equation,
+    effects: tuple[KnownEffect, ...],
+    of_modes: tuple[tuple[KnownEffect, ...], ...] = (),
+) -> str:
     n, modes = len(equation.terms), len(equation.modulus)
     named = equation.named
     below = "the Maxwell part"
     if named is not None:
         below = LAWS[named.law].described(named.constants[0])
+        if named.differing:
+            below = f"{LAWS[named.law].title}, {', '.join(named.differing)} by mode"
     terms = f"{n} term{'s' if n != 1 else ''} beside {below}" if n else below
     terms = terms if n or named else "upper convected Maxwell"
     text = f"Taken from {file.parent.name}: {law} ({terms}) with {modes} relaxation mode"
     text += "s" if modes != 1 else ""
+    times = equation.relaxation_time
+    for of in of_modes:
+        ends = (
+            f"{of[k].text} at {times[k]:.3g} s"
+            for k in (int(np.argmin(times)), int(np.argmax(times)))
+        )
+        text += f", in each mode its own {' to '.join(ends)}"
     if effects:
         text += f", and {', '.join(known.text for known in effects)}"
     return f"{text}."

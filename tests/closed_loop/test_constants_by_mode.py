@@ -96,7 +96,8 @@ def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
     # no run sees them, and their interval was 100 to 100 and "determined"
     law = FreeParameter("q", 5.0, 1.0, 100.0)
     places = np.array([0.0, -1.0, -2.0])
-    fit = SimpleNamespace(theta=np.array([5.0, 0.0, 25.0]))  # link 25 s² at the mean's −3
+    # link 25 s² at the mean's −3
+    fit = SimpleNamespace(theta=np.array([5.0, 0.0, 25.0, 0.0, 0.0, 0.0]))
     constant = VaryingConstant(law, 0, 1, places)
     values = constant.of_modes(fit)
     assert values[0] == pytest.approx(5.0)

@@ -13,7 +13,7 @@ from discover.comparison.fitting.law_by_mode import (
     CoefficientsInModes,
     SparseLaw,
     coefficients_in_modes,
-    fit_law_by_mode,
+    fit_laws_by_mode,
 )
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
 from discover.comparison.instrument import Frame
@@ -109,7 +109,8 @@ def fitted(mobilities, fluid=None):
     runs, unseen = (records(mobilities, rates, fluid=fluid) for rates in (FITTED, UNSEEN))
     sparse = SparseLaw(["sigma.sigma"], 1, same)
     flows = [*flows_of(runs, "training"), *flows_of(unseen, "held_out")]
-    return fit_law_by_mode(model, path, sparse, runs, unseen, Expectation(), 64, flows)
+    found = fit_laws_by_mode(model, path, sparse, runs, unseen, Expectation(), 64, flows)
+    return next(found, None)
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from independent import multimode_giesekus
+from independent import start_up as independent_start_up
 
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
 from discover.protocols import start_up
+from discover.simulate import simulate
 from discover.study import fingerprint, read_study
 from discover.study.declared_model import declared_model, forward_model
 
@@ -30,6 +34,20 @@ MOBILITY = {
     "effect": "ptt_linear",
     "kind": "constitutive",
     "parameters": {"epsilon": {"value": 0.2, "ci95": [0.1, 0.3], "unit": ""}},
+}
+_MODES = [
+    {"relaxation_time_s": t, "value": a, "ci95": [a, a], "left_open": False}
+    for t, a in ((1.0, 0.1), (0.1, 0.5))
+]
+_ALPHA = {"value": 0.2, "ci95": [0.1, 0.3], "unit": "", "degree": 1, "evidence": [0.0, 9.0]}
+MOBILITY_BY_MODE = {
+    "effect": "giesekus_mobility",
+    "kind": "constitutive",
+    "parameters": {"alpha": {**_ALPHA, "modes": _MODES}},
+}
+_OF_THREE = {
+    **MOBILITY_BY_MODE,
+    "parameters": {"alpha": {**_ALPHA, "modes": [*_MODES, _MODES[0]]}},
 }
 LOOP = {
     "verdict": "effects_added",
@@ -139,6 +157,68 @@ def test_the_fingerprint_changes_with_what_is_taken(tmp_path):
     assert fingerprint(read_study(file)) != before
 
 
+def shear(found, rate=5.0):
+    times = np.geomspace(0.02, 20.0, 30)
+    return times, simulate(found.fluid, start_up(rate), times).components[:, 3]
+
+
+def of_scipy(mobilities, times, rate=5.0):
+    fluid = multimode_giesekus(mobilities, (90.0, 40.0), (1.0, 0.1))
+    return fluid.respond(independent_start_up(rate), times).sigma12
+
+
+def test_constants_by_mode_of_a_loop_are_taken_with_those_of_every_mode(tmp_path):
+    """Of the declared law, and of what the loop added to it."""
+    named = {"law": "giesekus", "constants": [{"alpha": 0.1}, {"alpha": 0.5}]}
+    law = {**LAW, "terms": [], "named": named}
+    of_law = {**LOOP, "declared": {"law": law, "effects": [GAIN]}, "stages": []}
+    plain = {"law": {**LAW, "terms": []}, "effects": [GAIN]}
+    added = {**LOOP, "declared": plain, "stages": [MOBILITY_BY_MODE]}
+    for content in (of_law, added):
+        found = declared(write(tmp_path, "loop.json", content))
+        assert [known.name for known in found.effects] == ["stress_gain"]
+        assert not found.free_constants
+        times, stress = shear(found)
+        assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
+        # control: the constant at the mean time in both is another fluid
+        assert np.max(np.abs(stress / of_scipy((0.2, 0.2), times) - 1.0)) > 0.02
+        # the loop starts from it
+        model = AugmentedModel(forward_model(found), [])
+        run = Run("r", times, start_up(5.0), np.full(len(times), 5.0), stress)
+        predicted = model.predict(model.zero(), make_batch([run]))[0]
+        assert predicted == pytest.approx(0.9 * stress, rel=1e-5)
+    assert "in each mode its own giesekus mobility (alpha = 0.5) at 0.1 s to" in found.source
+
+
+def test_a_constant_that_is_the_same_in_all_modes_is_one_constant(tmp_path):
+    alpha = {**MOBILITY_BY_MODE["parameters"]["alpha"], "degree": 0}
+    stage = {**MOBILITY_BY_MODE, "parameters": {"alpha": alpha}}
+    found = declared(write(tmp_path, "loop.json", {**LOOP, "stages": [stage]}))
+    assert ("giesekus_mobility", (0.2,)) in [(known.name, known.values) for known in found.effects]
+
+
+def test_of_a_comparison_the_law_by_mode_is_taken_where_it_alone_explains(tmp_path):
+    sparse = {"law": LAW, "terms": [{}], "effects": [GAIN]}
+    alpha = MOBILITY_BY_MODE["parameters"]["alpha"]
+    by_mode = {
+        "verdict": "explained",
+        "constants": {"giesekus_mobility": alpha},
+        "known_part": {**LAW, "terms": []},
+    }
+    content = {**COMPARISON, "learners": {"tensor_sindy": sparse}, "by_mode": by_mode}
+    # sparse regression explains the data too, by one law for all modes
+    assert declared(write(tmp_path, "comparison.json", content)).law.as_terms() is not None
+    content = {**content, "lack_of_fit": {"tensor_sindy": {"verdict": "unexplained"}}}
+    found = declared(write(tmp_path, "comparison.json", content))
+    times, stress = shear(found)
+    assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
+    assert "the law with constants by mode" in found.source
+    assert [known.name for known in found.effects] == ["stress_gain"]
+    # one that explains nothing is no law
+    content = {**content, "by_mode": {**by_mode, "verdict": "unexplained"}}
+    assert "sparse" in declared(write(tmp_path, "comparison.json", content)).source
+
+
 _NOTHING = {**LOOP, "verdict": "unexplained", "stages": []}
 _NO_TERM = {
     **COMPARISON,
@@ -157,6 +237,11 @@ _NO_TERM = {
             "loop.json",
             {**LOOP, "declared": {"law": None, "effects": [], "by_mode": ["alpha"]}},
             "alpha differs from one relaxation mode to the next",
+        ),
+        (
+            "loop.json",
+            {**LOOP, "stages": [{**MOBILITY_BY_MODE, "parameters": _OF_THREE}]},
+            "damaged",
         ),
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),

@@ -128,7 +128,9 @@ def _set(search: SearchState, state: dict[str, Any]) -> None:
     search.without_aliases = set(state.get("unasked", ()))
     search.seen = SeenSets.from_json(state.get("seen", {}))
     search.degrees = {
-        name: Degree(found["degree"], tuple(found["evidence"]))
+        name: Degree(
+            **{**found, "evidence": tuple(found["evidence"]), "own": tuple(found.get("own", ()))}
+        )
         for name, found in state.get("degrees", {}).items()
     }
     search.known = {at: (mean, deviation) for at, mean, deviation in state["known"]}

@@ -137,7 +137,9 @@ class CurrentModel(SearchState):
         """Choose how constants by mode depend on the time, and return whether that is new."""
         before = {name: found.degree for name, found in self.degrees.items()}
         if before:
-            self.fit, self.degrees = choose_degrees(self.problem, self.fit, self.degrees)
+            self.fit, self.degrees = choose_degrees(
+                self.problem, self.fit, self.degrees, self.least_degrees
+            )
         return before != {name: found.degree for name, found in self.degrees.items()}
 
     def without(self, effect: str) -> Fit:

@@ -50,6 +50,8 @@ class SearchState:
         Effects whose aliases were found beside others than those that are in the model now.
     degrees
         Degree in log λ of each constant by mode, and the evidence for each degree.
+    least_degrees
+        Degrees below which none of them is taken, by name.
     """
 
     fit: Fit  # the first stage makes it
@@ -71,3 +73,4 @@ class SearchState:
         self.without_aliases: set[str] = set()
         self.seen = SeenSets()
         self.degrees = {name: Degree() for name in model.declared.by_mode}
+        self.least_degrees: dict[str, int] = {}

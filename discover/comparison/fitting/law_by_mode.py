@@ -1,6 +1,6 @@
 """A law whose constants differ from mode to mode, beside the one law for all modes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -15,11 +15,11 @@ from discover.forward.least_squares import Fit, intervals
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
-from discover.inference.degrees import Degree, choose_degrees
+from discover.inference.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.varying_constant import fits_of_one_degree_more
+from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
@@ -106,7 +106,7 @@ class LawByMode:
     @property
     def n_constants(self) -> int:
         """Number of constants fitted."""
-        return sum(1 + one.degree for one in self.constants.values())
+        return sum(one.n_constants for one in self.constants.values())
 
     def to_json(self) -> dict[str, Any]:
         """Return the law as ``comparison.json`` holds it."""
@@ -142,7 +142,7 @@ class CoefficientsInModes:
         return any(one.degree for one in self.constants.values())
 
 
-def fit_law_by_mode(
+def fit_laws_by_mode(
     model: DeclaredModel,
     path: Sequence[Mapping[str, Any]],
     sparse: SparseLaw,
@@ -151,13 +151,14 @@ def fit_law_by_mode(
     expectation: Expectation,
     n_candidates: int,
     flows: Sequence[Flow] = (),
-) -> LawByMode | None:
-    """Return the best law with constants by mode; None where none differs from mode to mode.
+) -> Iterator[LawByMode]:
+    """Return the best law with constants by mode, then the same with more degrees in log λ.
 
-    The terms are those of the path of sparse regression up to three, and those of Giesekus, of both
-    laws of Phan-Thien and Tanner and of Johnson and Segalman. Each constant has the degree in log λ
-    that evidence asks for, so that one constant for all modes stays where nothing speaks against
-    it.
+    None where no constant of the best differs from mode to mode. The terms are those of the path of
+    sparse regression up to three, and those of Giesekus, of both laws of Phan-Thien and Tanner and
+    of Johnson and Segalman. Each constant has the degree in log λ that evidence asks for, so that
+    one constant for all modes stays where nothing speaks against it; then one degree more as often
+    as a law is asked for.
 
     Parameters
     ----------
@@ -182,19 +183,28 @@ def fit_law_by_mode(
     found = [_fitted(problem, of_set) for of_set in sets]
     usable = [(fit, degrees) for fit, degrees in found if fit.usable]
     if not usable:
-        return None
+        return
     effective = problem.independent_samples(min((fit for fit, _ in usable), key=problem.cost))
     fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
     if not any(one.degree for one in degrees.values()):
-        return None
-    constants, bands = _told(problem, fit, degrees, model, flows)
-    return LawByMode(
-        constants,
-        problem.lack_of_fit(fit, fitted, expectation),
-        _worth_of(sparse, problem, fitted, effective) - problem.worth(fit, [*degrees], effective),
-        _errors(forward, fit, held_out),
-        bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
-    )
+        return
+    worth = _worth_of(sparse, problem, fitted, effective)
+    while fit.usable:
+        constants, bands = _told(problem, fit, degrees, model, flows)
+        yield LawByMode(
+            constants,
+            problem.lack_of_fit(fit, fitted, expectation),
+            worth - problem.worth(fit, [*degrees], effective),
+            _errors(forward, fit, held_out),
+            bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
+        )
+        least = one_degree_more(forward, degrees)
+        before = degrees
+        if not least:
+            return
+        fit, degrees = choose_degrees(problem, fit, degrees, least)
+        if all(degrees[name].degree == one.degree for name, one in before.items()):
+            return
 
 
 def coefficients_in_modes(
@@ -241,10 +251,10 @@ def _told(
 ) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
     """Return the constants of a fit by name, and its bands by the key of the flow."""
     forward = problem.model
-    wider = fits_of_one_degree_more(forward, problem.batch, fit, degrees)
+    freer = freer_fits(forward, problem.batch, fit, degrees)
     bounds = intervals(forward, problem.batch, fit)
-    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, wider)
-    drawn = draw_constants(problem, fit, degrees, wider, _DRAWS)
+    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer)
+    drawn = draw_constants(problem, fit, degrees, freer, _DRAWS)
     if drawn is None:
         return constants, {}
     found = (effect_of(forward, name) for name in drawn.names)

@@ -7,6 +7,7 @@ import numpy as np
 
 from discover.effects import ConstitutiveEffect, KnownEffect, ModeEffect, SeriesElement, StateEffect
 from discover.errors import InputError
+from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.study.declared_model import DeclaredModel
@@ -83,6 +84,7 @@ def _with_effect(
             np.append(column, value)
             for column, value in zip((modulus, relaxation_time), extra, strict=True)
         )
+        law = with_modes(law, declared.relaxation_time, relaxation_time)
     return replace(
         declared,
         law=law,

@@ -10,7 +10,7 @@ from discover.comparison.fitting.law_by_mode import (
     LawByMode,
     SparseLaw,
     coefficients_in_modes,
-    fit_law_by_mode,
+    fit_laws_by_mode,
 )
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
@@ -18,6 +18,7 @@ from discover.comparison.judging.modes_apart import said_of_each_mode
 from discover.comparison.judging.unseen_runs import hold_against_unseen, misses
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.inference.degrees import lowest_not_refuted
 from discover.statistics.residual import Expectation
 
 _LAW = "constants_by_mode"
@@ -96,8 +97,7 @@ def ask_of_modes(
                 return OfModes(alike, None, said)
         elif alike is not None and _holds(frame, alike, explanation):
             said = _BY_MODES_APART
-    law = _law_by_mode(chosen, frame, expectation, n_candidates)
-    law = None if law is None else _held_against_unseen(law, flows, expectation)
+    law = _law_by_mode(chosen, frame, expectation, n_candidates, flows)
     return OfModes(alike, law, said if law is None else "")
 
 
@@ -116,7 +116,11 @@ def _inside(flow: Flow, alike: CoefficientsInModes, noise: float) -> bool:
 
 
 def _law_by_mode(
-    chosen: LearnerOutcome, frame: Frame, expectation: Expectation, n_candidates: int
+    chosen: LearnerOutcome,
+    frame: Frame,
+    expectation: Expectation,
+    n_candidates: int,
+    flows: Sequence[Flow],
 ) -> LawByMode | None:
     model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
     predicted = [chosen.predictions[flow.key] for flow in training]
@@ -130,8 +134,16 @@ def _law_by_mode(
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())
-    law = fit_law_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
-    return None if law is None else replace(law, bands=frame.bands(law.bands))
+    laws = fit_laws_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
+    held = (
+        _held_against_unseen(replace(law, bands=frame.bands(law.bands)), flows, expectation)
+        for law in laws
+    )
+    first = next(held, None)
+    if first is None:
+        return None
+    found = lowest_not_refuted(first, lambda _: next(held, None), lambda law: law.refuted)
+    return found if found.explains else first
 
 
 def _held_against_unseen(

@@ -22,6 +22,7 @@ from discover.identify.soundness.steady_states import (
     steady_uniaxial_extension,
 )
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
@@ -213,10 +214,10 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
     rates = SHEAR_RATES / slowest
     stress = np.asarray(fluid.solvent_viscosity) * rates
     steady = np.ones(rates.size, dtype=bool)
-    for modulus, time in zip(
-        np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True
-    ):
-        found, _, residual = steady_shear(fluid.law, jnp.asarray(time * rates))
+    modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
+    for number, (modulus, time) in enumerate(modes):
+        law = law_of_mode(fluid.law, number)
+        found, _, residual = steady_shear(law, jnp.asarray(time * rates))
         stress = stress + modulus * np.asarray(found)[:, 3]
         steady &= is_steady(np.asarray(residual))
     last = rates.size if steady.all() else int(np.argmin(steady))
@@ -277,8 +278,16 @@ def _extension(fluid: Fluid) -> PhysicsCheck:
 
 
 def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
-    _, jacobian, residual = steady_uniaxial_extension(fluid.law, jnp.asarray(rates))
-    good = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+    times = np.asarray(fluid.relaxation_time)
+    slowest = int(np.argmax(times))
+    # of one law for all modes the slowest gives way first
+    numbers = range(len(times)) if differs_by_mode(fluid.law) else [slowest]
+    good = np.ones(rates.size, dtype=bool)
+    for number in numbers:
+        law = law_of_mode(fluid.law, number)
+        scaled = jnp.asarray(rates * (times[number] / times[slowest]))
+        _, jacobian, residual = steady_uniaxial_extension(law, scaled)
+        good &= is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
     return rates.size if good.all() else int(np.argmin(good))
 
 
@@ -290,10 +299,9 @@ def _linearised_at_rest(law: AbstractConstitutiveLaw):
     return law.stress_rate(rest, still), by_stress, by_rate
 
 
-def _small_strain(fluid: Fluid) -> PhysicsCheck:
-    name = SMALL_STRAIN
-    drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(fluid.law))
-    offset = float(np.max(np.abs(drift)))
+def _off_at_rest(law: AbstractConstitutiveLaw) -> tuple[float, float]:
+    """Return dσ/dt at rest, and by how much G′ + iG″ is off that of a Maxwell mode."""
+    drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(law))
     frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(source))
     response = np.array(
         [
@@ -302,7 +310,15 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
         ]
     )
     maxwell = 1j * frequency / (1.0 + 1j * frequency)
-    value = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
+    off = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
+    return float(np.max(np.abs(drift))), off
+
+
+def _small_strain(fluid: Fluid) -> PhysicsCheck:
+    name = SMALL_STRAIN
+    numbers = range(fluid.n_modes) if differs_by_mode(fluid.law) else [0]
+    of_modes = [_off_at_rest(law_of_mode(fluid.law, number)) for number in numbers]
+    offset, value = (max(column) for column in zip(*of_modes, strict=True))
     text = (
         f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
         f"{percent_of(max(value, 1e-5))} (the law linearised at rest, frequencies times "

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.fluids import at_samples
+from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
@@ -65,7 +65,7 @@ def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
 def _along(fluid, flows):
     def one(protocol, grid):
         _, states, rates = at_samples(fluid, protocol, grid)
-        at_mode = jax.vmap(partial(_energy, fluid.law), in_axes=(0, 0))
+        at_mode = over_modes(_energy, fluid.law)
         scaled = rates[:, None] * fluid.relaxation_time
         smallest, dissipation = jax.vmap(at_mode)(states, scaled)
         return states, smallest, dissipation

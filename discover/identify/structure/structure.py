@@ -25,6 +25,7 @@ from discover.identify.exact.relations import TermRelation, spell_briefly, term_
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense, joint_library
 from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
@@ -284,15 +285,16 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
     exact = [_finite(d, law, base) for d in exact]
     with_n1 = list(dict.fromkeys([*observed, "N1"]))
     left, _ = _directions(library, blocks, with_n1, int(total))
-    hidden = hidden_stresses(
-        LibraryExpansion(
-            coefficients=jnp.asarray(coefficients),
-            inner=jnp.asarray(inner),
-            library=library,
-            linear_relaxation=base.linear_relaxation,
-            base=base,
-        )
+    whole = LibraryExpansion(
+        coefficients=jnp.asarray(coefficients),
+        inner=jnp.asarray(inner),
+        library=library,
+        linear_relaxation=base.linear_relaxation,
+        base=base,
     )
+    numbers = range(problem.modulus.shape[0]) if differs_by_mode(base) else [0]
+    of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
+    hidden = max(of_modes, key=lambda one: len(one.unfelt))
     verdicts = tuple(
         _verdict(q, observed, exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
     )

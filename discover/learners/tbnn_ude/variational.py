@@ -20,6 +20,7 @@ from discover.forward.fluids import (
     solved_on_grid,
     with_cheap_tangents,
 )
+from discover.laws.each_mode import over_modes
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
@@ -101,7 +102,7 @@ def states_and_jacobian(
     fluid = problem.fluid(rebuild(weights))
     n_weights = weights.shape[0]
 
-    def one_mode(state, sensitivity, time_scale, gradient):
+    def one_mode(rebuild, state, sensitivity, time_scale, gradient):
         def change(s, w):
             return rebuild(w).stress_rate(s, time_scale * gradient) / time_scale
 
@@ -113,7 +114,9 @@ def states_and_jacobian(
     @jax.jit  # traced once for all stages of a step
     def field(t, y, protocol):
         gradient = protocol.velocity_gradient(t)
-        return jax.vmap(one_mode, (0, 0, 0, None))(y[..., 0], y[..., 1:], relaxation_time, gradient)
+        gradients = jnp.broadcast_to(gradient, (*relaxation_time.shape, *gradient.shape))
+        of_modes = over_modes(one_mode, rebuild)
+        return of_modes(y[..., 0], y[..., 1:], relaxation_time, gradients)
 
     def observe(t, y, protocol):
         stress = y[:, :4]  # without structure variables, which no record holds
@@ -126,7 +129,8 @@ def states_and_jacobian(
             gradient = jnp.multiply.outer(relaxation_time, protocol.velocity_gradient(time))
 
             def recorded(w):
-                state = steady_modes(rebuild(w).stress_rate, gradient, fluid.rest())[:, :4]
+                of_modes = over_modes(lambda made, *flow: made(w).stress_rate(*flow), rebuild)
+                state = steady_modes(of_modes, gradient, fluid.rest())[:, :4]
                 return protocol.recorded_stress(jnp.tensordot(modulus, state, axes=1)), state
 
             # one number recorded: a pullback costs what one weight's tangent would
@@ -136,11 +140,16 @@ def states_and_jacobian(
         return grid.of_states(at)
 
     def solved_run(protocol, grid):
-        law = with_cheap_tangents(lambda made, w, *flow: made(w).stress_rate(*flow), rebuild)
         modes = modulus, relaxation_time, problem.beside(protocol)
 
         def make(w):
-            return dynamics_of_modes(partial(law, w), *modes, protocol)
+            def of_mode(rebuild, stress, rate):
+                law = with_cheap_tangents(
+                    lambda made, w, *flow: made(w).stress_rate(*flow), rebuild
+                )
+                return law(w, stress, rate)
+
+            return dynamics_of_modes(over_modes(of_mode, rebuild, -1), *modes, protocol)
 
         def recorded(w):
             found = solved_on_grid(make, w, protocol, grid)

@@ -24,6 +24,7 @@ from discover.forward.fluids import (
     with_cheap_tangents,
 )
 from discover.laws.base import as_state, stress_in
+from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
@@ -46,7 +47,7 @@ with the square."""
 # Compiled as a part of the whole either way; as a unit of its own it is traced once and not once
 # for every stage of the integration.
 @partial(jax.jit, static_argnums=0)
-def _mode_rates(library, base, active, coefficients, inner, state, rate):
+def _mode_rates(library, active, base, coefficients, inner, state, rate):
     """Return d/dt of one mode's augmented state (s, 1 + q + m), dimensionless."""
     stress, columns = state[:, 0], state[:, 1:]
 
@@ -75,8 +76,11 @@ def _mode_rates(library, base, active, coefficients, inner, state, rate):
 def _vector_field(t, state, args):
     problem, protocol, active, coefficients, inner = args
     rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
-    mode = partial(_mode_rates, problem.library, problem.base, active, coefficients, inner)
-    rates = jax.vmap(mode)(state, rate)
+
+    def mode(base, state, rate):
+        return _mode_rates(problem.library, active, base, coefficients, inner, state, rate)
+
+    rates = over_modes(mode, problem.base)(state, rate)
     return rates / problem.relaxation_time[:, None, None]
 
 
@@ -112,11 +116,11 @@ def _solve_run(problem, active, coefficients, inner, protocol, grid):
 
 def _states_alone(problem, active, coefficients, inner, protocol) -> Following:
     """Return how the states change, without sensitivities."""
-    mode = partial(_known_less_terms, problem, active, coefficients, inner)
+    of_modes = _known_less_terms(problem, active, coefficients, inner)
 
     def field(t, stress, _):
         rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
-        return jax.vmap(mode)(stress, rate) / problem.relaxation_time[:, None]
+        return of_modes(stress, rate) / problem.relaxation_time[:, None]
 
     return Following(field, _solver(problem), _rest(problem), None)
 
@@ -151,11 +155,14 @@ def _solved_run(problem, active, coefficients, inner, protocol, grid):
 
 
 def _observed_where_solved(problem, active, numbers, protocol, grid):
-    law = with_cheap_tangents(partial(_law_of_numbers, problem.library), (active, problem.base))
     modes = problem.modulus, problem.relaxation_time, problem.solvent_viscosity
 
     def make(numbers):
-        return dynamics_of_modes(partial(law, numbers), *modes, protocol)
+        def of_mode(base, stress, rate):
+            law = with_cheap_tangents(partial(_law_of_numbers, problem.library), (active, base))
+            return law(numbers, stress, rate)
+
+        return dynamics_of_modes(over_modes(of_mode, problem.base, -1), *modes, protocol)
 
     return solved_on_grid(make, numbers, protocol, grid, together=True).observed
 
@@ -182,14 +189,19 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
 
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
     gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
-    law = partial(_known_less_terms, problem, active, coefficients, inner)
+    law = _known_less_terms(problem, active, coefficients, inner)
     state = steady_modes(law, gradient, _rest(problem))
     return _observed(problem, protocol, time, state)
 
 
-def _known_less_terms(problem, active, coefficients, inner, stress, rate):
-    given, numbers = (active, problem.base), (coefficients, inner)
-    return _law_of_numbers(problem.library, given, numbers, stress, rate)
+def _known_less_terms(problem, active, coefficients, inner):
+    """Return the dimensionless dσ/dt of all modes, of their σ and their λL."""
+    numbers = coefficients, inner
+
+    def of_mode(base, stress, rate):
+        return _law_of_numbers(problem.library, (active, base), numbers, stress, rate)
+
+    return over_modes(of_mode, problem.base)
 
 
 def _observed(problem, protocol, time, state):

@@ -17,8 +17,15 @@ from discover.report.plots.style import (
     picture,
 )
 from discover.report.wording import effect_title, interval, readable, significant
+from discover.words import listed
 
-_DEGREES = ("one constant for all modes", "linear in log λ", "quadratic in log λ")
+_DEGREES = (
+    "one constant for all modes",
+    "linear in log λ",
+    "quadratic in log λ",
+    "free in each mode that the runs tell",
+)
+_TRIED = ("linear", "quadratic", "free")
 
 
 def by_mode_picture(
@@ -66,9 +73,9 @@ def by_mode_picture(
         return picture(
             drawing,
             "by_mode",
-            f"{said}{doubt} Intervals take it that the law is the fluid's and the constant a "
-            "smooth function of the relaxation time; they hold one degree more than was chosen, "
-            "where one was tried.",
+            f"{said}{doubt} Intervals take it that the law is the fluid's. They hold one degree "
+            "more than was chosen, where one was tried, and modes that are free where more of them "
+            "are told than a parabola has constants.",
         )
 
 
@@ -94,9 +101,10 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     """Return what the data say of a constant by mode."""
     symbol = readable(effect_title(name))
     gains = [significant(gain, 2) for gain in constant.evidence[1:]]
-    tried = f" (evidence over one constant, linear and quadratic: {' and '.join(gains)})"
-    tried = tried if len(gains) > 1 else f" (evidence over one constant, linear: {gains[0]})"
+    tried = f" (evidence over one constant, {listed(_TRIED[: len(gains)])}: {listed(gains)})"
     text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
+    if constant.is_raised:
+        text += ", since runs held out refute less, which the fitted ones would be content with"
     if not constant.degree:
         return f"{text}: {significant(constant.value, 2)}. {_allowed(constant)}"
     known = [mode for mode in constant.modes if not mode.left_open]

@@ -1,0 +1,226 @@
+"""A law whose constants differ from one relaxation mode to the next."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw, State
+from tensor_library.algebra import Symmetric
+from tensor_library.kinematics import VelocityGradient
+from tensor_library.terms import TermShare
+
+Tree = TypeVar("Tree")
+
+
+class LawOfEachMode(AbstractConstitutiveLaw):
+    """One law for each mode of a fluid: the same equation with constants of its own.
+
+    It stands for a law where a fluid takes one, alone or below the terms that a learner adds. What
+    follows the modes of a fluid takes it apart by `over_modes` or `law_of_mode`; in there it is the
+    law of that one mode.
+
+    Attributes
+    ----------
+    law
+        The law, with a leading axis of modes on every array.
+    linear_relaxation
+        As in the law.
+    """
+
+    law: AbstractConstitutiveLaw
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    @property
+    def variables(self) -> int:
+        """As in the law."""
+        return self.law.variables
+
+    @property
+    def tensors(self) -> int:
+        """As in the law."""
+        return self.law.tensors
+
+    @property
+    def retracts(self) -> bool:
+        """As in the law."""
+        return self.law.retracts
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h of the law, of one mode."""
+        return self.law.extra_term(stress, rate)
+
+    def as_terms(self) -> tuple[TermShare, ...] | None:
+        """Return None: no sum of terms is the law of all modes."""
+        return None
+
+    def trace_relaxation(self, stress: State) -> Float[Array, ""]:
+        """Return that of the law, of one mode."""
+        return self.law.trace_relaxation(stress)
+
+    def relaxations(self) -> Float[Array, "t 2"]:
+        """Return those of the law, of one mode."""
+        return self.law.relaxations()
+
+    def shares(self) -> Float[Array, " tensors"]:
+        """Return those of the law, of one mode."""
+        return self.law.shares()
+
+    def conformation(self, stress: Symmetric) -> Symmetric:
+        """Return that of the law, of one mode."""
+        return self.law.conformation(stress)
+
+    def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
+        """Return that of the law, of one mode."""
+        return self.law.stress_rate(stress, velocity_gradient)
+
+
+def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:
+    """Return the law of a fluid with one law for each of its modes.
+
+    Parameters
+    ----------
+    laws
+        In the order of the modes, of one kind: they may differ in numbers alone.
+
+    Raises
+    ------
+    InputError
+        If they are of several kinds, or a further tensor of a mode has its own share of the stress.
+    """
+    parts = [eqx.partition(law, eqx.is_array) for law in laws]
+    kinds = {jax.tree.structure(arrays) for arrays, _ in parts}
+    if len(kinds) != 1 or not all(eqx.tree_equal(parts[0][1], rest) for _, rest in parts):
+        raise InputError("Laws of the modes of one fluid must be of one kind; got several.")
+    if laws[0].tensors:
+        raise InputError(
+            f"The law {type(laws[0]).__name__} carries several tensors in every mode, and its "
+            "constants must be the same in all of them."
+        )
+    relaxes = laws[0].linear_relaxation
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(arrays for arrays, _ in parts))
+    return LawOfEachMode(law=eqx.combine(stacked, parts[0][1]), linear_relaxation=relaxes)
+
+
+def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
+    """Return whether a law, or one that it adds to, differs from mode to mode."""
+    return any(isinstance(part, LawOfEachMode) for part in _parts(law))
+
+
+def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callable[..., Any]:
+    """Return a function of one mode, with its law, as one of all modes.
+
+    Parameters
+    ----------
+    function
+        Of a tree that holds the law, and of numbers of one mode.
+    tree
+        A law, or what holds one; what of it differs from mode to mode is taken apart.
+    axis
+        Along which the modes lie, in the numbers and in what is returned.
+    """
+    own, shared = _apart(tree)
+
+    def of_mode(own, *numbers):
+        return function(eqx.combine(own, shared), *numbers)
+
+    def of_all(*numbers):
+        mapped = jax.vmap(of_mode, in_axes=(0, *(axis for _ in numbers)), out_axes=axis)
+        return mapped(own, *numbers)
+
+    return of_all
+
+
+def of_each_mode(
+    function: Callable[[AbstractConstitutiveLaw], Tree], law: AbstractConstitutiveLaw, count: int
+) -> Tree:
+    """Return what a law says of each of so many modes, along a first axis."""
+    return over_modes(lambda law, _: function(law), law)(jnp.arange(count))
+
+
+def law_of_mode(law: AbstractConstitutiveLaw, number: int) -> AbstractConstitutiveLaw:
+    """Return the law of one mode, counted from 0; where all have the same, that one."""
+
+    def of_mode(part):
+        if not isinstance(part, LawOfEachMode):
+            return part
+        return jax.tree.map(lambda leaf: leaf[number] if eqx.is_array(leaf) else leaf, part.law)
+
+    return jax.tree.map(of_mode, law, is_leaf=_is_of_each)
+
+
+def with_modes(
+    law: AbstractConstitutiveLaw,
+    before: Float[Array, " k"] | np.ndarray,
+    after: Float[Array, " m"] | np.ndarray,
+) -> AbstractConstitutiveLaw:
+    """Return a law of modes with these times as one of modes with other times.
+
+    A mode has constants between those of its neighbours, evenly in log λ, and beyond the ends those
+    of the end.
+
+    Parameters
+    ----------
+    law
+        The law.
+    before, after
+        Relaxation times in s.
+    """
+
+    def of_times(part):
+        if not isinstance(part, LawOfEachMode):
+            return part
+        order = jnp.argsort(jnp.asarray(before))
+        known, asked = jnp.log(jnp.asarray(before))[order], jnp.log(jnp.asarray(after))
+
+        def between(leaf):
+            if not eqx.is_array(leaf):
+                return leaf
+            rows = leaf[order].reshape(len(known), -1)
+            found = jax.vmap(lambda row: jnp.interp(asked, known, row), 1, 1)(rows)
+            return found.reshape(len(asked), *leaf.shape[1:])
+
+        moved = jax.tree.map(between, part.law)
+        return LawOfEachMode(law=moved, linear_relaxation=part.linear_relaxation)
+
+    return jax.tree.map(of_times, law, is_leaf=_is_of_each)
+
+
+def require_modes(law: AbstractConstitutiveLaw, count: int) -> None:
+    """Refuse a law with constants of other than so many modes.
+
+    Raises
+    ------
+    InputError
+        If it has them.
+    """
+    for part in _parts(law):
+        if isinstance(part, LawOfEachMode):
+            leaves = [leaf for leaf in jax.tree.leaves(part) if eqx.is_array(leaf)]
+            wrong = next((leaf for leaf in leaves if leaf.shape[:1] != (count,)), None)
+            if wrong is not None:
+                raise InputError(
+                    f"A law of each mode must have constants for {count} modes, as the fluid has; "
+                    f"got the shape {wrong.shape}."
+                )
+
+
+def _is_of_each(part: Any) -> bool:
+    return isinstance(part, LawOfEachMode)
+
+
+def _parts(tree: Any) -> list[Any]:
+    return jax.tree.leaves(tree, is_leaf=_is_of_each)
+
+
+def _apart(tree: Tree) -> tuple[Tree, Tree]:
+    """Return what differs from mode to mode, and all else, each with None for the other."""
+    differs = jax.tree.map(
+        lambda part: eqx.is_array if _is_of_each(part) else False, tree, is_leaf=_is_of_each
+    )
+    return eqx.partition(tree, differs)

@@ -1,0 +1,113 @@
+"""Constants of many modes that no smooth function of the relaxation time describes, by scipy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from independent import multimode_giesekus
+from independent import start_up as flow
+
+from discover.dataset import Run
+from discover.effects import make_effect
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward.least_squares import intervals
+from discover.inference import degrees as of_degrees
+from discover.inference.by_mode import constants_by_mode
+from discover.inference.degrees import FREE, Degree, choose_degrees, one_degree_more
+from discover.inference.draws_by_mode import draw_constants
+from discover.inference.problem import FitProblem
+from discover.inference.varying_constant import freer_fits
+from discover.protocols import start_up
+
+MODULI = np.array([300.0, 200.0, 100.0, 60.0, 30.0])
+TIMES = np.array([0.03, 0.15, 0.7, 3.0, 15.0])
+RATES = (0.1, 0.3, 1.0, 4.0, 15.0, 60.0)
+NAME = "giesekus_mobility"
+ROUGH, SMOOTH = (0.1, 0.3, 0.15, 0.35, 0.2), (0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+@cache
+def problem(mobilities, rates=RATES):
+    generator, runs = np.random.default_rng(1), []
+    for rate in rates:
+        times = np.geomspace(0.02, 20.0, 50) / np.sqrt(rate)
+        stress = multimode_giesekus(mobilities, MODULI, TIMES).respond(flow(rate), times).sigma12
+        size = 0.01 * np.sqrt(np.mean(stress**2))
+        stress = stress + size * generator.standard_normal(len(times))
+        runs.append(Run(f"{rate}", times, start_up(rate), np.full(len(times), rate), stress))
+    declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=(NAME,))
+    model = AugmentedModel(declared, [make_effect(NAME)], data_scales(runs))
+    return FitProblem(model, make_batch(runs))
+
+
+@cache
+def chosen(mobilities, least=0, rates=RATES):
+    asked = problem(mobilities, rates)
+    at = asked.model.positions(NAME)
+    start = asked.model.zero()
+    start[at] = 0.2
+    return choose_degrees(asked, asked.fit(start, at), {NAME: Degree()}, {NAME: least})
+
+
+def constants(mobilities, least=0, rates=RATES):
+    asked, (fit, degrees) = problem(mobilities, rates), chosen(mobilities, least, rates)
+    model, batch = asked.model, asked.batch
+    freer = freer_fits(model, batch, fit, degrees)
+    bounds = intervals(model, batch, fit)
+    found = constants_by_mode(model, batch, fit, bounds, degrees, freer)[NAME]
+    return found, draw_constants(asked, fit, degrees, freer, 20)
+
+
+def held(mode, truth):
+    """95 % intervals, widened by half: five of them must hold at once."""
+    low, high = mode.ci95
+    return low - (high - low) / 4 < truth < high + (high - low) / 4
+
+
+def test_each_mode_that_the_runs_tell_has_a_constant_of_its_own():
+    found, drawn = constants(ROUGH)
+    assert found.degree == FREE
+    assert found.n_constants == len(ROUGH)
+    assert found.evidence[FREE] > found.evidence[2] + 6.0  # strong evidence over a parabola
+    for mode, truth in zip(found.modes, ROUGH, strict=True):
+        assert held(mode, truth)
+        assert mode.value == pytest.approx(truth, rel=0.1)
+    # laws drawn are those of the intervals
+    assert drawn.values[0, 0] == pytest.approx([mode.value for mode in found.modes], rel=1e-6)
+
+
+def test_control_a_smooth_function_keeps_its_few_constants_and_its_intervals_hold_all_the_same():
+    """The mobility is a line in log λ and its link nearly a parabola: that alone missed two."""
+    found, drawn = constants(SMOOTH)
+    assert found.degree == 2
+    assert found.n_constants == 3
+    assert not found.is_raised
+    assert all(held(mode, truth) for mode, truth in zip(found.modes, SMOOTH, strict=True))
+    # the free fit is one more group of laws
+    assert len(drawn.sizes) == 2
+
+
+def test_a_mode_that_no_run_tells_is_left_open_and_follows_the_others():
+    found, _ = constants(ROUGH, rates=(0.03, 0.1, 0.3, 1.0))
+    assert found.modes[0].left_open
+    assert not found.modes[-1].left_open
+    told = [pair for pair in zip(found.modes, ROUGH, strict=True) if not pair[0].left_open]
+    assert all(held(mode, truth) for mode, truth in told)
+
+
+def test_a_lower_degree_that_was_refuted_gives_way_to_the_next(monkeypatch):
+    """Which is fitted to the same runs; evidence there would be content with less."""
+    monkeypatch.setattr(of_degrees, "BARE_MENTION", 100.0)
+    chosen.cache_clear()
+    model = problem(SMOOTH).model
+    _, first = chosen(SMOOTH)
+    assert first[NAME].degree == 1
+    least = one_degree_more(model, first)
+    assert least == {NAME: 2}
+    _, second = chosen(SMOOTH, least[NAME])
+    assert (second[NAME].degree, second[NAME].is_raised) == (2, True)
+    _, third = chosen(SMOOTH, one_degree_more(model, second)[NAME])
+    assert third[NAME].degree == FREE
+    assert third[NAME].own
+    assert one_degree_more(model, third) == {}
+    chosen.cache_clear()

@@ -1,0 +1,145 @@
+"""Laws with constants of their own in each mode, against stresses by scipy and one mode alone."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import Modes, PhanThienTanner, PomPom, multimode_giesekus
+from independent import start_up as independent_start_up
+
+from discover.dataset import Run
+from discover.effects import make_effect
+from discover.equations import AugmentedLaw, law_parts
+from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.identify.soundness.physics import _extension
+from discover.laws import Fluid, make_law
+from discover.laws.checking import check_law
+from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
+from discover.protocols import start_up
+from discover.simulate import simulate
+from discover.simulate.steady_states import steady_state
+from discover.simulate.synthetic import linear_sweep
+
+MODULI, TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
+MOBILITIES = (0.1, 0.3, 0.5)
+SAMPLES = np.geomspace(0.02, 20.0, 40)
+RATE = 5.0
+
+
+def giesekus(mobilities=MOBILITIES):
+    return law_of_each_mode([make_law("giesekus", {"alpha": a}) for a in mobilities])
+
+
+def of_scipy(mobilities=MOBILITIES, moduli=MODULI, times=TIMES):
+    return multimode_giesekus(mobilities, moduli, times).respond(
+        independent_start_up(RATE), SAMPLES
+    )
+
+
+def apart(found, true):
+    return float(np.max(np.abs(found - true)) / np.max(np.abs(true)))
+
+
+def test_the_stresses_are_those_of_the_modes_by_scipy():
+    stress = simulate(Fluid(giesekus(), MODULI, TIMES), start_up(RATE), SAMPLES)
+    true = of_scipy()
+    assert apart(stress.components[:, 3], true.sigma12) < 1e-6
+    assert apart(stress.first_normal_stress_difference, true.N1) < 1e-6
+    # control: with the constants in the other order they are others
+    other = simulate(Fluid(giesekus(MOBILITIES[::-1]), MODULI, TIMES), start_up(RATE), SAMPLES)
+    assert apart(other.components[:, 3], true.sigma12) > 0.05
+
+
+def test_of_a_law_with_a_stretch_too():
+    arms = (5.0, 7.0, 9.0)
+    law = law_of_each_mode(
+        [make_law("pom_pom_drag_strain", {"q": q, "stretch_time_ratio": 0.4}) for q in arms]
+    )
+    stress = simulate(Fluid(law, MODULI, TIMES), start_up(RATE), SAMPLES)
+    modes = zip(arms, MODULI, TIMES, strict=True)
+    true = Modes(*(PomPom(q, 0.4 * t, g, t) for q, g, t in modes)).respond(
+        independent_start_up(RATE), SAMPLES
+    )
+    assert apart(stress.components[:, 3], true.sigma12) < 1e-3
+
+
+def test_the_model_of_the_loop_gives_an_added_mode_constants_between_its_neighbours():
+    run = Run("a", SAMPLES, start_up(RATE), np.full(len(SAMPLES), RATE), of_scipy().sigma12)
+    declared = DeclaredModel(giesekus(), np.array(MODULI), np.array(TIMES))
+    model = AugmentedModel(declared, [make_effect("relaxation_mode")])
+    assert apart(model.predict(model.zero(), make_batch([run]))[0], run.stress) < 1e-5
+    theta = model.zero()
+    theta[model.positions("relaxation_mode")] = 30.0, 10.0**0.5  # halfway between 1 and 10 s
+    true = of_scipy((0.1, 0.3, 0.4, 0.5), (200.0, 100.0, 30.0, 50.0), (0.1, 1.0, 10.0**0.5, 10.0))
+    assert apart(model.predict(theta, make_batch([run]))[0], true.sigma12) < 1e-5
+    moved = with_modes(giesekus(), np.array(TIMES), np.array([10.0**0.5, 0.01, 100.0]))
+    assert moved.law.mobility == pytest.approx([0.4, 0.1, 0.5])
+
+
+def test_steady_states_and_linear_sweeps_are_those_of_each_mode():
+    fluid = Fluid(giesekus(), MODULI, TIMES)
+    states = np.asarray(steady_state(fluid, jnp.asarray(RATE)))
+    for number, (alpha, time) in enumerate(zip(MOBILITIES, TIMES, strict=True)):
+        alone = Fluid(make_law("giesekus", {"alpha": alpha}), 1.0, time)
+        assert states[number] == pytest.approx(
+            np.asarray(steady_state(alone, jnp.asarray(RATE)))[0]
+        )
+    sweep, omega = linear_sweep(fluid), linear_sweep(fluid).angular_frequency
+    x = np.multiply.outer(omega, TIMES)
+    assert sweep.storage_modulus == pytest.approx((x**2 / (1 + x**2)) @ np.array(MODULI))
+
+
+def test_a_law_of_each_mode_is_written_with_its_name():
+    named, terms = law_parts(giesekus())
+    assert named is not None
+    assert (named.law, terms) == ("giesekus", ())
+    assert [one["alpha"] for one in named.constants] == pytest.approx(MOBILITIES)
+    effects = tuple(make_effect(name) for name in ("ptt_linear", "non_affine_motion"))
+
+    def of_mode(epsilon, slip):
+        values = jnp.asarray([epsilon]), jnp.asarray([slip])
+        return AugmentedLaw(make_law("ucm", {}), values, effects)
+
+    law = law_of_each_mode([of_mode(0.1, 0.2), of_mode(0.3, 0.05)])
+    named, _ = law_parts(law)
+    assert named is not None
+    assert named.law == "ptt_linear_non_affine"
+    fluid = Fluid(law, MODULI[:2], TIMES[:2])
+    pairs = zip((0.1, 0.3), (0.2, 0.05), MODULI, TIMES, strict=False)
+    true = Modes(
+        *(PhanThienTanner(e, slip=s, modulus=g, relaxation_time=t) for e, s, g, t in pairs)
+    ).respond(independent_start_up(RATE), SAMPLES)
+    stress = simulate(fluid, start_up(RATE), SAMPLES)
+    assert apart(stress.components[:, 3], true.sigma12) < 1e-5
+    # what no law with a name adds cannot be written
+    term = (make_effect("tr(sigma.gammadot)*I"),)
+    unnamed = [AugmentedLaw(make_law("ucm", {}), (jnp.asarray([c]),), term) for c in (0.1, 0.2)]
+    with pytest.raises(InputError, match="differs from one relaxation mode to the next"):
+        law_parts(law_of_each_mode(unnamed))
+
+
+def test_what_is_no_law_of_these_modes_is_refused():
+    with pytest.raises(InputError, match="constants for 2 modes"):
+        Fluid(giesekus(), MODULI[:2], TIMES[:2])
+    with pytest.raises(InputError, match="of one kind"):
+        law_of_each_mode([make_law("giesekus", {"alpha": 0.1}), make_law("ucm", {})])
+
+
+def test_a_law_is_taken_apart_by_modes():
+    law = giesekus()
+    assert differs_by_mode(law)
+    assert not differs_by_mode(make_law("giesekus", {"alpha": 0.1}))
+    assert float(law_of_mode(law, 1).mobility) == pytest.approx(0.3)
+    check_law(law)
+
+
+def test_extension_is_bounded_where_it_is_in_every_mode():
+    """A Maxwell mode stretches without bound from 0.5/λ on, be it not the slowest."""
+    times = np.array([1.0, 10.0])
+    bounded, unbounded = (
+        _extension(Fluid(giesekus(mobilities), MODULI[:2], times))
+        for mobilities in ((0.1, 0.3), (0.0, 0.3))
+    )
+    assert bounded.passed is True
+    assert unbounded.passed is False
+    assert unbounded.value == pytest.approx(0.5, rel=0.05)
