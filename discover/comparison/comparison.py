@@ -308,6 +308,9 @@ class Comparison(PageView, NotebookView):
                         "ci95_given_equal_modes": None
                         if t.ci95_given_equal_modes is None
                         else list(t.ci95_given_equal_modes),
+                        "ci95_given_declared": None
+                        if t.ci95_given_declared is None
+                        else list(t.ci95_given_declared),
                         "coefficient_penalised": t.coefficient_penalised,
                         "inner": dict(t.inner),
                         "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.dead_records import holds_signal
+from discover.statistics.likeness import likeness
 from discover.statistics.outliers import stray
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
 from discover.statistics.same_place import repeated
@@ -60,6 +61,9 @@ class LackOfFit:
         Relative size of what changes from sample to sample; None where the noise is given.
     rest
         Of a model that explains the records: what is left, as a predicate.
+    likeness
+        Of one that does not: what of the instrument's what is left looks like, as a clause; empty
+        where it looks like nothing that has a word.
     """
 
     verdict: FitVerdict
@@ -74,6 +78,7 @@ class LackOfFit:
     pattern: str = PATTERN
     changing: float | None = None
     rest: str = "is noise"
+    likeness: str = ""
 
     @property
     def noise_unsure(self) -> bool:
@@ -185,6 +190,7 @@ def what_is_left(
         pattern,
         float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
         rest,
+        likeness(residuals, measured) if verdict == "unexplained" else "",
     )
 
 

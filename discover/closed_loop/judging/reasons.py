@@ -67,6 +67,9 @@ class _Sentences:
         outliers = grounds.fitted.left.outliers
         if outliers:
             text += f" Besides those left out before the fit, {outliers} samples are outliers."
+        likeness = grounds.fitted.left.likeness
+        if likeness and grounds.structured and not grounds.fitted.explained:
+            text += f" What is left may be no effect of those with a name: {likeness}."
         if grounds.short:
             text += f" Runs of fewer samples do not judge: {', '.join(grounds.short)}."
         return text

@@ -94,6 +94,7 @@ class Explanation:
                     "verdict": one.verdict,
                     "outliers": one.outliers,
                     "reason": one.reason,
+                    "likeness": one.likeness,
                 }
                 for name, one in self.lack_of_fit.items()
             },
