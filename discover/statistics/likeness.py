@@ -35,7 +35,7 @@ def likeness(
     if far is None:
         return ""
     return (
-        "it wanders as a zero does that drifts at random, by some "
+        "what is left wanders as a zero does that drifts at random, by some "
         f"{percent_of(far)} of the stress over a run, and not as smoothly as what a law lacks: "
         "read the zero before and after each run, or repeat one, in which a missing effect comes "
         "back and a wandering zero does not"
