@@ -13,6 +13,7 @@ from discover.closed_loop.explanations.other_times import (
 from discover.closed_loop.final_fit import FinalConstants, FinalFit
 from discover.closed_loop.judging.between_samples import judged_with
 from discover.closed_loop.judging.judgement import Judgement, judge
+from discover.closed_loop.judging.left_out_in_turn import judged_in_turn
 from discover.closed_loop.judging.silence import Silence, fluid_is_silent
 from discover.dataset import Run
 from discover.dataset.checking.start import doubts_of_start
@@ -63,6 +64,7 @@ def verdict_on(
         silence,
         [run.name for run in whole if any(doubts_of_start(run))],
     )
+    judgement = judged_in_turn(judgement, search.problem, final.fit, active, final.fitted)
     judgement = judged_with(judgement, constants.coarse)
     times = other_times(search, final.carried, judgement) if final.carried else []
     judgement, instead = compared_with_times(judgement, active, final.carried, times)

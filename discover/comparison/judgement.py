@@ -12,6 +12,7 @@ from discover.comparison.fitting.named_effects import fit_named_effects
 from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
+from discover.comparison.judging.beside_other_constants import with_other_coefficients
 from discover.comparison.judging.constants_in_bands import with_fitted_constants
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
@@ -146,6 +147,7 @@ def judge(
     if of_modes.alike is not None and explanation.in_library:
         outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
         tested = replace(tested, bands=holding_modes_apart(tested.bands, of_modes.alike))
+    outcomes = with_other_coefficients(outcomes, tested.others)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
     outcomes = with_gain_in_dense(outcomes, tested.others)

@@ -11,6 +11,7 @@ from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
 from discover.inference.evidence import criterion, evidence
+from discover.protocols.sampling import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation, judged_cost, summarise
 
@@ -99,7 +100,9 @@ class FitProblem:
         rows = zip(fit.residual, self.weight, strict=True)
         residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
         even = [1.0 / run.sizes(run.recorded) for run in runs]
-        return lack_of_fit(residuals, [run.recorded for run in runs], expectation, None, even)
+        intervals = [sampling_interval(run.time, run.protocol, run.quantity) for run in runs]
+        records = [run.recorded for run in runs]
+        return lack_of_fit(residuals, records, expectation, None, even, intervals)
 
     def evidence(self, before: Fit, after: Fit, effective: float, n_effects: int = 1) -> float:
         """Return the evidence for what one fit has more than another; see `evidence`."""

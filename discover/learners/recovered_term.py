@@ -21,6 +21,9 @@ class RecoveredTerm:
     ci95_given_equal_modes
         That of one coefficient for all modes, where `ci95` holds coefficients that differ from mode
         to mode; else None.
+    ci95_given_declared
+        That with the declared modulus and relaxation time, where `ci95` holds the coefficient with
+        those that a linear term amounts to as well; else None.
     inner
         Inner parameters by name.
     latex
@@ -41,3 +44,4 @@ class RecoveredTerm:
     inner_ci95: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inner_at_one: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     ci95_given_equal_modes: tuple[float, float] | None = field(default=None, kw_only=True)
+    ci95_given_declared: tuple[float, float] | None = field(default=None, kw_only=True)

@@ -197,12 +197,18 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "nothing beside the known part"
     parts = []
     for term in outcome.terms:
-        equal = term.ci95_given_equal_modes
-        text = f"{estimate(term.coefficient, equal or term.ci95)} {_factor(readable(term.term))}"
+        equal, declared = term.ci95_given_equal_modes, term.ci95_given_declared
+        narrow = equal or declared or term.ci95
+        text = f"{estimate(term.coefficient, narrow)} {_factor(readable(term.term))}"
         if term.ci95 is not None and equal is not None:
             text += (
                 f" (95 % interval {interval(equal)} if it is the same in all modes, else "
                 f"{interval(term.ci95)} at the mean relaxation time)"
+            )
+        elif term.ci95 is not None and declared is not None:
+            text += (
+                f" (95 % interval {interval(declared)} with the declared modes, "
+                f"{interval(term.ci95)} with these or others)"
             )
         elif term.ci95 is not None:
             text += f" (95 % interval {interval(term.ci95)})"

@@ -8,8 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.dead_records import holds_signal
+from discover.statistics.likeness import likeness
 from discover.statistics.outliers import stray
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
+from discover.statistics.same_correlation import same_correlation_probability
 from discover.statistics.same_place import repeated
 from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 from discover.words import percent_of
@@ -60,6 +62,9 @@ class LackOfFit:
         Relative size of what changes from sample to sample; None where the noise is given.
     rest
         Of a model that explains the records: what is left, as a predicate.
+    likeness
+        Of one that does not: what of the instrument's what is left looks like, as a clause; empty
+        where it looks like nothing that has a word.
     """
 
     verdict: FitVerdict
@@ -74,6 +79,7 @@ class LackOfFit:
     pattern: str = PATTERN
     changing: float | None = None
     rest: str = "is noise"
+    likeness: str = ""
 
     @property
     def noise_unsure(self) -> bool:
@@ -96,6 +102,7 @@ def lack_of_fit(
     expectation: Expectation | None = None,
     rates: Sequence[Float[np.ndarray, " _"]] | None = None,
     even: Sequence[Float[np.ndarray, " _"]] | None = None,
+    intervals: Sequence[float] | None = None,
 ) -> LackOfFit:
     """Return what a model leaves of the records, and whether that is noise.
 
@@ -114,13 +121,15 @@ def lack_of_fit(
     even
         By what records and residuals are multiplied so that their noise has one size; by default
         by nothing.
+    intervals
+        As in `what_is_left`.
     """
     factors = [np.ones(len(record)) for record in measured] if even is None else even
     residuals, records = (
         [factor * row for factor, row in zip(factors, rows, strict=True)]
         for rows in (residuals, measured)
     )
-    left = what_is_left(residuals, records, expectation)
+    left = what_is_left(residuals, records, expectation, intervals)
     if holds_signal(measured, rates):
         return left
     return replace(
@@ -132,17 +141,29 @@ def what_is_left(
     residuals: Sequence[Float[np.ndarray, " _"]],
     measured: Sequence[Float[np.ndarray, " _"]],
     expectation: Expectation | None = None,
+    intervals: Sequence[float] | None = None,
 ) -> LackOfFit:
-    """Return the same of records that are known to hold a signal; see `lack_of_fit`."""
+    """Return the same of records that are known to hold a signal; see `lack_of_fit`.
+
+    Parameters
+    ----------
+    residuals, measured, expectation
+        As there.
+    intervals
+        Time between neighbouring samples of each run, by which the correlations of their noise are
+        held against one another (`same_correlation_probability`); not a number of what is recorded
+        otherwise. Without them they are not.
+    """
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)
     rows = judging(weight)
     misfit = float(np.mean(np.sqrt(np.sum(residual[rows] ** 2, axis=1))))
-    floor = expectation.floor(residual, weight, record)
+    further = _further(residual, weight, intervals)
+    floor = expectation.floor(residual, weight, record, further)
     expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
     known = expectation.noise is not None or tells_noise(weight)
-    explained = known and expectation.explains(residual, weight, record)
-    probability = noise_probability(residual, weight, record)
+    explained = known and expectation.explains(residual, weight, record, further)
+    probability = noise_probability(residual, weight, record, further)
     long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
     pattern = PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
@@ -185,7 +206,16 @@ def what_is_left(
         pattern,
         float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
         rest,
+        likeness(residuals, measured) if verdict == "unexplained" else "",
     )
+
+
+def _further(residual, weight, intervals: Sequence[float] | None) -> tuple[float, ...]:
+    """Return what tests say that need to know when the samples were taken."""
+    if intervals is None:
+        return ()
+    rows = [row[w > 0] for row, w in zip(residual, weight, strict=True)]
+    return (same_correlation_probability(rows, intervals),)
 
 
 _PATTERNED = {

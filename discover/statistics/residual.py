@@ -97,6 +97,7 @@ def noise_floor(
     residual: Float[np.ndarray, "runs n"],
     weight: Float[np.ndarray, "runs n"],
     measured: Float[np.ndarray, "runs n"] | None = None,
+    further: Sequence[float] = (),
 ) -> float:
     """Return the relative noise, mean over runs.
 
@@ -107,13 +108,14 @@ def noise_floor(
     Runs too short to be tested alone are taken to be as noisy as the others, or as what changes in
     them from sample to sample if that is more: their size is no sign of noise. Where all are so
     short and not tested together either, or hold structure, they tell it together by what changes.
-    Those that do not judge (`judging`) do not count.
+    Those that do not judge (`judging`) do not count. Further tests are those of
+    `noise_probability`.
     """
     rows = judging(weight)
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
     measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    probability = noise_probability(residual, weight, measured)
+    probability = noise_probability(residual, weight, measured, further)
     samples = np.count_nonzero(weight > 0, axis=1)
     tested = samples >= FEWEST_TESTED
     known = probability is not None and probability > SIGNIFICANCE
@@ -176,13 +178,14 @@ def is_noise(
     residual: Float[np.ndarray, "runs n"],
     weight: Float[np.ndarray, "runs n"],
     measured: Float[np.ndarray, "runs n"] | None = None,
+    further: Sequence[float] = (),
 ) -> bool:
     """Return whether residuals may be noise, white or with a first-order correlation.
 
     Runs too short to be tested, even together, do not say that they are not; see
     `noise_probability`.
     """
-    probability = noise_probability(residual, weight, measured)
+    probability = noise_probability(residual, weight, measured, further)
     return probability is None or probability > SIGNIFICANCE
 
 
@@ -220,18 +223,22 @@ class Expectation:
         residual: Float[np.ndarray, "runs n"],
         weight: Float[np.ndarray, "runs n"],
         measured: Float[np.ndarray, "runs n"] | None = None,
+        further: Sequence[float] = (),
     ) -> float:
         """Return the relative noise, known or estimated."""
-        return noise_floor(residual, weight, measured) if self.noise is None else self.noise
+        if self.noise is not None:
+            return self.noise
+        return noise_floor(residual, weight, measured, further)
 
     def size(
         self,
         residual: Float[np.ndarray, "runs n"],
         weight: Float[np.ndarray, "runs n"],
         measured: Float[np.ndarray, "runs n"] | None = None,
+        further: Sequence[float] = (),
     ) -> float:
         """Return the relative error that noise, repeats and linear error together explain."""
-        floor = max(self.floor(residual, weight, measured), self.repeat_error)
+        floor = max(self.floor(residual, weight, measured, further), self.repeat_error)
         return float(np.hypot(floor, self.linear_error))
 
     def explains(
@@ -239,20 +246,22 @@ class Expectation:
         residual: Float[np.ndarray, "runs n"],
         weight: Float[np.ndarray, "runs n"],
         measured: Float[np.ndarray, "runs n"] | None = None,
+        further: Sequence[float] = (),
     ) -> bool:
         """Return whether noise and the error of the linear data explain a residual.
 
         It may not be larger than both together. Where it has a pattern that noise has not, the
         pattern may not be larger than the error of the linear data, or than what repeated runs
         differ by, the only ones that have any; or the whole not larger than a noise that is given,
-        of which only who gives it knows what is in it.
+        of which only who gives it knows what is in it. Further tests are those of
+        `noise_probability`.
         """
         rows = judging(weight)
         sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))
         error = float(np.mean(sizes))
-        if error > STRUCTURE * self.size(residual, weight, measured):
+        if error > STRUCTURE * self.size(residual, weight, measured, further):
             return False
-        if is_noise(residual, weight, measured):
+        if is_noise(residual, weight, measured, further):
             return True
         if self.noise is not None:
             return error <= float(np.hypot(self.noise, self.linear_error))

@@ -42,6 +42,7 @@ def noise_probability(
     residual: Float[np.ndarray, "runs n"],
     weight: Float[np.ndarray, "runs n"],
     measured: Float[np.ndarray, "runs n"] | None = None,
+    further: Sequence[float] = (),
 ) -> float | None:
     """Return how probable residuals as structured as these are, if they are noise.
 
@@ -76,6 +77,8 @@ def noise_probability(
         Positive where there is a sample.
     measured
         The measurement, by which cycles are found; without it they are not looked for.
+    further
+        Probabilities by other tests of the longer runs, which count as these do.
     """
     rows, records, short = [], [], []
     for i, (values, seen) in enumerate(zip(residual, weight, strict=True)):
@@ -109,7 +112,7 @@ def noise_probability(
     cycles = [cycle(record) if record is not None else None for record in records]
     if any(length is not None for length in cycles):
         tests.append(_repeats(white, count, cycles))
-    tests.append(smooth_misfit_probability(rows))
+    tests += [smooth_misfit_probability(rows), *further]
     if short:
         tests.append(
             separate_probability([_differences(r[None], np.array([rho]))[0, 0] for r in short])

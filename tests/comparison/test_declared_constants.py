@@ -8,6 +8,7 @@ import pytest
 from independent import Giesekus, UpperConvectedMaxwell, oscillation, start_up
 from independent.instruments import Instrument
 
+from discover.comparison.judging.beside_other_constants import with_other_coefficients
 from discover.comparison.judging.declared_constants import (
     beside,
     other_constants,
@@ -15,6 +16,7 @@ from discover.comparison.judging.declared_constants import (
     with_other_gain,
 )
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.laws import make_law
 from discover.laws.expansion import law_of_terms
@@ -140,3 +142,66 @@ def test_the_band_holds_the_fluid_behind_a_transducer_of_that_gain():
     # a wrong time moves no stress
     of_time = other_constants(TERMS[:1], declared())
     assert with_other_gain({"run": band}, of_time) == {"run": band}
+
+
+def sparse(terms, covariance=None):
+    nothing = np.zeros(0)
+    details = {"covariance": covariance}
+    return {
+        "tensor_sindy": LearnerOutcome("tensor_sindy", tuple(terms), 0.0, (nothing,) * 2, details)
+    }
+
+
+def test_an_interval_beside_a_wrong_declaration_holds_the_coefficient_of_the_fluid():
+    others = other_constants(TERMS, declared())
+    wide = with_other_coefficients(sparse(TERMS), others)["tensor_sindy"].terms
+    by_name = {term.term: term for term in wide}
+    square = by_name["sigma.sigma"]
+    given = square.ci95_given_declared
+    assert not given[0] <= MOBILITY <= given[1]
+    assert square.ci95[0] <= MOBILITY <= square.ci95[1]
+    # either alone may be the wrong one
+    for factor in (others[0].factor, others[1].factor):
+        assert square.ci95[0] <= square.coefficient * factor <= square.ci95[1]
+    # what amounts to another constant is what it is
+    assert by_name["sigma"] == TERMS[0]
+
+
+def test_an_interval_beside_a_wrong_time_is_as_wide_as_both_errors_make_it():
+    terms = found(("sigma", 0.1), ("sigma.sigma", 0.33))
+    # α = k/(1 + c), of 100,000 draws by NumPy: errors that go together, and errors that go apart
+    for correlation in (0.9, -0.9):
+        covariance = 0.005**2 * np.array([[1.0, correlation], [correlation, 1.0]])
+        others = other_constants(terms, declared())
+        (_, square) = with_other_coefficients(sparse(terms, covariance), others)[
+            "tensor_sindy"
+        ].terms
+        drawn = np.random.default_rng(0).multivariate_normal(
+            [0.1, 0.33], covariance * (0.01 / 1.96 / 0.005) ** 2, 100_000
+        )
+        ends = np.quantile(drawn[:, 1] / (1.0 + drawn[:, 0]), [0.025, 0.975])
+        assert square.ci95[0] == pytest.approx(ends[0], abs=2e-4)  # of the draws, and second order
+        assert square.ci95[1] == terms[1].ci95[1]
+
+
+def test_an_interval_beside_no_other_constant_stays():
+    terms = found(("sigma.sigma", 0.3), ("sigma", 0.005))
+    outcomes = sparse(terms)
+    assert with_other_coefficients(outcomes, other_constants(terms, declared())) == outcomes
+
+
+def test_a_wrong_modulus_moves_the_inner_constant_of_a_closed_form():
+    # exp(ε tr σ/G): with a modulus f times as large, ε is f times as large
+    form = RecoveredTerm(
+        "(exp(epsilon*tr(sigma))-1)*sigma", 1.0, ci95=(0.99, 1.01), inner={"epsilon": 0.4},
+        inner_ci95={"epsilon": (0.39, 0.41)}, inner_at_one={"epsilon": (0.4, 0.39, 0.41)},
+    )  # fmt: skip
+    terms = [form, *found(("gammadot", -0.1))]
+    (one, _) = with_other_coefficients(sparse(terms), other_constants(terms, declared()))[
+        "tensor_sindy"
+    ].terms
+    assert one.inner_ci95["epsilon"][0] == pytest.approx(0.39)
+    assert one.inner_ci95["epsilon"][1] > 1.1 * 0.41
+    assert one.inner_at_one["epsilon"][2] == one.inner_ci95["epsilon"][1]
+    # its coefficient is of the first order in the stress
+    assert one.ci95 == pytest.approx((0.99, 1.01))

@@ -9,6 +9,7 @@ from discover.closed_loop.judging.finer_steps import change_on_finer_steps
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
+from discover.statistics.converter_steps import step_of_converter
 from discover.statistics.residual import judging
 
 COMPUTED = 1e-6
@@ -92,7 +93,7 @@ def rounding(values: Float[np.ndarray, " n"]) -> float:
     values
         In any unit. Of fewer than five that differ nothing is said.
     """
-    step = _step_of_converter(values)
+    step = step_of_converter(values)
     values = np.abs(values[values != 0.0])
     if len(np.unique(values)) < _FEWEST_VALUES:
         return 0.0
@@ -105,12 +106,3 @@ def rounding(values: Float[np.ndarray, " n"]) -> float:
                 found.append(float(np.sqrt(np.mean((0.5 * unit) ** 2))))
                 break
     return max(found)
-
-
-def _step_of_converter(values: Float[np.ndarray, " n"]) -> float:
-    """Return the step of which all numbers are multiples, of which most occur again; 0 if none."""
-    levels = np.unique(values)
-    if not _FEWEST_VALUES <= len(levels) <= len(values) // 2:
-        return 0.0
-    gaps = np.diff(levels) / np.min(np.diff(levels))
-    return float(np.min(np.diff(levels))) if np.allclose(gaps, np.round(gaps), atol=1e-3) else 0.0

@@ -10,6 +10,8 @@ from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation
 from discover.statistics.whiteness import SIGNIFICANCE
 from discover.words import percent_of
 
+_MISSING = "Some effect is still missing"
+
 
 @dataclass(frozen=True)
 class Grounds:
@@ -64,9 +66,15 @@ class _Sentences:
     def all(self) -> str:
         """Return the reasons, with what was not counted."""
         grounds, text = self._grounds, self._main()
-        outliers = grounds.fitted.left.outliers
-        if outliers:
-            text += f" Besides those left out before the fit, {outliers} samples are outliers."
+        left = grounds.fitted.left
+        if left.likeness and grounds.structured and not grounds.fitted.explained:
+            text = text.removesuffix(f" {_MISSING}.")
+            text += (
+                f" {_MISSING}, or a fault of the instrument that no effect describes: "
+                f"{left.likeness}."
+            )
+        if left.outliers:
+            text += f" Besides those left out before the fit, {left.outliers} samples are outliers."
         if grounds.short:
             text += f" Runs of fewer samples do not judge: {', '.join(grounds.short)}."
         return text

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -10,6 +11,7 @@ from discover.closed_loop.judging.numerical_resolution import NumericalResolutio
 from discover.forward import even
 from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES
+from discover.protocols.sampling import sampling_interval
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, fast_part, tells_noise
 from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
@@ -50,6 +52,11 @@ class ToleratedMisfit:
         error = self.resolution.mean(fit.run_errors)
         return error <= STRUCTURE * self.resolution.limit(fit.theta, active, error)
 
+    @cached_property
+    def _intervals(self) -> list[float]:
+        runs = self.resolution.runs
+        return [sampling_interval(run.time, run.protocol, run.quantity) for run in runs]
+
     @property
     def noise_known(self) -> bool:
         """Whether noise can be told from structure: it was given, or some run is long enough."""
@@ -63,7 +70,7 @@ class ToleratedMisfit:
             rows.append(row[w > 0] / seen / even(seen))
             records.append(record[w > 0] / even(seen))
         return self._of_separate_samples(
-            what_is_left(rows, records, self.expectation), rows, records
+            what_is_left(rows, records, self.expectation, self._intervals), rows, records
         )
 
     def _of_separate_samples(self, left: LackOfFit, rows, records) -> LackOfFit:

@@ -20,9 +20,10 @@ from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.invariants import INVARIANT_NAMES
 from tensor_library.terms import parse_term
 
-_TIME, _MODULUS = "sigma", "gammadot"
+TIME_TERM, MODULUS_TERM = "sigma", "gammadot"
+"""Terms that amount to another relaxation time and to another modulus."""
 
-LINEAR_TERMS = (_TIME, _MODULUS)
+LINEAR_TERMS = (TIME_TERM, MODULUS_TERM)
 """Terms that change the moduli at vanishing strain."""
 
 
@@ -51,13 +52,13 @@ class OtherConstant:
     @property
     def name(self) -> str:
         """The constant as a study spells it."""
-        return "relaxation_time_s" if self.term == _TIME else "modulus_Pa"
+        return "relaxation_time_s" if self.term == TIME_TERM else "modulus_Pa"
 
     @property
     def text(self) -> str:
         """What the term is the same as, as part of a sentence."""
-        noun, unit = ("relaxation time", "s") if self.term == _TIME else ("modulus", "Pa")
-        plural = "relaxation times" if self.term == _TIME else "moduli"
+        noun, unit = ("relaxation time", "s") if self.term == TIME_TERM else ("modulus", "Pa")
+        plural = "relaxation times" if self.term == TIME_TERM else "moduli"
         size = self.declared or 1.0
         span = ""
         if self.ci95 is not None:
@@ -67,7 +68,7 @@ class OtherConstant:
             same = f"{plural} that are all {value} times the declared ones{span}"
         else:
             same = f"a {noun} of {value} {unit}{span} in place of {self.declared:.4g} {unit}"
-        if self.term == _MODULUS:
+        if self.term == MODULUS_TERM:
             same += f", or as a transducer that shows {self.factor:.4g} times the stress"
         elif self.slip is not None:
             slip = f"{self.slip:.4g} 1/(Pa s)"
@@ -87,7 +88,7 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
         if term.term not in LINEAR_TERMS or term.ci95 is None:
             continue
         values = (term.coefficient, *term.ci95)
-        if term.term == _TIME:
+        if term.term == TIME_TERM:
             totals = [float(model.law.linear_relaxation) + value for value in values]
             declared = model.relaxation_time
         else:
@@ -95,14 +96,14 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
             declared = model.modulus
         if totals[0] <= 0.0:
             continue
-        factor = 1.0 / totals[0] if term.term == _TIME else totals[0]
+        factor = 1.0 / totals[0] if term.term == TIME_TERM else totals[0]
         limits = None
         if min(totals) > 0.0:
-            low, high = sorted(1.0 / t if term.term == _TIME else t for t in totals[1:])
+            low, high = sorted(1.0 / t if term.term == TIME_TERM else t for t in totals[1:])
             limits = low, high
         if abs(factor - 1.0) > SEPARATED:
             alone = float(declared[0]) if len(declared) == 1 else None
-            slip = _slip(term, model) if term.term == _TIME and alone is not None else None
+            slip = _slip(term, model) if term.term == TIME_TERM and alone is not None else None
             found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits, slip))
     return found
 
@@ -118,28 +119,41 @@ def _slip(term: RecoveredTerm, model: DeclaredModel) -> float | None:
 
 
 def beside(terms: Iterable[RecoveredTerm], others: Sequence[OtherConstant]) -> dict[str, float]:
-    """Return the coefficients of the other terms with the other constants in place.
-
-    A term of m stresses and n rates has f_G^(m − 1) f_λ^(1 − n) times its coefficient.
-    """
+    """Return the coefficients of the other terms with the other constants in place."""
     factors = {other.term: other.factor for other in others}
-    stress, time = factors.get(_MODULUS, 1.0), factors.get(_TIME, 1.0)
     left = {}
     for term in terms:
         if term.term in factors:
             continue
-        parsed = parse_term(term.term)
-        # every product in a sum has the same degree
-        names = [TENSOR_NAMES[parsed.tensor].split("+")[0]]
-        names += [n for n, p in zip(INVARIANT_NAMES, parsed.powers, strict=True) for _ in range(p)]
-        m, n = (sum(name.count(symbol) for name in names) for symbol in (_TIME, _MODULUS))
-        left[term.term] = term.coefficient * stress ** (m - 1) * time ** (1 - n)
+        of_stress, of_time = powers_of_factors(term.term)
+        stress = factors.get(MODULUS_TERM, 1.0) ** of_stress
+        left[term.term] = term.coefficient * stress * factors.get(TIME_TERM, 1.0) ** of_time
     return left
+
+
+def powers_of_factors(term: str) -> tuple[int, int]:
+    """Return the powers of the factors on modulus and time that a coefficient is multiplied by.
+
+    A term of m stresses and n rates has f_G^(m − 1) f_λ^(1 − n) times its coefficient.
+
+    Parameters
+    ----------
+    term
+        Its spelling.
+    """
+    parsed = parse_term(term)
+    # every product in a sum has the same degree
+    names = [TENSOR_NAMES[parsed.tensor].split("+")[0]]
+    names += [n for n, p in zip(INVARIANT_NAMES, parsed.powers, strict=True) for _ in range(p)]
+    stresses, rates = (
+        sum(name.count(symbol) for name in names) for symbol in (TIME_TERM, MODULUS_TERM)
+    )
+    return stresses - 1, 1 - rates
 
 
 def other_gain(others: Iterable[OtherConstant]) -> float | None:
     """Return the gain of the transducer that linear terms may stand for; None if there is none."""
-    return next((other.factor for other in others if other.term == _MODULUS), None)
+    return next((other.factor for other in others if other.term == MODULUS_TERM), None)
 
 
 def with_other_gain(

@@ -13,6 +13,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import Repeats
 from discover.learners.registry import BANDS_ONLY
 from discover.protocols.kinematics import FOLLOWED
+from discover.protocols.sampling import sampling_interval
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
 
@@ -94,6 +95,7 @@ class Explanation:
                     "verdict": one.verdict,
                     "outliers": one.outliers,
                     "reason": one.reason,
+                    "likeness": one.likeness,
                 }
                 for name, one in self.lack_of_fit.items()
             },
@@ -142,7 +144,7 @@ def what_it_leaves(
     normal_stresses_used: bool,
 ) -> LackOfFit:
     """Return what one learner's law leaves of the training runs; parameters as in `explain`."""
-    residuals, records, rates, even = [], [], [], []
+    residuals, records, rates, even, intervals = [], [], [], [], []
     for flow in training:
         prediction = outcome.predictions[flow.key]
         for quantity in QUANTITIES if normal_stresses_used else QUANTITIES[:1]:
@@ -158,9 +160,10 @@ def what_it_leaves(
             records.append(record)
             even.append(flow.even(record))
             rates.append(np.asarray(flow.rate, dtype=float))
+            intervals.append(sampling_interval(flow.times, flow.protocol, quantity))
     # moduli that are constant are those of a linear fluid, and of no dead sensor
     imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
-    found = lack_of_fit(residuals, records, expectation, imposed, even)
+    found = lack_of_fit(residuals, records, expectation, imposed, even, intervals)
     limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
     if found.verdict == "unexplained" and found.misfit <= limit:
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"

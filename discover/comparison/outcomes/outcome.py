@@ -132,7 +132,7 @@ class LearnerOutcome(TermTables):
             RecoveredTerm(
                 **{
                     **t,
-                    **{n: t.get(n) and tuple(t[n]) for n in ("ci95", "ci95_given_equal_modes")},
+                    **{n: t.get(n) and tuple(t[n]) for n in _INTERVALS},
                     "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
                     "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
                 }
@@ -168,6 +168,7 @@ class LearnerOutcome(TermTables):
 
 
 _STRAIN_STEP = 0.2
+_INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
 
 
 def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:

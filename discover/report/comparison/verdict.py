@@ -191,7 +191,7 @@ def _left(one: LackOfFit) -> str:
     elif one.misfit <= STRUCTURE * one.noise:
         # else it would seem that nothing is missing
         text += f", but {one.reason}"
-    return text
+    return f"{text}; {one.likeness}" if one.likeness else text
 
 
 _MOST_TERMS = 4

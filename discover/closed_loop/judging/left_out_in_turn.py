@@ -1,0 +1,168 @@
+"""Where no run is held out, each run in turn judges what the others say of the constants.
+
+A few effects together may follow a few runs by chance, down to what passes for noise, with
+constants that each run would have otherwise. With a run left out, the others then predict it by
+far worse than all together describe it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from discover.closed_loop.judging.judgement import Judgement
+from discover.dataset import Run
+from discover.dataset.repeats import repeats_among
+from discover.forward import Batch, even
+from discover.forward.least_squares import Fit, fit_batch, jacobians, sequences_of
+from discover.inference.problem import FitProblem
+from discover.protocols.kinematics import STATES
+from discover.statistics import least_squares_covariance, root_of
+from discover.statistics.residual import FEWEST_FAST, STRUCTURE
+from discover.statistics.unseen import CARRIED, Unseen
+from discover.words import percent_of
+
+_EXCUSED = 1e-3
+"""Probability of constants that would have to move so far, above which they excuse a miss. How
+uncertain they are is known to first order only."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A run, or one test that was repeated, and what the other runs make of it.
+
+    Attributes
+    ----------
+    name
+        Of the run, or of the first.
+    error
+        Relative error of its prediction, the constants fitted to the others alone.
+    agreement
+        Of constants that would have to move so far to describe it too, how probable they are.
+    """
+
+    name: str
+    error: float
+    agreement: float
+
+    def is_missed(self, limit: float) -> bool:
+        """Return whether it is missed by more than a limit, and by no uncertain constants."""
+        return self.error > limit and self.agreement <= _EXCUSED
+
+
+def judged_in_turn(
+    judgement: Judgement, problem: FitProblem, fit: Fit, effects: Sequence[str], runs: Sequence[Run]
+) -> Judgement:
+    """Return a judgement that runs left out in turn do not refute; of runs held out, as it is.
+
+    What was found is refuted if more than half of them are missed by clearly more than all together
+    leave, and by more than the constants are uncertain: of a right law one run may be the only one
+    that tells a constant.
+
+    Parameters
+    ----------
+    judgement
+        Of the final model.
+    problem, fit, effects, runs
+        What was fitted to what, the final fit, the effects found, and the fitted runs.
+    """
+    if judgement.structured or judgement.verdict != "effects_added" or judgement.unseen:
+        return judgement
+    limit = STRUCTURE * max(judgement.left.misfit, judgement.left.expected, judgement.resolution)
+    left_out = leave_out_in_turn(problem, fit, runs)
+    missed = [one for one in left_out if one.is_missed(limit)]
+    if len(left_out) < 2 or 2 * len(missed) <= len(left_out):
+        return judgement
+    worst = max(missed, key=lambda one: one.error)
+    error = float(np.mean([one.error for one in missed]))
+    text = (
+        f"{judgement.description} But with a run left out of the fit the others do not predict it: "
+        f"of {len(left_out)} runs {len(missed)} are then missed by more than {percent_of(limit)}, "
+        f"{worst.name} by {percent_of(worst.error)}, which no uncertain constant explains. What "
+        f"was found ({', '.join(effects)}) describes these runs and is no finding."
+    )
+    return replace(
+        judgement,
+        verdict="unexplained",
+        structured=True,
+        carries_over=False,
+        left=judgement.left.refuted(judgement.left.reason),
+        description=text,
+        missed=max(STRUCTURE * error / limit, CARRIED),
+        unseen=len(missed),
+    )
+
+
+def leave_out_in_turn(problem: FitProblem, fit: Fit, runs: Sequence[Run]) -> list[LeftOut]:
+    """Return what the other runs make of each; repeats of one test are left out together.
+
+    Tables of states are not left out, for their points are many flows; nor are runs too short to
+    judge. Parameters as in `judged_in_turn`.
+    """
+    groups = _groups(runs)
+    if len(groups) < 2:
+        return []
+    found = []
+    for rows in groups:
+        weight = problem.weight.copy()
+        weight[rows] = 0.0
+        rest = eqx.tree_at(lambda b: b.weight, problem.batch, jnp.asarray(weight))
+        (other,) = fit_batch(problem.model, rest, [fit.theta], [fit.free], prior=problem.prior)
+        error, agreement = np.inf, 0.0
+        if other.usable:
+            error, agreement = _of_rows(problem, other, rest, rows)
+        # a residual is as much larger as its run weighs more
+        error /= float(np.mean([runs[row].weight for row in rows]))
+        found.append(LeftOut(runs[rows[0]].name, error, agreement))
+    return found
+
+
+def _groups(runs: Sequence[Run]) -> list[list[int]]:
+    """Return the rows of the runs that are left out together."""
+    repeats = repeats_among(list(runs))
+    first = {}
+    for group in () if repeats is None else repeats.groups:
+        first |= dict.fromkeys(group, group[0])
+    groups: dict[str, list[int]] = {}
+    for i, run in enumerate(runs):
+        if len(run) >= FEWEST_FAST and run.protocol.control not in STATES:
+            groups.setdefault(first.get(run.name, run.name), []).append(i)
+    return list(groups.values())
+
+
+def _of_rows(
+    problem: FitProblem, other: Fit, rest: Batch, rows: Sequence[int]
+) -> tuple[float, float]:
+    """Return the error of runs by a fit to the others, and how well its constants suit them."""
+    model, batch = problem.model, problem.batch
+    residual = model.residuals([other.theta], batch)
+    if not np.all(np.isfinite(residual[0, rows])):
+        return np.inf, 0.0
+    error = float(np.mean(np.sqrt(np.sum(residual[0, rows] ** 2, axis=1))))
+    derivative = jacobians(model, batch, [other.theta], residual, [other.free])[0]
+    root, correlation = _root(rest, other)
+    columns = np.tensordot(root, derivative, axes=(0, 0))
+    parts = []
+    for i in rows:
+        weight = problem.weight[i]
+        seen = weight > 0
+        size = weight[seen] * even(weight[seen])
+        record = np.asarray(batch.recorded)[i, seen] / even(weight[seen])
+        parts.append((residual[0, i, seen] / size, record, columns[:, i, seen] / size))
+    residuals, records, moved = zip(*parts, strict=True)
+    return error, Unseen(residuals, records, moved, correlation).moved()[1]
+
+
+def _root(rest: Batch, other: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Return a root of the covariance of constants fitted to some runs, and the correlation."""
+    told = [(rows, size) for rows, size in zip(*sequences_of(rest), strict=True) if len(rows)]
+    sequences, sizes = zip(*told, strict=True)
+    design = other.jacobian.reshape(len(other.free), -1).T
+    covariance, _, noise = least_squares_covariance(
+        design, other.residual.ravel(), sequences, sizes=sizes
+    )
+    if not np.all(np.isfinite(covariance)):
+        return np.zeros_like(covariance), noise.correlation
+    return root_of(covariance), noise.correlation

@@ -1,0 +1,58 @@
+"""What a residual with a pattern may be of the instrument's, where no effect with a name is it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.statistics.converter_steps import step_of_converter
+from discover.statistics.wandering import wandering
+from discover.words import percent_of
+
+_WITHIN = 0.8
+"""Share of what is left within half a step from which on the steps may be what is left."""
+
+_HARDLY_MORE = 1.05  # half steps
+
+
+def likeness(
+    residuals: Sequence[Float[np.ndarray, " _"]], measured: Sequence[Float[np.ndarray, " _"]]
+) -> str:
+    """Return what a residual looks like, as a clause; empty where it looks like neither.
+
+    That is no finding: a law that errs by less than a step, or at random, looks the same.
+
+    Parameters
+    ----------
+    residuals, measured
+        Prediction minus measurement of each run, and the measurement, in one unit.
+    """
+    steps = [step_of_converter(np.asarray(record)) for record in measured]
+    if steps and all(steps):
+        return _of_steps(residuals, measured, steps)
+    sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
+    far = wandering([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
+    if far is None:
+        return ""
+    return (
+        "what is left wanders as a zero does that drifts at random, by some "
+        f"{percent_of(far)} of the stress over a run, and not as smoothly as what a law lacks: "
+        "read the zero before and after each run, or repeat one, in which a missing effect comes "
+        "back and a wandering zero does not"
+    )
+
+
+def _of_steps(residuals, measured, steps: Sequence[float]) -> str:
+    """Return what the steps of a converter have to do with it."""
+    every = zip(residuals, steps, strict=True)
+    off = np.concatenate([2.0 * np.abs(np.asarray(row)) / step for row, step in every])
+    within = float(np.mean(off <= _HARDLY_MORE))
+    if within < _WITHIN:
+        return ""
+    largest = [float(np.max(np.abs(record))) or 1.0 for record in measured]
+    size = float(np.mean([step / most for step, most in zip(steps, largest, strict=True)]))
+    return (
+        f"the records come in steps of {percent_of(size)} of their largest value, and "
+        f"{percent_of(within)} of what is left stands within half of one: it may be nothing but "
+        "the steps, which hide as much of a law as well; a finer range of the transducer would tell"
+    )

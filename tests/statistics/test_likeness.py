@@ -1,0 +1,130 @@
+"""What a residual may be of the instrument's: zeros that wander, and steps of a converter."""
+
+import numpy as np
+import pytest
+from independent import Giesekus, WhiteMetzner, oscillation, start_up
+from scipy.signal import lfilter
+
+from discover.closed_loop.judging.fitted_runs import FittedRuns
+from discover.closed_loop.judging.reasons import Grounds, reasons
+from discover.closed_loop.judging.unseen_runs import UnseenRuns
+from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics.likeness import likeness
+from discover.statistics.residual import Expectation
+from discover.statistics.wandering import wandering
+
+LENGTHS = (80, 80, 120)
+DRAWS = 40
+FLOWS = (
+    (start_up(0.5), np.linspace(0.1, 8.0, 80)),
+    (start_up(2.0), np.linspace(0.1, 8.0, 80)),
+    (oscillation(2.0, 1.0), np.linspace(0.1, 12.0, 120)),
+)
+SCALE = {"modulus": 100.0, "relaxation_time": 1.0}
+
+
+def walk(n, lot):
+    return 0.04 * np.cumsum(lot.standard_normal(n)) / np.sqrt(n) + 0.003 * lot.standard_normal(n)
+
+
+def smooth(n, lot, size=3.0):
+    swings = np.cos(np.pi * np.outer(np.arange(1, 5), np.linspace(0.0, 1.0, n)))
+    row = lot.standard_normal(4) @ swings
+    return 0.01 * (size * row / np.sqrt(np.mean(row**2)) + lot.standard_normal(n))
+
+
+def start(n, lot):
+    time = np.linspace(0.0, 1.0, n)
+    return 0.01 * (10.0 * lot.choice([-1.0, 1.0]) * np.exp(-time / 0.1) + lot.standard_normal(n))
+
+
+def wave(n, lot):
+    time = np.linspace(0.0, 12.0, n)
+    return 0.01 * (10.0 * np.sin(3.0 * time + lot.uniform(0.0, 6.0)) + lot.standard_normal(n))
+
+
+def white(n, lot):
+    return 0.01 * lot.standard_normal(n)
+
+
+def correlated(n, lot):
+    return 0.01 * lfilter([1.0], [1.0, -0.5], lot.standard_normal(n))
+
+
+def found(make):
+    lots = (np.random.default_rng(seed) for seed in range(DRAWS))
+    told = [wandering([make(n, lot) for n in LENGTHS]) for lot in lots]
+    return [far for far in told if far is not None]
+
+
+def test_a_zero_that_wanders_is_told_with_its_size():
+    told = found(walk)
+    assert len(told) > DRAWS / 2
+    # at its end a walk is 0.04 off, root-mean-square over draws
+    assert np.median(told) == pytest.approx(0.04, rel=0.3)
+
+
+@pytest.mark.parametrize("make", [smooth, start, wave, white, correlated])
+def test_what_a_law_lacks_does_not_wander(make):
+    assert not found(make)
+
+
+def test_runs_of_a_few_samples_say_nothing_of_a_walk():
+    lot = np.random.default_rng(0)
+    assert wandering([np.cumsum(lot.standard_normal(30)) for _ in range(4)]) is None
+
+
+def residual_in_steps(told, share=0.04):
+    """Return what a Giesekus law leaves of records of a fluid that are read in steps."""
+    law = Giesekus(0.3, **SCALE)
+    rows, records = [], []
+    for flow, times in FLOWS:
+        stress = told.respond(flow, times).sigma12
+        step = share * np.max(np.abs(stress))
+        records.append(step * np.round(stress / step))
+        rows.append(law.respond(flow, times).sigma12 - records[-1])
+    return rows, records
+
+
+def test_steps_of_a_converter_are_told_where_they_may_be_all_that_is_left():
+    text = likeness(*residual_in_steps(Giesekus(0.3, **SCALE)))
+    assert "steps of 4 % of their largest value" in text
+    assert "100 % of what is left stands within half of one" in text
+    assert "hide as much of a law" in text
+
+
+def test_steps_are_not_told_where_more_is_left_or_where_there_are_none():
+    assert likeness(*residual_in_steps(WhiteMetzner(0.5, **SCALE))) == ""
+    rows, records = residual_in_steps(Giesekus(0.3, **SCALE), share=1e-9)
+    lot = np.random.default_rng(0)
+    assert likeness(rows, [row + lot.standard_normal(len(row)) for row in records]) == ""
+
+
+def test_only_what_is_not_explained_is_said_to_look_like_something():
+    rows, records = residual_in_steps(Giesekus(0.3, **SCALE))
+    left = lack_of_fit(rows, records)
+    assert left.verdict == "unexplained"
+    assert "steps" in left.likeness
+    lot = np.random.default_rng(0)
+    noise = [lot.standard_normal(len(row)) for row in records]
+    left = lack_of_fit(noise, records)
+    assert left.verdict == "explained"
+    assert left.likeness == ""
+
+
+def reasons_of(likeness, structured=True, outliers=0):
+    left = LackOfFit(
+        "unexplained" if structured else "explained", 0.025, 0.004, 0.9, 1e-6, outliers,
+        expected=0.004, likeness=likeness,
+    )  # fmt: skip
+    fitted = FittedRuns(left, not structured, not structured, 0.0, True, True)
+    unseen = UnseenRuns(0.0, 0.0, True, False)
+    return reasons(Grounds(fitted, unseen, Expectation(), structured, False, None, (), (), "a.csv"))
+
+
+def test_a_loop_says_what_is_left_may_be_beside_a_missing_effect():
+    text = reasons_of("what is left wanders", outliers=2)
+    assert "Some effect is still missing, or a fault of the instrument" in text
+    assert "what is left wanders. Besides" in text
+    assert "Some effect is still missing." in reasons_of("")
+    assert "fault of the instrument" not in reasons_of("", structured=False)
