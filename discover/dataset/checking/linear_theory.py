@@ -102,7 +102,7 @@ def against_linear_theory(
     """Yield where runs and the linear sweep, or runs among themselves, do not fit together."""
     fastest = max((np.max(np.abs(run.rate)) for run in runs), default=0.0)
     runs = [run for run in runs if run.flow == "shear" and run.from_rest]
-    start_ups = [run for run in runs if _is_start_up(run)]
+    start_ups = [run for run in runs if is_start_up(run)]
     if sweep is None or spectrum is None:
         return
     # mean relaxation time, weighted by what each mode adds to the viscosity
@@ -125,7 +125,8 @@ def against_linear_theory(
         yield from _cox_merz(run, sweep, mean_time)
 
 
-def _is_start_up(run: Run) -> bool:
+def is_start_up(run: Run) -> bool:
+    """Return whether a run is at one rate, in three samples or more."""
     rate = run.rate
     return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
