@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.linear_theory import is_start_up
 from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
 
@@ -17,6 +16,12 @@ _UNIT_FACTOR = 30.0
 _ONE_TEMPERATURE = 2.0
 """In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11), so that less than this is within
 the gain and the noise of most records."""
+
+
+def is_start_up(run: Run) -> bool:
+    """Return whether a run is at one rate, in three samples or more."""
+    rate = run.rate
+    return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
 def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:

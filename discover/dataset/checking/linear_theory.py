@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
 from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.checking.sweep_inertia import sweep_inertia
@@ -123,12 +124,6 @@ def against_linear_theory(
         yield from _duration(run, mean_time)
         yield from _small_strain(run, *linear[run.name])
         yield from _cox_merz(run, sweep, mean_time)
-
-
-def is_start_up(run: Run) -> bool:
-    """Return whether a run is at one rate, in three samples or more."""
-    rate = run.rate
-    return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
 def _duration(run: Run, mean_time: float) -> Iterator[Finding]:

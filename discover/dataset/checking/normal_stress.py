@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.linear_theory import is_start_up
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
