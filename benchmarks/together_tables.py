@@ -1,8 +1,8 @@
 """Answers on several tests together, as lines of a log and as tables of a page."""
 
-import json
 from pathlib import Path
 
+from answer_tables import TASKS, answers, names_of, table, with_falsehoods, with_interval
 from together_records import FLUIDS, TOGETHER
 
 _ARITHMETIC = 1e-6
@@ -10,47 +10,32 @@ _ARITHMETIC = 1e-6
 
 def line(row: dict) -> str:
     """Return a row of the log."""
-    named = "; ".join(
-        names[0] + (f" (or {len(names) - 1} more)" if len(names) > 1 else "")
-        for names in row["named"]
-    )
     text = (
         f"{row['together']} {row['fluid']:10s} {row['task']:10s} {row['verdict']:17s} "
-        f"{named or '-'} [{_constants(row)}] {_missed(row)} {row['seconds']:.0f} s"
+        f"{names_of(row) or '-'} [{_constants(row)}] {_missed(row)} {row['seconds']:.0f} s"
     )
     if row.get("undetermined"):
         text += f" open: {', '.join(row['undetermined'])}"
-    return "\n".join([text, *(f"    FALSE: {text}" for text in row["false"])])
+    return with_falsehoods(text, row)
 
 
 def tables(out: Path) -> str:
     """Return a table for each command, of the answers that are there."""
     parts = []
-    for task in ("compare", "close-loop"):
-        rows = {}
-        for kept in out.glob(f"*_{task}.json"):
-            row = json.loads(kept.read_text())
-            rows[row["together"], row["fluid"]] = row
-        lines = [f"| fluid | {' | '.join(TOGETHER)} |", "|---" * (1 + len(TOGETHER)) + "|"]
-        lines += [
-            f"| {fluid} | {' | '.join(_cell(rows.get((one, fluid))) for one in TOGETHER)} |"
-            for fluid in FLUIDS
-            if any((one, fluid) in rows for one in TOGETHER)
-        ]
+    for task in TASKS:
+        rows = answers(out, task, "together", "fluid")
         seconds = sorted(row["seconds"] for row in rows.values())
         false = sum(bool(row["false"]) for row in rows.values())
         took = f"{seconds[0]:.0f} to {seconds[-1]:.0f} s of processor" if seconds else ""
         parts.append(
             f"{task}: {len(rows)} answers, {false} with something false; {took}\n\n"
-            + "\n".join(lines)
+            + table(rows, "fluid", TOGETHER, FLUIDS, _cell)
         )
     return "\n\n".join(parts)
 
 
-def _cell(row: dict | None) -> str:
+def _cell(row: dict) -> str:
     """Return one answer as it stands in a table of a page."""
-    if row is None:
-        return ""
     if row["verdict"] == "fault":
         return "*fault*"
     said = []
@@ -74,9 +59,7 @@ def _cell(row: dict | None) -> str:
 
 
 def _constants(row: dict) -> str:
-    return ", ".join(
-        f"{value:.3g} ({low:.3g} to {high:.3g})" for _, _, value, low, high in row["constants"]
-    )
+    return ", ".join(with_interval(*found) for _, _, *found in row["constants"])
 
 
 def _missed(row: dict) -> str:

@@ -1,5 +1,6 @@
 """Results as JSON has them: lists, names and numbers, None for a number that is not finite."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import isfinite
@@ -23,3 +24,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not isfinite(value):
         return None
     return value if isinstance(value, str | int | float | bool | None) else str(value)
+
+
+def json_text(content: Any) -> str:
+    """Return the text of a file of results."""
+    return json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

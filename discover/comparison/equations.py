@@ -39,7 +39,7 @@ def outcome_equation(
     """Return the known part with what a learner found."""
     who = learner_title(outcome.learner)
     who = f"the {who}" if outcome.learner == "tbnn_ude" else who
-    found = tuple(EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in outcome.terms)
+    found = EquationTerm.of(outcome.terms)
     time = known.mean_relaxation_time
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
     learned_in = box_of(_numbers(flow, time) for flow in flows if flow.kind == "training")

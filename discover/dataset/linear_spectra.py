@@ -1,5 +1,7 @@
 """A spectrum of relaxation modes from any linear test, and what it says of the others."""
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
@@ -8,7 +10,6 @@ from scipy.special import exprel
 from discover.dataset.linear_tests import RELAXATION, SWEEP, LinearTest
 from discover.dataset.linear_viscoelasticity import (
     FLOOR,
-    MARGINS,
     MOST_MODES,
     RelaxationSpectrum,
     fewest_modes,
@@ -27,10 +28,7 @@ def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
     if test.kind == SWEEP:
         return relaxation_spectrum(test.sweep)
     fit = _from_relaxation if test.kind == RELAXATION else _from_creep
-    most = min(MOST_MODES, len(test) // 2)
-    return fewest_modes(
-        [fit(test, n, margin) for n in range(1, most + 1) for margin in MARGINS[: 2 * n]]
-    )
+    return fewest_modes(partial(fit, test), min(MOST_MODES, len(test) // 2))
 
 
 def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.ndarray:

@@ -1,7 +1,8 @@
 """A linear frequency sweep, and a spectrum of relaxation modes from it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -176,26 +177,28 @@ def relaxation_spectrum(
         )
     # more unknowns than data would fit the noise
     most_modes = min(most_modes, len(sweep.angular_frequency))
-    trials = [
-        _fit(sweep, n, margin) for n in range(1, most_modes + 1) for margin in MARGINS[: 2 * n]
-    ]
-    found = fewest_modes(trials, tolerance)
+    found = fewest_modes(partial(_fit, sweep), most_modes, tolerance)
     return replace(found, modulus_covariance=_covariance(sweep, found))
 
 
 def fewest_modes(
-    trials: Sequence[tuple[np.ndarray, np.ndarray, float]],
+    fit: Callable[[int, float], tuple[np.ndarray, np.ndarray, float]],
+    most: int,
     tolerance: float = TOLERANCE,
 ) -> RelaxationSpectrum:
     """Return the spectrum with the fewest modes of those that fit nearly as well as any.
 
     Parameters
     ----------
-    trials
-        Moduli in Pa, relaxation times in s and relative error of each.
+    fit
+        Moduli in Pa, relaxation times in s and relative error, of a number of modes and of how far
+        their times go beyond the data, in decades.
+    most
+        Largest number of modes.
     tolerance
         How much worse than the best a spectrum may be, as a factor of 1 or more.
     """
+    trials = [fit(n, margin) for n in range(1, most + 1) for margin in MARGINS[: 2 * n]]
     best = min(error for _, _, error in trials)
     errors: dict[int, float] = {}
     for modulus, _, error in trials:

@@ -1,5 +1,6 @@
 """TOML files that users write by hand: studies and mappings."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -67,3 +68,8 @@ def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]
         raise InputError(f"{path} is nested too deeply to be a {kind}. {example}") from None
     except ValueError as error:  # TOML's own error, or a number of thousands of digits
         raise InputError(f"{path} is not valid TOML: {error}. Mend that line.") from None
+
+
+def toml_string(text: str) -> str:
+    """Return a text as TOML has it, which escapes as JSON does, and DEL besides."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

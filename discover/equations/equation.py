@@ -230,7 +230,9 @@ class Equation(NotebookView):
         yield from self.notes
 
 
-def mean_relaxation_time(modulus: Sequence[float], relaxation_time: Sequence[float]) -> float:
+def mean_relaxation_time(
+    modulus: Sequence[float] | np.ndarray, relaxation_time: Sequence[float] | np.ndarray
+) -> float:
     """Return λ̄ = Σ G λ² / Σ G λ in s: each mode weighs as its share of the viscosity."""
     g, time = np.asarray(modulus), np.asarray(relaxation_time)
     return float(np.sum(g * time**2) / np.sum(g * time))

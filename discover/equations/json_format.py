@@ -122,7 +122,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
     tested, named = law.tested, law.named
     try:
         return Equation(
-            terms=tuple(EquationTerm(t.term, t.coefficient, t.inner, t.ci95) for t in law.terms),
+            terms=EquationTerm.of(law.terms),
             modulus=tuple(mode.modulus_Pa for mode in law.modes),
             relaxation_time=tuple(mode.relaxation_time_s for mode in law.modes),
             linear_relaxation=law.linear_relaxation,

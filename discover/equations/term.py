@@ -1,8 +1,8 @@
 """One term of a law as it leaves this package."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from tensor_library.terms import parse_term
 
@@ -55,6 +55,11 @@ class EquationTerm:
     coefficient: float
     inner: Mapping[str, float] = field(default_factory=dict)
     ci95: Interval | None = None
+
+    @classmethod
+    def of(cls, terms: Iterable[Any]) -> tuple["EquationTerm", ...]:
+        """Return terms that have all that these have, such as a learner's, as these."""
+        return tuple(cls(t.term, t.coefficient, t.inner, t.ci95) for t in terms)
 
     def __post_init__(self):
         # what nobody could write out again is refused here

@@ -1,6 +1,5 @@
 """One equation in any of the forms in which it can leave."""
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -12,18 +11,13 @@ from discover.equations.latex_file import equation_latex
 from discover.equations.rheotool import rheotool_text
 from discover.equations.ufl import ufl_code
 from discover.errors import InputError
-
-
-def _json_text(equation: Equation) -> str:
-    content = equation_to_json(equation)
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
+from discover.plain_json import json_text
 
 FORMATS: Mapping[str, Callable[[Equation], str]] = {
     "python": numpy_code,
     "sympy": sympy_code,
     "latex": equation_latex,
-    "json": _json_text,
+    "json": lambda equation: json_text(equation_to_json(equation)),
     "rheotool": rheotool_text,
     "ufl": ufl_code,
 }

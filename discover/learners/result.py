@@ -63,9 +63,7 @@ class LearnerResult(HasEquation, TermTables):
         Of a network this is its projection on the library.
         """
         base = getattr(self.law, "base", None)
-        found = tuple(
-            EquationTerm(t.term, t.coefficient, dict(t.inner), t.ci95) for t in self.terms
-        )
+        found = EquationTerm.of(self.terms)
         named, known = (None, ()) if base is None else law_parts(base)
         return Equation(
             combined(known + found) if known else found,

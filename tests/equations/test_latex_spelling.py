@@ -12,7 +12,7 @@ from sympy.parsing.latex import parse_latex
 
 from discover.comparison.comparison import Comparison
 from discover.equations import Equation, EquationTerm, NamedPart, write_equation
-from discover.report.equations import equations_tex
+from discover.report.comparison.report import equations_tex
 from tensor_library.terms import CandidateTerm, parse_term
 
 # The reader knows letters and functions of one letter; \left and \right only size a bracket.

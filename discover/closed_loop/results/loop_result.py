@@ -1,6 +1,5 @@
 """What a closed loop found, for people, pictures and other programs."""
 
-import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -43,7 +42,7 @@ from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
-from discover.plain_json import plain
+from discover.plain_json import json_text, plain
 from discover.statistics import Told
 from discover.words import percent_of
 
@@ -362,8 +361,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
 
     def write_json(self, path: str | Path) -> None:
         """Write ``loop.json``."""
-        text = json.dumps(self.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
-        Path(path).write_text(text + "\n", encoding="utf-8")
+        Path(path).write_text(json_text(self.to_json()), encoding="utf-8")
 
 
 _RANKED = ("effect", "kind", "score", "reduction", "evidence", "error", "left_out_error")

@@ -23,7 +23,7 @@ from discover.identify import (
     find_twins,
 )
 from discover.identify.exact.relations import spell
-from discover.identify.soundness.physics import mean_relaxation_time
+from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
@@ -253,7 +253,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
-    time = mean_relaxation_time(fluid)
+    time = time_scale(fluid)
     weissenberg = time * max(flow.largest_rate for flow in training)
     deborah = time * max(_frequency(flow) for flow in training)
     protocols = [flow.protocol for flow in along]

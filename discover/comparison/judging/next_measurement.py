@@ -12,6 +12,7 @@ from discover.identify.design.experiments import OBSERVED, candidate_experiments
 from discover.identify.design.next_experiment import Proposal, propose_experiments
 from discover.identify.rivals.bands import PredictionBand, prediction_bands
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
+from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.protocols import another_between_samples
@@ -178,11 +179,11 @@ def next_measurement(
     noise = options.noise or max(misfit, LEAST_NOISE)
     proposals = []
     if others:
-        moduli, times = (np.asarray(v) for v in (declared.modulus, declared.relaxation_time))
-        # the mean time that the zero-shear normal stress over the viscosity shows
-        mean_time = float(np.sum(moduli * times**2) / np.sum(moduli * times))
         experiments = candidate_experiments(
-            mean_time, options.flows, options.weissenberg_numbers, options.deborah_numbers
+            time_scale(declared),
+            options.flows,
+            options.weissenberg_numbers,
+            options.deborah_numbers,
         )
         proposals = propose_experiments(
             chosen, others, declared, experiments, noise, options.observe, seed=seed

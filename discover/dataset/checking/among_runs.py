@@ -18,6 +18,12 @@ _ONE_TEMPERATURE = 2.0
 the gain and the noise of most records."""
 
 
+def is_start_up(run: Run) -> bool:
+    """Return whether a run is at one rate, in three samples or more."""
+    rate = run.rate
+    return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
+
+
 def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
     """Yield which start-ups do not go together with the others.
 
@@ -32,7 +38,8 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
         Those that load; less than two start-ups say nothing.
     """
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
-        yield from _among_alike([r for r in runs if r.flow == kind and _is_start_up(r)])
+        alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
+        yield from _among_alike(alike)
 
 
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
@@ -80,12 +87,6 @@ def _among_alike(start_ups: Sequence[Run]) -> Iterator[Finding]:
                 f"{what} in {run.name} is at least {size} for its shear rate, beside the other "
                 "start-ups. Check the units of its stress and time (kPa for Pa, ms for s).",
             )
-
-
-def _is_start_up(run: Run) -> bool:
-    rate = run.rate
-    constant = np.ptp(rate) <= 1e-6 * np.max(np.abs(rate))
-    return bool(len(run) >= 3 and rate[0] != 0 and constant and run.from_rest)
 
 
 def _largest(run: Run) -> float:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
 from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.checking.sweep_inertia import sweep_inertia
@@ -102,7 +103,7 @@ def against_linear_theory(
     """Yield where runs and the linear sweep, or runs among themselves, do not fit together."""
     fastest = max((np.max(np.abs(run.rate)) for run in runs), default=0.0)
     runs = [run for run in runs if run.flow == "shear" and run.from_rest]
-    start_ups = [run for run in runs if _is_start_up(run)]
+    start_ups = [run for run in runs if is_start_up(run)]
     if sweep is None or spectrum is None:
         return
     # mean relaxation time, weighted by what each mode adds to the viscosity
@@ -123,11 +124,6 @@ def against_linear_theory(
         yield from _duration(run, mean_time)
         yield from _small_strain(run, *linear[run.name])
         yield from _cox_merz(run, sweep, mean_time)
-
-
-def _is_start_up(run: Run) -> bool:
-    rate = run.rate
-    return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
 def _duration(run: Run, mean_time: float) -> Iterator[Finding]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
@@ -66,7 +67,8 @@ def _reasons(
     sweep: LinearSweep | None,
     spectrum: RelaxationSpectrum | None,
 ) -> Iterator[str]:
-    if not _is_start_up(run):
+    in_shear = run.protocol.control == "rate" and run.flow == "shear" and run.from_rest
+    if not (in_shear and is_start_up(run)):
         return
     reasons = (
         _early(run, normal),
@@ -75,13 +77,6 @@ def _reasons(
         None if sweep is None else _laun(run, normal, sweep),
     )
     yield from (reason for reason in reasons if reason is not None)
-
-
-def _is_start_up(run: Run) -> bool:
-    rate = run.rate
-    if run.protocol.control != "rate" or run.flow != "shear" or not run.from_rest or len(run) < 3:
-        return False
-    return bool(rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
 def _end(run: Run, values: Float[np.ndarray, " n"]) -> float:

@@ -1,6 +1,5 @@
 """What an import needs to know: which column is what, in which unit, on which geometry."""
 
-import json
 import math
 import os
 from pathlib import Path
@@ -9,7 +8,7 @@ from urllib.parse import quote, unquote_to_bytes
 
 from pydantic import Field, model_validator
 
-from discover.dataset.toml_file import read_toml
+from discover.dataset.toml_file import read_toml, toml_string
 from discover.validation import Section, validated
 
 MAPPING_FILE = "import.toml"
@@ -233,7 +232,4 @@ def _key(name: str) -> str:
 
 
 def _toml(value: object) -> str:
-    # a JSON string is a TOML string as long as it is not escaped to ASCII
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)
+    return toml_string(value) if isinstance(value, str) else repr(value)

@@ -13,8 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from discover.equations.equation import mean_relaxation_time as mean_of_modes
-from discover.identify.soundness.physics_flows import Cycles, Trajectories, cycles, trajectories
+from discover.identify.soundness.physics_flows import (
+    Cycles,
+    Trajectories,
+    cycles,
+    time_scale,
+    trajectories,
+)
 from discover.identify.soundness.steady_states import (
     is_stable,
     is_steady,
@@ -146,12 +151,6 @@ def check_physics(
     )
 
 
-def mean_relaxation_time(fluid: Fluid) -> float:
-    """Return Σ G λ² / Σ G λ, in s: the time scale of the fluid's slow flows."""
-    modulus, time = np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time)
-    return mean_of_modes(modulus.tolist(), time.tolist())
-
-
 def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
     name = "conformation tensor positive definite"
     run, value = along.lowest(along.smallest_conformation)
@@ -210,7 +209,7 @@ def _work(beyond: Cycles) -> PhysicsCheck:
 
 def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
     name = "flow curve monotonic"
-    slowest = mean_relaxation_time(fluid)
+    slowest = time_scale(fluid)
     rates = SHEAR_RATES / slowest
     stress = np.asarray(fluid.solvent_viscosity) * rates
     steady = np.ones(rates.size, dtype=bool)

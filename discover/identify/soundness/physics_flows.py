@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from discover.equations.equation import mean_relaxation_time
 from discover.forward.fluids import at_samples
 from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
@@ -107,6 +108,11 @@ class Cycles:
     work: Float[np.ndarray, " flows"]
 
 
+def time_scale(fluid: Fluid) -> float:
+    """Return Σ G λ² / Σ G λ in s, which the zero-shear normal stress over the viscosity shows."""
+    return mean_relaxation_time(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
+
+
 def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
     """Return three cycles of every pair of numbers, simulated together.
 
@@ -115,8 +121,7 @@ def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float])
     weissenberg, deborah
         Amplitudes of the shear rate and frequencies, times the mean relaxation time.
     """
-    modulus, time = np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time)
-    scale = float(np.sum(modulus * time**2) / np.sum(modulus * time))
+    scale = time_scale(fluid)
     pairs = [(wi, de) for wi in weissenberg for de in deborah]
     flows = [oscillatory_shear(wi / scale, de / scale) for wi, de in pairs]
     times = [

@@ -1,14 +1,15 @@
 """The report on a comparison: page, figures, JSON and LaTeX."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from discover.comparison.comparison import Comparison
+from discover.equations.latex import PREAMBLE, law_latex
+from discover.learners.registry import learner_title
+from discover.plain_json import json_text
 from discover.report.comparison.pictures import comparison_pictures
 from discover.report.comparison.sections import sections
 from discover.report.comparison.verdict import comparison_verdict
-from discover.report.equations import equations_tex
 from discover.report.overlay import Overlay
 from discover.report.page import made_by, render, safe_name
 from discover.report.parts import Missing, attempt
@@ -46,8 +47,7 @@ def write_comparison(
     -------
     The page.
     """
-    content = json.dumps(comparison.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
-    content += "\n"
+    content = json_text(comparison.to_json())
     folder.write("comparison.json", content)
     predictions = write_predictions(comparison_predictions(comparison, overlays), folder)
     folder.write("equations.tex", equations_tex(comparison, linear_relaxation))
@@ -75,3 +75,18 @@ def write_comparison(
         run=run,
     )
     return folder.write("report.html", page)
+
+
+def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
+    """Return ``equations.tex``: the law that each learner found, with the known part below it."""
+    parts = [PREAMBLE]
+    for name, outcome in comparison.outcomes.items():
+        known = comparison.known_part_of(name)
+        terms = (*known.terms, *outcome.terms)
+        named, beside = known.named, ""
+        if named is not None and not named.is_written:
+            named, beside = None, f", without the h of the known law {named.law}"
+        equation = law_latex(terms, linear_relaxation, named=named)
+        head = f"% {learner_title(name)}{beside}\n"
+        parts.append(f"{head}\\begin{{equation}}\n  {equation}\n\\end{{equation}}\n")
+    return "\n".join(parts)

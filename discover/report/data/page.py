@@ -1,6 +1,5 @@
 """The page on a data folder: what each file was taken for, and a study to start from."""
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +12,7 @@ from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
+from discover.dataset.toml_file import toml_string
 from discover.errors import InputError
 from discover.report.page import render
 from discover.report.parts import attempt
@@ -87,10 +87,12 @@ def _ends(values: np.ndarray, unit: str) -> str:
 
 def first_study(dataset: Dataset, folder: str) -> str:
     """Return a study of these data that runs as it is, as TOML."""
-    lines = ["[data]", f"folder = {_quoted(folder)}"]
+    lines = ["[data]", f"folder = {toml_string(folder)}"]
     if len(dataset) >= _ENOUGH_TO_HOLD_OUT:
         fastest = max(dataset, key=lambda run: float(np.max(np.abs(run.rate))))
-        lines.append(f"held_out = [{_quoted(fastest.name)}]  # not fitted: it tests the law found")
+        lines.append(
+            f"held_out = [{toml_string(fastest.name)}]  # not fitted: it tests the law found"
+        )
     for kind in dataset.material_functions:
         role = "judge" if len(dataset) else "fit"
         lines.append(f'{kind} = "{role}"  # or "{"fit" if role == "judge" else "judge"}"')
@@ -103,8 +105,3 @@ def first_study(dataset: Dataset, folder: str) -> str:
         lines += ['modulus_Pa = "fit"', 'relaxation_time_s = "fit"']
     lines += ["", "[loop]", "max_effects = 3"]
     return "\n".join(lines) + "\n"
-
-
-def _quoted(text: str) -> str:
-    # a basic string of TOML escapes as JSON does, and DEL besides
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

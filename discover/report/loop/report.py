@@ -1,10 +1,10 @@
 """The report on a closed loop: page, figures, JSON and LaTeX."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from discover.closed_loop.results.loop_result import LoopResult
+from discover.plain_json import json_text
 from discover.protocols.kinematics import in_words
 from discover.report.loop import tables
 from discover.report.loop.verdict import loop_verdict
@@ -71,8 +71,7 @@ def write_loop(
     drawn = [p for p in pictures if p is not None]
     for one in drawn:
         folder.write(f"figures/{safe_name(one.name)}.svg", one.svg)
-    content = json.dumps(result.to_json(), indent=2, allow_nan=False, ensure_ascii=False)
-    content += "\n"
+    content = json_text(result.to_json())
     folder.write("loop.json", content)
     folder.write("equations.tex", loop_tex(result))
     predictions = write_predictions(loop_predictions(result, overlays), folder)
