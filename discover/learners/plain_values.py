@@ -10,8 +10,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from discover.equations import law_parts
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import LawOfEachMode, law_of_each_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, name_of
@@ -99,6 +101,14 @@ class PlainWriter:
                     for name in _NETWORK_FIELDS
                 },
             }  # fmt: skip
+        if isinstance(law, LawOfEachMode):
+            part, _ = law_parts(law)  # it has a name, or is refused
+            assert part is not None
+            return {
+                KIND: "law_of_each_mode",
+                "name": part.law,
+                "constants": [dict(one) for one in part.constants],
+            }
         found = name_of(law)
         if found is None:
             raise InputError(
@@ -152,6 +162,8 @@ class PlainReader:
             if law.linear_relaxation == relaxes:
                 return law
             return dataclasses.replace(law, linear_relaxation=relaxes)
+        if kind == "law_of_each_mode":
+            return law_of_each_mode([make_law(plain["name"], one) for one in plain["constants"]])
         fields = {key: self.value(item) for key, item in plain["fields"].items()}
         if kind == "network":
             return self._network(plain, fields)

@@ -65,8 +65,12 @@ class LearnerResult(HasEquation, TermTables):
         base = getattr(self.law, "base", None)
         found = EquationTerm.of(self.terms)
         named, known = (None, ()) if base is None else law_parts(base)
+        # one mode stands for all, but where each has constants of its own
+        unit = (1.0,) * (1 if named is None else len(named.constants))
         return Equation(
             combined(known + found) if known else found,
+            unit,
+            unit,
             linear_relaxation=self.law.linear_relaxation,
             named=named,
         )

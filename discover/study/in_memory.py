@@ -12,6 +12,7 @@ from discover.dataset.run import require_signal
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.laws.checking import check_law
+from discover.laws.each_mode import differs_by_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.simulate.synthetic import SyntheticDataset
@@ -20,6 +21,9 @@ from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only judges: a data set of its own, or names of runs of the data set."""
+
+
+_OF_EACH_MODE = "a law with constants of its own in each mode"
 
 
 def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
@@ -115,7 +119,8 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
             "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
         )
     check_law(base.law)
-    name, parameters = name_of(base.law) or (type(base.law).__name__, {})
+    own = _OF_EACH_MODE if differs_by_mode(base.law) else type(base.law).__name__
+    name, parameters = name_of(base.law) or (own, {})
     modulus, relaxation_time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     return DeclaredModel(
         base.law,

@@ -1,5 +1,6 @@
 """Laws with constants of their own in each mode, against stresses by scipy and one mode alone."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,10 +16,18 @@ from discover.identify.soundness.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.checking import check_law
 from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
+from discover.learners.plain_values import PlainReader, PlainWriter
+from discover.learners.tbnn_ude.initial_law import initial_law
+from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
+from discover.learners.tbnn_ude.variational import trajectories
+from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.sensitivities import linearise
 from discover.protocols import start_up
 from discover.simulate import simulate
 from discover.simulate.steady_states import steady_state
 from discover.simulate.synthetic import linear_sweep
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
 
 MODULI, TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
 MOBILITIES = (0.1, 0.3, 0.5)
@@ -143,3 +152,28 @@ def test_extension_is_bounded_where_it_is_in_every_mode():
     assert bounded.passed is True
     assert unbounded.passed is False
     assert unbounded.value == pytest.approx(0.5, rel=0.05)
+
+
+def test_learners_start_from_the_law_of_each_mode():
+    """Their systems of states and sensitivities, with nothing added: the stress is the fluid's."""
+    run = Run("a", SAMPLES, start_up(RATE), np.full(len(SAMPLES), RATE), of_scipy().sigma12)
+    library = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
+    sparse = make_problem([run], library, MODULI, TIMES, base=giesekus())
+    residual, columns = linearise(sparse, jnp.zeros(2), jnp.zeros(0))
+    assert np.linalg.norm(residual) < 1e-5
+    # control: a coefficient that is the same in all modes changes it as all mobilities do
+    less, more = (of_scipy(tuple(a + d for a in MOBILITIES)).sigma12 for d in (-5e-3, 5e-3))
+    size = np.sqrt(np.mean(run.stress**2) * len(SAMPLES))
+    change = np.asarray(columns)[np.asarray(sparse.weight).reshape(-1) > 0, 0]
+    assert change == pytest.approx(1e2 * (more - less) / size, abs=2e-3 * np.max(np.abs(change)))
+    network = make_training_problem([run], np.array(MODULI), np.array(TIMES), base=giesekus())
+    law = initial_law(jax.random.key(0), 4, True, jnp.ones(8), giesekus())
+    recorded = np.asarray(trajectories(law, network).recorded)[0, : len(SAMPLES)]
+    assert recorded * sum(MODULI) == pytest.approx(run.stress, rel=1e-4)
+
+
+def test_a_law_of_each_mode_goes_through_a_file():
+    writer = PlainWriter(())
+    plain = writer.plain(giesekus(), "law")
+    again = PlainReader((), writer.arrays).value(plain)
+    assert np.asarray(again.law.mobility) == pytest.approx(MOBILITIES)

@@ -70,7 +70,6 @@ def require_one_known_law(declared: DeclaredModel) -> None:
     if declared.by_mode:
         raise InputError(
             f"[model] by_mode lets {', '.join(declared.by_mode)} differ from mode to mode, which "
-            "only close-loop can: every law that a comparison tries, checks and writes down is one "
-            "law for all modes. Leave by_mode out to compare laws with one constant, or run "
-            "discover close-loop on this study."
+            "only close-loop fits. Run discover close-loop on this study, and compare beside what "
+            'it finds: [model] from = "its folder". Or leave by_mode out.'
         )
