@@ -22,7 +22,7 @@ from discover.comparison.outcomes.flows import (
     of_recorded,
     relative_errors,
 )
-from discover.comparison.outcomes.outcome import LearnerOutcome, plain
+from discover.comparison.outcomes.outcome import INTERVALS, LearnerOutcome, plain
 from discover.comparison.outcomes.range import Placement, place
 from discover.comparison.outcomes.truth import TrueTerm
 from discover.effects import KnownEffect
@@ -304,13 +304,10 @@ class Comparison(PageView, NotebookView):
                     {
                         "term": t.term,
                         "coefficient": t.coefficient,
-                        "ci95": None if t.ci95 is None else list(t.ci95),
-                        "ci95_given_equal_modes": None
-                        if t.ci95_given_equal_modes is None
-                        else list(t.ci95_given_equal_modes),
-                        "ci95_given_declared": None
-                        if t.ci95_given_declared is None
-                        else list(t.ci95_given_declared),
+                        **{
+                            name: None if (ends := getattr(t, name)) is None else list(ends)
+                            for name in INTERVALS
+                        },
                         "coefficient_penalised": t.coefficient_penalised,
                         "inner": dict(t.inner),
                         "inner_ci95": {k: list(v) for k, v in t.inner_ci95.items()},
