@@ -52,6 +52,7 @@ from hostile_fluids_records import (
 )
 from independent import (
     KBKZ,
+    Giesekus,
     Modes,
     Newtonian,
     PhanThienTanner,
@@ -107,6 +108,9 @@ NOISY = {
     "proportional_ucm": Case("Maxwell, 5 % of each value", recorded(),
                               proportional(0.05), terms={}),
     "quantised_ucm": Case("Maxwell, steps of 4 %", recorded(), steps_of(0.04), terms={}),
+    "quantised_weak": Case("Giesekus, 0.005, steps of 4 %", recorded(Giesekus(0.005, **SCALE)),
+                           steps_of(0.04), planted={"giesekus_mobility": {"alpha": 0.005}},
+                           terms={"sigma.sigma": 0.005}),
     "wandering_ucm": Case("Maxwell, a random walk of 4 %", recorded(), wandering(0.04), terms={}),
     "correlated_ucm": Case("Maxwell, AR(1) noise 2 %, 0.95", recorded(),
                            autoregressive(0.02, 0.95), terms={}),

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from independent import Giesekus
+from independent import start_up as strain_rate
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.judging.numerical_resolution import (
@@ -11,10 +13,14 @@ from discover.closed_loop.judging.numerical_resolution import (
     NumericalResolution,
     rounding,
 )
+from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
-from discover.forward import AugmentedModel, make_batch
+from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward import DeclaredModel as ForwardDeclared
+from discover.inference.problem import FitProblem
 from discover.protocols import measured_rate, oscillatory_shear, start_up
+from discover.statistics.residual import STRUCTURE, Expectation
 
 TIMES = np.linspace(0.1, 10.0, 100)
 WAVE = 1.5 * np.cos(0.8 * TIMES)
@@ -146,3 +152,26 @@ def test_steps_of_a_converter_round_as_digits_do():
     noise = np.random.default_rng(0).standard_normal(100)
     assert rounding(values + 1e-3 * noise) == 0.0
     assert rounding(np.repeat(noise[:20], 5)) == 0.0
+
+
+def test_a_law_that_is_a_little_wrong_is_not_hidden_by_steps_of_a_converter():
+    runs, step = [], {}
+    for rate in (0.5, 2.0):
+        stress = Giesekus(0.3, modulus=100.0, relaxation_time=1.0)
+        stress = stress.respond(strain_rate(rate), TIMES).sigma12
+        step[rate] = 0.04 * np.max(stress)
+        read = step[rate] * np.round(stress / step[rate])
+        runs.append(Run(f"at_{rate:g}", TIMES, start_up(rate), np.full(100, rate), read))
+    hidden = {}
+    for mobility in (0.3, 0.29, 0.28, 0.27):
+        modes = np.array([100.0]), np.array([1.0])
+        law = ForwardDeclared.named("giesekus", {"alpha": mobility}, *modes)
+        model = AugmentedModel(law, [], data_scales(runs))
+        problem = FitProblem(model, make_batch(runs))
+        fit = problem.at(model.zero(), ())
+        resolution = NumericalResolution(model, problem.batch, runs)
+        error = resolution.mean(fit.run_errors)
+        # by its size alone, what is left would be the steps'
+        assert error <= STRUCTURE * resolution.limit(fit.theta, (), error)
+        hidden[mobility] = ToleratedMisfit(Expectation(), resolution).unresolved(fit, ())
+    assert hidden == {0.3: True, 0.29: False, 0.28: False, 0.27: False}

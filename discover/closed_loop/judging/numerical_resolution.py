@@ -22,6 +22,11 @@ series err by a thousandth on the steps of a search, and a rate read 24 times a 
 φ the phase between samples, which is this."""
 
 _MOST_DIGITS = 9  # a difference of the tenth digit is below `COMPUTED` by far
+_HARDLY_MORE = 1.1  # half steps, of a stress that is noisy before it is read
+_BEYOND = 0.1
+"""Share of samples more than half a step off from which on a converter's steps are not all that is
+left: a misfit of a seventh of a step, half of what the steps themselves leave."""
+
 _FEWEST_VALUES = 5  # that all of fewer end in the same noughts may be chance
 
 
@@ -40,7 +45,28 @@ class NumericalResolution:
         self.rounding = np.array(
             [rounding(run.recorded) / size for run, size in zip(runs, sizes, strict=True)]
         )
+        self._half_steps = np.array([0.5 * step_of_converter(run.recorded) for run in runs])
         self._known: dict[bytes, np.ndarray] = {}
+
+    def beyond_steps(self, residual: Float[np.ndarray, "runs n"]) -> bool:
+        """Return whether residuals are more than the steps of a converter leave.
+
+        A record in steps is the nearest level to the stress, so a right model misses it by half a
+        step at the most: a misfit m, small beside a step s, shows as the share m/s of the samples
+        beyond, though it hardly adds to what is left, root-mean-square.
+
+        Parameters
+        ----------
+        residual
+            Weighted, as of a fit.
+        """
+        weight = np.asarray(self.batch.weight)
+        off = [
+            np.abs(row[w > 0] / w[w > 0]) / half
+            for row, w, half in zip(residual, weight, self._half_steps, strict=True)
+            if half > 0.0
+        ]
+        return bool(off) and float(np.mean(np.concatenate(off) > _HARDLY_MORE)) > _BEYOND
 
     def limit(self, theta: np.ndarray, active: Sequence[str], error: float) -> float:
         """Return the relative error that arithmetic explains, mean over the runs that judge.

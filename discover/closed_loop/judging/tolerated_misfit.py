@@ -50,6 +50,8 @@ class ToleratedMisfit:
     def unresolved(self, fit: Fit, active: Sequence[str]) -> bool:
         """Return whether what a fit leaves is no more than arithmetic leaves."""
         error = self.resolution.mean(fit.run_errors)
+        if self.resolution.beyond_steps(fit.residual):
+            return False
         return error <= STRUCTURE * self.resolution.limit(fit.theta, active, error)
 
     @cached_property

@@ -20,6 +20,9 @@ from discover.simulate.flow_batch import lay_out
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
 
+INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
+"""Intervals of a coefficient, as `RecoveredTerm` and results spell them."""
+
 
 @dataclass(frozen=True)
 class LearnerOutcome(TermTables):
@@ -132,7 +135,7 @@ class LearnerOutcome(TermTables):
             RecoveredTerm(
                 **{
                     **t,
-                    **{n: t.get(n) and tuple(t[n]) for n in _INTERVALS},
+                    **{n: t.get(n) and tuple(t[n]) for n in INTERVALS},
                     "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
                     "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
                 }
@@ -168,7 +171,6 @@ class LearnerOutcome(TermTables):
 
 
 _STRAIN_STEP = 0.2
-_INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
 
 
 def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
