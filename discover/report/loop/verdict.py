@@ -217,7 +217,9 @@ def _loop_sure(result: LoopResult) -> str:
         parts.append(f"{_several(few, 'and')} {verb}")
     if weights := result.remaining.get("weights"):
         ratio = significant(max(weights.values()) / min(weights.values()), 2)
-        parts.append(f"runs differ in noise by a factor of {ratio}, and each weighs by its own")
+        parts.append(
+            f"the noise of runs differs by up to a factor of {ratio}, and each weighs by its own"
+        )
     if count := result.remaining.get("outliers", 0):
         which = "samples are outliers" if count > 1 else "sample is an outlier"
         parts.append(f"{count} {which} and did not count")
