@@ -17,7 +17,7 @@ def searched_by_noise(
 ) -> tuple[SearchTask, SearchResult]:
     """Return a search with runs weighed by their noise, and its task, if that explains them.
 
-    Otherwise the search that has ended, and its task.
+    By no other effects than equal weights found. Otherwise the search that has ended, and its task.
 
     Parameters
     ----------
@@ -38,7 +38,9 @@ def searched_by_noise(
     runs = [replace(run, weight=own) for run, own in zip(task.fitted, weights, strict=True)]
     weighed = replace(task, fitted=runs, name=f"{task.name}_by_noise")
     again = weighed.search(declared, laws)
-    return (weighed, again) if again.search.explained else (task, ended)
+    # weights are for constants: of what fits the quiet runs alone too many sets of effects do
+    same = set(again.search.active) <= set(search.active)
+    return (weighed, again) if again.search.explained and same else (task, ended)
 
 
 def weighed_like(runs: Sequence[Run], fitted: Sequence[Run]) -> list[Run]:

@@ -34,7 +34,8 @@ def learned_by_noise(
 ) -> Learnt:
     """Return the known part and what learners find in runs weighed by their noise.
 
-    That is so if sparse regression then explains the runs; else what was found with equal weights.
+    That is so if sparse regression then explains the runs, by no other terms; else what was found
+    with equal weights.
 
     Parameters
     ----------
@@ -57,9 +58,10 @@ def learned_by_noise(
     weighed = with_each_run(data, lambda run: replace(run, weight=weights.get(run.name, 1.0)))
     there = known_in(weighed)
     again = replace(learning, prefix="by_noise_").outcomes(list(own), there, progress)
-    if not _explains(study, there, again[_BY_ITS_LAW]):
-        return learnt
-    return there, again
+    before, after = ({t.term for t in of[_BY_ITS_LAW].terms} for of in (own, again))
+    if after <= before and _explains(study, there, again[_BY_ITS_LAW]):
+        return there, again
+    return learnt
 
 
 def _weights(

@@ -1,6 +1,10 @@
 """Runs of unlike noise, fitted together: each weighs by its own."""
 
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from independent import Giesekus, Structured, start_up
 
 import discover as dc
@@ -56,6 +60,45 @@ def test_with_equal_weights_loud_runs_leave_a_pattern_in_the_quiet_one(monkeypat
     loop = loop_on(Giesekus(MOBILITY, MODULUS, TIME))
     low, high = loop.stages[0].parameters["alpha"].ci95
     assert loop.verdict == "unexplained" or high - low > 6.0 * deviation()
+
+
+@dataclass(frozen=True)
+class TaskOf:
+    """A search that finds given effects, and what is left is noise, with weights by noise alone."""
+
+    effects: tuple[str, ...]
+    fitted: tuple[dc.Run, ...]
+    name: str = "search"
+    silent: bool = False
+
+    def say(self, line: str) -> None:
+        del line
+
+    def search(self, declared, laws):
+        rng, weighed = np.random.default_rng(0), any(run.weight != 1.0 for run in self.fitted)
+        sizes = np.array([0.05, 0.002])[:, None] / np.sqrt(len(TIMES))
+        return SimpleNamespace(
+            search=SimpleNamespace(
+                active=list(self.effects) if weighed else ["giesekus_mobility"],
+                explained=weighed,
+                fit=SimpleNamespace(
+                    residual=sizes * rng.standard_normal((2, len(TIMES))), usable=True
+                ),
+                problem=SimpleNamespace(weight=np.ones((2, len(TIMES)))),
+            )
+        )
+
+
+@pytest.mark.parametrize(
+    ("effects", "kept"),
+    [(("giesekus_mobility",), True), ((), True), (("ptt_exponential", "thixotropy"), False)],
+)
+@pytest.mark.usefixtures("as_users_run_it")
+def test_weights_by_noise_bring_in_no_effect_that_equal_weights_did_not_find(effects, kept):
+    run = dc.Run("a.csv", TIMES, dc.start_up(1.0), 0 * TIMES + 1.0, TIMES)
+    task = TaskOf(effects, (run, replace(run, name="b.csv")))
+    _, ended = own_noise.searched_by_noise(task, task.search(None, ()), None, ())
+    assert ended.search.explained == kept
 
 
 def test_weights_by_noise_explain_no_fluid_of_another_kind():
