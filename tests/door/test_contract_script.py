@@ -36,8 +36,8 @@ def after(tmp_path_factory):
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
         patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, progress=heard["network"], quick=True))
         patch.setattr(dc, "close_loop", partial(in_memory.close_loop, progress=heard["loop"]))
-        few = partial(in_memory.run_loop, effects=["giesekus_mobility", "stress_gain"])
-        patch.setattr(in_memory, "run_loop", few)
+        few = partial(in_memory.run_loop_on, effects=["giesekus_mobility", "stress_gain"])
+        patch.setattr(in_memory, "run_loop_on", few)
         left: dict = {"folder": folder, "said": said}
         exec(compile(script(), "docs/python.md", "exec"), left)
         yield left
