@@ -1,7 +1,7 @@
 """Learners on runs that are weighed by their own noise, where equal weights will not do."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from discover.comparison.instrument.known import Known
 from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.learning import Learning
 from discover.comparison.outcomes.expected import expectation_of
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.dataset.run_table import kind_of_record
@@ -51,7 +52,10 @@ def learned_by_noise(
         Called with what is going on and the fraction done.
     """
     known, own = learnt
-    weights = None if _BY_ITS_LAW not in own else _weights(study, data, known, own[_BY_ITS_LAW])
+    if _BY_ITS_LAW not in own:
+        return learnt
+    seen = _seen(study, known, own)
+    weights = _weights(seen, data)
     if weights is None:
         return learnt
     progress("runs differ in noise: once more, each run weighed by its own", 1.0)
@@ -59,20 +63,34 @@ def learned_by_noise(
     there = known_in(weighed)
     again = replace(learning, prefix="by_noise_").outcomes(list(own), there, progress)
     before, after = ({t.term for t in of[_BY_ITS_LAW].terms} for of in (own, again))
-    if after <= before and _explains(study, there, again[_BY_ITS_LAW]):
+    if after <= before and _seen(study, there, again).explained:
         return there, again
     return learnt
 
 
-def _weights(
-    study: Study, data: StudyData, known: Known, own: LearnerOutcome
-) -> dict[str, float] | None:
+@dataclass(frozen=True)
+class _Seen:
+    """The fitted runs, the law of sparse regression in them, and whether it leaves noise."""
+
+    flows: Sequence[Flow]
+    outcome: LearnerOutcome
+    explained: bool
+
+
+def _seen(study: Study, known: Known, own: Mapping[str, LearnerOutcome]) -> _Seen:
+    repeats = repeats_among(list(known.before.data.dataset))
+    expectation = expectation_of(study, known.before.model, repeats)
+    flows = [flow for flow in known.flows if flow.kind == "training"]
+    outcome = known.frame(own[_BY_ITS_LAW]).outcome(own[_BY_ITS_LAW])
+    left = what_it_leaves(outcome, flows, expectation, study.compare.use_normal_stresses)
+    return _Seen(flows, outcome, left.verdict == "explained")
+
+
+def _weights(seen: _Seen, data: StudyData) -> dict[str, float] | None:
     """Return the weight of each run by name; None where equal weights are as good."""
-    outcome, left = known.frame(own).outcome(own), []
-    for flow in known.flows:
-        if flow.kind != "training":
-            continue
-        predicted = outcome.predictions[flow.key]
+    left = []
+    for flow in seen.flows:
+        predicted = seen.outcome.predictions[flow.key]
         if predicted is None:
             return None
         record = np.asarray(flow.measured, dtype=float)
@@ -80,16 +98,7 @@ def _weights(
         size = float(np.sqrt(np.mean((even * record) ** 2))) or 1.0
         left.append(even * (predicted["sigma12"] - record) / size)
     runs = data.fit.runs
-    weights = weights_by_noise(left, list(map(kind_of_record, runs)), _explains(study, known, own))
+    weights = weights_by_noise(left, list(map(kind_of_record, runs)), seen.explained)
     if weights is None:
         return None
     return {run.name: weight for run, weight in zip(runs, weights, strict=True)}
-
-
-def _explains(study: Study, known: Known, own: LearnerOutcome) -> bool:
-    """Return whether what a learner's law leaves of the fitted runs is noise."""
-    repeats = repeats_among(list(known.before.data.dataset))
-    expectation = expectation_of(study, known.before.model, repeats)
-    flows = [flow for flow in known.flows if flow.kind == "training"]
-    outcome, normal = known.frame(own).outcome(own), study.compare.use_normal_stresses
-    return what_it_leaves(outcome, flows, expectation, normal).verdict == "explained"

@@ -294,7 +294,9 @@ def covariance_and_noise(
 ) -> tuple[Float[np.ndarray, "free free"], NoiseModel]:
     """Return the covariance of fitted parameters, and the noise that it rests on."""
     design = jacobian.reshape(len(jacobian), -1).T
-    sequences, sizes = sequences_of(batch)
+    # a run that was left out of the fit says nothing of the noise
+    told = [(rows, size) for rows, size in zip(*sequences_of(batch), strict=True) if len(rows)]
+    sequences, sizes = zip(*told, strict=True)
     covariance, _, noise = least_squares_covariance(
         design, residual.ravel(), sequences, sizes=sizes
     )

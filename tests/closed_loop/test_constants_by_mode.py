@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from independent import Giesekus, multimode_giesekus
-from independent import start_up as flow
+from independent import Giesekus
 from independent.folders import write_table
 from independent.homogeneous import GiesekusFluid
+from modes_in_start_up import NOISE, noisy_start_ups
 
 import discover as dc
 from discover.closed_loop import DeclaredModel, run_loop
@@ -25,19 +25,12 @@ from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
-NOISE = 0.01
 
 
 @cache
 def data(mobilities, rates=RATES):
     """Return start-ups of shear with white noise."""
-    generator, runs = np.random.default_rng(0), []
-    for rate in rates:
-        times = np.geomspace(0.02, 12.0, 50) / np.sqrt(rate)
-        stress = multimode_giesekus(mobilities, MODULI, TIMES).respond(flow(rate), times).sigma12
-        size = NOISE * np.sqrt(np.mean(stress**2))
-        stress = stress + size * generator.standard_normal(len(times))
-        runs.append(Run(f"{rate}", times, start_up(rate), np.full(len(times), rate), stress))
+    runs = noisy_start_ups(mobilities, MODULI, TIMES, rates, 12.0, seed=0)
     return Dataset("three modes", tuple(runs))
 
 

@@ -4,10 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from independent import multimode_giesekus
-from independent import start_up as flow
+from modes_in_start_up import noisy_start_ups
 
-from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.forward.least_squares import intervals
@@ -17,7 +15,6 @@ from discover.inference.degrees import FREE, Degree, choose_degrees, one_degree_
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.problem import FitProblem
 from discover.inference.varying_constant import freer_fits
-from discover.protocols import start_up
 
 MODULI = np.array([300.0, 200.0, 100.0, 60.0, 30.0])
 TIMES = np.array([0.03, 0.15, 0.7, 3.0, 15.0])
@@ -28,13 +25,7 @@ ROUGH, SMOOTH = (0.1, 0.3, 0.15, 0.35, 0.2), (0.1, 0.2, 0.3, 0.4, 0.5)
 
 @cache
 def problem(mobilities, rates=RATES):
-    generator, runs = np.random.default_rng(1), []
-    for rate in rates:
-        times = np.geomspace(0.02, 20.0, 50) / np.sqrt(rate)
-        stress = multimode_giesekus(mobilities, MODULI, TIMES).respond(flow(rate), times).sigma12
-        size = 0.01 * np.sqrt(np.mean(stress**2))
-        stress = stress + size * generator.standard_normal(len(times))
-        runs.append(Run(f"{rate}", times, start_up(rate), np.full(len(times), rate), stress))
+    runs = noisy_start_ups(mobilities, MODULI, TIMES, rates, 20.0, seed=1)
     declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=(NAME,))
     model = AugmentedModel(declared, [make_effect(NAME)], data_scales(runs))
     return FitProblem(model, make_batch(runs))

@@ -1,5 +1,6 @@
 """Runs that no fit saw, and what a model leaves of them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,22 +46,49 @@ def held_out(
 ) -> HeldOut:
     """Return what a final model leaves of runs that no fit saw."""
     residual = model.residuals([theta], resolution.batch)
+    rows = range(len(residual[0]))
+    unseen = unseen_rows(model, (batch, fit), theta, resolution.batch, residual, rows)
+    return HeldOut(residual[0], resolution, unseen)
+
+
+def unseen_rows(
+    model: AugmentedModel,
+    fitted: tuple[Batch, Fit],
+    theta: np.ndarray,
+    batch: Batch,
+    residual: Float[np.ndarray, "1 runs n"],
+    rows: Iterable[int],
+) -> Unseen:
+    """Return what a model leaves of some runs that a fit did not see.
+
+    Parameters
+    ----------
+    model
+        The model.
+    fitted
+        The runs that were fitted, and the fit, which says how uncertain the constants are.
+    theta
+        The parameters that predict.
+    batch, residual
+        Runs, and what these parameters leave of them.
+    rows
+        Those of the runs that are asked about.
+    """
     derivative = np.zeros((0, *residual[0].shape))
     root, correlation = np.zeros((0, 0)), np.ones(1)
-    if fit.free:
-        derivative = jacobians(model, resolution.batch, [theta], residual, [fit.free])[0]
-        root, correlation = root_of_covariance(batch, fit)
+    if fitted[1].free:
+        derivative = jacobians(model, batch, [theta], residual, [fitted[1].free])[0]
+        root, correlation = root_of_covariance(*fitted)
     columns = np.tensordot(root, derivative, axes=(0, 0))
-    weight, records = np.asarray(resolution.batch.weight), np.asarray(resolution.batch.recorded)
-    kept = [w > 0 for w in weight]
-    sizes = [even(w[seen]) for w, seen in zip(weight, kept, strict=True)]
-    unseen = Unseen(
-        [residual[0, i, seen] / weight[i, seen] / sizes[i] for i, seen in enumerate(kept)],
-        [records[i, seen] / sizes[i] for i, seen in enumerate(kept)],
-        [columns[:, i, seen] / weight[i, seen] / sizes[i] for i, seen in enumerate(kept)],
+    weight, records = np.asarray(batch.weight), np.asarray(batch.recorded)
+    kept = {i: weight[i] > 0 for i in rows}
+    sizes = {i: even(weight[i, seen]) for i, seen in kept.items()}
+    return Unseen(
+        [residual[0, i, seen] / weight[i, seen] / sizes[i] for i, seen in kept.items()],
+        [records[i, seen] / sizes[i] for i, seen in kept.items()],
+        [columns[:, i, seen] / weight[i, seen] / sizes[i] for i, seen in kept.items()],
         correlation,
     )
-    return HeldOut(residual[0], resolution, unseen)
 
 
 def root_of_covariance(batch: Batch, fit: Fit) -> tuple[np.ndarray, np.ndarray]:

@@ -12,16 +12,15 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from discover.closed_loop.judging.held_out import unseen_rows
 from discover.closed_loop.judging.judgement import Judgement
 from discover.dataset import Run
 from discover.dataset.repeats import repeats_among
-from discover.forward import Batch, even
-from discover.forward.least_squares import Fit, fit_batch, jacobians, sequences_of
+from discover.forward.least_squares import Fit
 from discover.inference.problem import FitProblem
 from discover.protocols.kinematics import STATES
-from discover.statistics import least_squares_covariance, root_of
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE
-from discover.statistics.unseen import CARRIED, Unseen
+from discover.statistics.unseen import CARRIED
 from discover.words import percent_of
 
 _EXCUSED = 1e-3
@@ -108,11 +107,10 @@ def leave_out_in_turn(problem: FitProblem, fit: Fit, runs: Sequence[Run]) -> lis
     for rows in groups:
         weight = problem.weight.copy()
         weight[rows] = 0.0
-        rest = eqx.tree_at(lambda b: b.weight, problem.batch, jnp.asarray(weight))
-        (other,) = fit_batch(problem.model, rest, [fit.theta], [fit.free], prior=problem.prior)
-        error, agreement = np.inf, 0.0
-        if other.usable:
-            error, agreement = _of_rows(problem, other, rest, rows)
+        batch = eqx.tree_at(lambda b: b.weight, problem.batch, jnp.asarray(weight))
+        rest = replace(problem, batch=batch)
+        other = rest.fit(fit.theta, fit.free)
+        error, agreement = _of_rows(problem, rest, other, rows) if other.usable else (np.inf, 0.0)
         # a residual is as much larger as its run weighs more
         error /= float(np.mean([runs[row].weight for row in rows]))
         found.append(LeftOut(runs[rows[0]].name, error, agreement))
@@ -133,7 +131,7 @@ def _groups(runs: Sequence[Run]) -> list[list[int]]:
 
 
 def _of_rows(
-    problem: FitProblem, other: Fit, rest: Batch, rows: Sequence[int]
+    problem: FitProblem, rest: FitProblem, other: Fit, rows: Sequence[int]
 ) -> tuple[float, float]:
     """Return the error of runs by a fit to the others, and how well its constants suit them."""
     model, batch = problem.model, problem.batch
@@ -141,28 +139,5 @@ def _of_rows(
     if not np.all(np.isfinite(residual[0, rows])):
         return np.inf, 0.0
     error = float(np.mean(np.sqrt(np.sum(residual[0, rows] ** 2, axis=1))))
-    derivative = jacobians(model, batch, [other.theta], residual, [other.free])[0]
-    root, correlation = _root(rest, other)
-    columns = np.tensordot(root, derivative, axes=(0, 0))
-    parts = []
-    for i in rows:
-        weight = problem.weight[i]
-        seen = weight > 0
-        size = weight[seen] * even(weight[seen])
-        record = np.asarray(batch.recorded)[i, seen] / even(weight[seen])
-        parts.append((residual[0, i, seen] / size, record, columns[:, i, seen] / size))
-    residuals, records, moved = zip(*parts, strict=True)
-    return error, Unseen(residuals, records, moved, correlation).moved()[1]
-
-
-def _root(rest: Batch, other: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Return a root of the covariance of constants fitted to some runs, and the correlation."""
-    told = [(rows, size) for rows, size in zip(*sequences_of(rest), strict=True) if len(rows)]
-    sequences, sizes = zip(*told, strict=True)
-    design = other.jacobian.reshape(len(other.free), -1).T
-    covariance, _, noise = least_squares_covariance(
-        design, other.residual.ravel(), sequences, sizes=sizes
-    )
-    if not np.all(np.isfinite(covariance)):
-        return np.zeros_like(covariance), noise.correlation
-    return root_of(covariance), noise.correlation
+    unseen = unseen_rows(model, (rest.batch, other), other.theta, batch, residual, rows)
+    return error, unseen.moved()[1]

@@ -20,7 +20,7 @@ from discover.simulate.flow_batch import lay_out
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
 
-INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
+_INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
 """Intervals of a coefficient, as `RecoveredTerm` and results spell them."""
 
 
@@ -135,7 +135,7 @@ class LearnerOutcome(TermTables):
             RecoveredTerm(
                 **{
                     **t,
-                    **{n: t.get(n) and tuple(t[n]) for n in INTERVALS},
+                    **{n: t.get(n) and tuple(t[n]) for n in _INTERVALS},
                     "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
                     "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
                 }
