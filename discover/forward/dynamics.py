@@ -15,6 +15,7 @@ from discover.simulate.exponential_runge_kutta import (
     krogstad_weights,
     relax,
 )
+from tensor_library.contraction import contracted
 
 Levels = tuple[Float[Array, "..."], ...]
 """States of the fluid."""
@@ -112,7 +113,7 @@ class Dynamics(NamedTuple):
         """Rate over 1/λ of the relaxation that is integrated exactly."""
         return 1.0 if self.linear_relaxation else 0.0
 
-    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 10 _"], ...]:
+    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 13 _"], ...]:
         """Return what `weights_of_step` wants of steps of these widths in s.
 
         Apart for the declared modes and those of effects; of each the weights of its stress and,
@@ -133,7 +134,7 @@ class Dynamics(NamedTuple):
 
     def weights_of_step(
         self,
-        pieces: tuple[Float[Array, "kinds 10 _"], ...],
+        pieces: tuple[Float[Array, "kinds 13 _"], ...],
         width: Float[Array, ""],
         slow: Float[Array, ""],
     ) -> StressWeights:
@@ -225,7 +226,8 @@ class Dynamics(NamedTuple):
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""
-        return (stress[3] if flow is None else flow.stress(stress[:4])) @ self.modes.modulus
+        of_modes = stress[3] if flow is None else flow.stress(stress[:4])
+        return contracted(of_modes, self.modes.modulus)
 
     def sheared(self, stress, rate, flow: Kinematics | None):
         """Return the stress and the rate that a state feels.
@@ -233,5 +235,6 @@ class Dynamics(NamedTuple):
         Those of a shear of the same intensity that does the same work.
         """
         if flow is None:
-            return stress[3] @ self.modes.modulus, rate
-        return flow.equivalent_shear_stress(stress[:4]) @ self.modes.modulus, flow.intensity * rate
+            return contracted(stress[3], self.modes.modulus), rate
+        of_modes = flow.equivalent_shear_stress(stress[:4])
+        return contracted(of_modes, self.modes.modulus), flow.intensity * rate

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import LibraryTerm
+from tensor_library.contraction import contracted
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.invariants import scalar_invariants
 
@@ -54,5 +55,5 @@ class LibraryMatrix:
 
     def sum(self, matrix: Float[Array, "8 m"], stress, rate):
         """Return the sum of all terms."""
-        coefficients = matrix @ self.monomials(stress, rate)
-        return jnp.tensordot(coefficients, integrity_basis(stress, rate), axes=1)
+        coefficients = contracted(matrix, self.monomials(stress, rate))
+        return contracted(coefficients, integrity_basis(stress, rate))

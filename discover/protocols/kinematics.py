@@ -9,13 +9,13 @@ from typing import Literal
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
 from discover.programs import on_device
 from discover.words import listed
+from tensor_library.contraction import contracted
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 
@@ -98,7 +98,7 @@ class Kinematics(eqx.Module):
 
     def stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return the recorded stress of σ11, σ22, σ33, σ12."""
-        return jnp.tensordot(self.recorded, components, axes=1)
+        return contracted(self.recorded, components)
 
     @property
     def is_shear(self) -> Bool[Array, "*batch"]:
@@ -112,7 +112,7 @@ class Kinematics(eqx.Module):
 
     def equivalent_shear_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return the stress whose work at the shear rate of equal intensity is that of the flow."""
-        return jnp.tensordot(self.gradient, components, axes=1) / self.intensity
+        return contracted(self.gradient, components) / self.intensity
 
 
 def kind_of(kinematics: Kinematics | None) -> FlowKind:

@@ -70,6 +70,7 @@ class KrogstadWeights(NamedTuple):
 
     The stages are Y2 = half y + a21 N1, Y3 = half y + a31 N1 + a32 N2 and Y4 = full y + a41 N1 +
     a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y.
+    A parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle with m.
     """
 
     half: Float[Array, " ..."]
@@ -82,6 +83,9 @@ class KrogstadWeights(NamedTuple):
     b1: Float[Array, " ..."]
     b23: Float[Array, " ..."]
     b4: Float[Array, " ..."]
+    m1: Float[Array, " ..."]
+    m23: Float[Array, " ..."]
+    m4: Float[Array, " ..."]
 
     def tableau(self) -> tuple[Float[Array, "4 ..."], Float[Array, "4 4 ..."]]:
         """Return what each stage multiplies the state with, and the remainders of all stages."""
@@ -110,6 +114,10 @@ class KrogstadWeights(NamedTuple):
     def end(self, y, n1, n2, n3, n4):
         """Return the state after the step."""
         return self.full * y + self.b1 * n1 + self.b23 * (n2 + n3) + self.b4 * n4
+
+    def middle(self, y, n1, n2, n3, n4):
+        """Return the state in the middle of the step, as exact as that after it."""
+        return self.half * y + self.m1 * n1 + self.m23 * (n2 + n3) + self.m4 * n4
 
 
 class StressWeights(NamedTuple):
@@ -218,6 +226,10 @@ class StressWeights(NamedTuple):
         """Return the state after the step."""
         return self._applied("end", y, n1, n2, n3, n4)
 
+    def middle(self, y, n1, n2, n3, n4):
+        """Return the state in the middle of the step."""
+        return self._applied("middle", y, n1, n2, n3, n4)
+
     def _applied(self, stage: str, *parts):
         parts = [_with_shares(part, self.shares, -1.0, axis=0) for part in parts]
         found = getattr(self.whole, stage)(*parts)
@@ -247,7 +259,7 @@ def krogstad_weights(
     step
         Its length, in the unit of time of the remainders.
     """
-    half_first, half_second, _ = phi_functions(0.5 * z)
+    half_first, half_second, half_third = phi_functions(0.5 * z)
     first, second, third = phi_functions(z)
     return KrogstadWeights(
         half=jnp.exp(0.5 * z),
@@ -260,6 +272,9 @@ def krogstad_weights(
         b1=step * (first - 3.0 * second + 4.0 * third),
         b23=step * (2.0 * second - 4.0 * third),
         b4=step * (4.0 * third - second),
+        m1=step * (0.5 * half_first - 0.75 * half_second + 0.5 * half_third),
+        m23=0.5 * step * (half_second - half_third),
+        m4=step * (0.5 * half_third - 0.25 * half_second),
     )
 
 

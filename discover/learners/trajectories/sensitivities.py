@@ -34,6 +34,7 @@ from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
 from discover.simulate.following import Following, follow
 from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
+from tensor_library.contraction import contracted
 from tensor_library.kinematics import rate_of_deformation
 
 _LAWS_AT_ONCE = 32  # what is kept of every step of all of them stays small
@@ -67,7 +68,7 @@ def _mode_rates(library, active, base, coefficients, inner, state, rate):
     else:
         unit = jnp.eye(size + inner.shape[0], dtype=stress.dtype)
         jacobian = push(unit[:size], unit[size:])
-        along = jacobian[:, :size] @ columns
+        along = contracted(jacobian[:, :size], columns)
         along = along.at[:, n_terms:].add(jacobian[:, size:])
     along = along.at[:, :n_terms].add(-terms.T)
     return jnp.concatenate([change[:, None], along], axis=1)
@@ -87,7 +88,7 @@ def _vector_field(t, state, args):
 def _observe(t, state, args):
     """Return the recorded stress, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
     problem, protocol, *_ = args
-    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
+    total = contracted(problem.modulus, state[:, :4])
     return _recorded(total.at[:, 0].add(_of_solvent(problem, protocol, t)), protocol)
 
 
@@ -171,7 +172,7 @@ def _law_of_numbers(library, given, numbers, stress, rate):
     (active, base), (coefficients, inner) = given, numbers
     own = stress_in(stress)
     terms = evaluate_active(library, active, own, rate_of_deformation(rate), inner)
-    added = as_state(jnp.tensordot(coefficients, terms, axes=1), stress)
+    added = as_state(contracted(coefficients, terms), stress)
     return base.stress_rate(stress, rate) - added
 
 
@@ -206,7 +207,7 @@ def _known_less_terms(problem, active, coefficients, inner):
 
 def _observed(problem, protocol, time, state):
     """Return the recorded stress, N1 and N2 of modes, shape (k, s)."""
-    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
+    total = contracted(problem.modulus, state[:, :4])
     return _recorded(total + _of_solvent(problem, protocol, time), protocol)
 
 
