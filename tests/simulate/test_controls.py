@@ -1,16 +1,20 @@
 """A fluid at a given stress and in steady states, against closed forms and scipy."""
 
 from dataclasses import replace
+from itertools import pairwise
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent.giesekus import Giesekus
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.protocols import imposed_stress, start_up, steady_rates
+from discover.simulate.grid import stress_grid
 
 MODULUS, TIME = 100.0, 1.0
 MAXWELL = DeclaredModel.maxwell(MODULUS, TIME)
@@ -33,6 +37,11 @@ def at_stress(times, stress, strain=None):
     strain = np.ones(len(times)) if strain is None else strain
     protocol = imposed_stress(times, stress)
     return Run("creep", times, protocol, np.zeros(len(times)), stress, strain=strain)
+
+
+def with_strain(protocol, strain):
+    knots = np.interp(protocol.table_times, TIMES, strain)
+    return replace(protocol, table_strains=jnp.asarray(knots))
 
 
 def predicted(declared, *runs, effects=(), **values):
@@ -90,9 +99,9 @@ def test_a_maxwell_fluid_recovers_its_elastic_strain():
     np.testing.assert_allclose(strain[times > 2.0], flowed, rtol=1e-4)
 
 
-# first order in time where the solvent carries a part of the stress: 0.6 per mille was measured
-@pytest.mark.parametrize(("solvent", "tolerance"), [(0.1, 5e-5), (10.0, 1.5e-3)])
-def test_a_giesekus_fluid_with_solvent_creeps_as_scipy_has_it(solvent, tolerance):
+# second order in time: 7e-6 was measured where the solvent carries most of the stress
+@pytest.mark.parametrize("solvent", [0.1, 10.0])
+def test_a_giesekus_fluid_with_solvent_creeps_as_scipy_has_it(solvent):
     law, stress = Giesekus(0.3, MODULUS, TIME), 60.0
 
     def change(t, y):
@@ -105,7 +114,47 @@ def test_a_giesekus_fluid_with_solvent_creeps_as_scipy_has_it(solvent, tolerance
         change, (0.0, 10.0), np.zeros(5), method="Radau", t_eval=TIMES, rtol=1e-9, atol=1e-10
     ).y[4]
     strain = predicted(giesekus(0.3, solvent), at_stress(TIMES, np.full(60, stress)))[0]
-    assert np.linalg.norm(strain - exact) < tolerance * np.linalg.norm(exact)
+    assert np.linalg.norm(strain - exact) < 5e-5 * np.linalg.norm(exact)
+
+
+def test_a_spectrum_over_five_decades_creeps_by_its_closed_form():
+    modulus, time = np.geomspace(1e5, 10.0, 9), np.geomspace(1e-3, 100.0, 9)
+    times, stress = np.geomspace(1e-3, 100.0, 60), 100.0
+
+    # 1/(s² G(s)), G(s) the sum of G λ/(1 + λs): an elastic part, a flow, and a retardation at each
+    # zero between two relaxation rates   [Ferry 1980, Viscoelastic Properties of Polymers, ch. 3]
+    def relaxing(s):
+        return np.sum(modulus * time / (1.0 + time * s))
+
+    rates = 1.0 / time
+    zeros = np.array(
+        [
+            brentq(relaxing, -a * (1.0 - 1e-12), -b * (1.0 + 1e-12), xtol=1e-300, rtol=1e-14)
+            for a, b in pairwise(rates)
+        ]
+    )
+    slopes = np.array([np.sum(modulus * time**2 / (1.0 + time * s) ** 2) for s in zeros])
+    parts = 1.0 / (zeros**2 * slopes)
+    compliance = 1.0 / np.sum(modulus) + times / np.sum(modulus * time)
+    compliance = compliance + parts @ (1.0 - np.exp(np.outer(zeros, times)))
+    declared = DeclaredModel.maxwell(modulus, time)
+    strain = predicted(declared, at_stress(times, np.full(60, stress)))[0]
+    # the jump takes a thousandth of the time to the first sample, in which it flows: 2e-4 there
+    np.testing.assert_allclose(strain, stress * compliance, rtol=3e-4)
+    assert np.max(np.abs(strain - stress * compliance)) < 5e-5 * strain[-1]
+
+
+def test_noise_in_a_strain_is_not_taken_for_flow():
+    protocol = imposed_stress(TIMES, np.full(60, 50.0))
+    strain = 20.0 * TIMES
+    noisy = strain + 2.0 * np.random.default_rng(0).standard_normal(60)
+    steps = [
+        len(stress_grid(with_strain(protocol, of), TIMES, 0.1))
+        for of in (0.0 * strain, strain, noisy)
+    ]
+    # flow does ask for steps
+    assert steps[1] > 1.5 * steps[0]
+    assert steps[2] < 1.1 * steps[1]
 
 
 def test_a_tool_with_inertia_rings_in_creep_as_scipy_has_it():
@@ -116,12 +165,12 @@ def test_a_tool_with_inertia_rings_in_creep_as_scipy_has_it():
         return [MODULUS * rate - shear / TIME, (stress - shear) / inertia, rate]
 
     exact = solve_ivp(change, (0.0, 4.0), np.zeros(3), t_eval=times, rtol=1e-9, atol=1e-11).y[2]
+    # followed to second order, with some forty steps a period: 0.14 % was measured
     run = at_stress(times, np.full(200, stress))
     strain = predicted(
         MAXWELL, run, effects=["instrument_inertia"], instrument_inertia=inertia
     )[0]  # fmt: skip
-    # followed to second order, with some forty steps a period: 0.24 % was measured
-    assert np.linalg.norm(strain - exact) < 0.005 * np.linalg.norm(exact)
+    assert np.linalg.norm(strain - exact) < 0.003 * np.linalg.norm(exact)
     without = predicted(MAXWELL, run)[0]
     assert np.linalg.norm(without - exact) > 0.08 * np.linalg.norm(exact)
 
