@@ -52,7 +52,9 @@ def test_a_narrow_dense_band_leaves_a_statement_and_says_its_width():
     # an open quantity has the band all the same, with what it takes for granted
     assert second.undetermined
     assert "± 20 % of N1 at the widest" in second.text
-    assert "no claim about a fluid unlike all of them" in second.text
+    assert (
+        "takes it for granted that the fluid behaves like one of the laws that fit" in second.text
+    )
 
 
 def test_dense_bands_hold_the_fluid_behind_a_transducer_of_the_gain_that_the_sparse_law_shows():
