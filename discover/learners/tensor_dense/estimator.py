@@ -174,6 +174,7 @@ class TensorDense(RunPrediction):
             found.weights_of_draws,
             float(_reference(problem).relaxation),
             found.moduli if np.any(np.asarray(problem.modulus_error)) else None,
+            None if found.named_law_fits else found.optimum_of_draw,
         )
         self.law_ = LibraryExpansion(
             coefficients=jnp.asarray(self.coefficients_),

@@ -41,6 +41,9 @@ SHARED = 0.5
 _NAMED_FITS = 1.05
 """A named law fits whose own misfit is at most so many times the noise."""
 
+_NAMED_NEARLY_FITS = 1.1
+"""Up to so many times the noise a named law is not ruled out, for 64 terms take up noise too."""
+
 _PAIRS = 4
 """Draws about an optimum, in pairs of opposites."""
 
@@ -111,6 +114,8 @@ class Mixture:
         Of each draw in Pa, shape (draws, k).
     weights_of_draws
         Adding up to one, shape (draws,).
+    named_law_fits
+        Whether one of the reference laws by itself may be the fluid's.
     """
 
     optima: tuple[Optimum, ...]
@@ -122,6 +127,7 @@ class Mixture:
     coefficients: Float[np.ndarray, "draws n"]
     moduli: Float[np.ndarray, "draws k"]
     weights_of_draws: Float[np.ndarray, " draws"]
+    named_law_fits: bool
 
 
 def explore(
@@ -186,6 +192,7 @@ def explore(
         np.concatenate([laws for laws, _ in drawn]) * scale,
         np.concatenate([moduli for _, moduli in drawn]),
         (weights / counts)[owner],
+        bool(min(misfit for _, misfit in references.values()) <= _NAMED_NEARLY_FITS * noise),
     )
 
 
