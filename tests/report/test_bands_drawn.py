@@ -21,11 +21,11 @@ EMPTY = (np.zeros(0), np.zeros(0))
 @pytest.mark.parametrize(
     ("learner", "detail", "label"),
     [
-        ("tensor_dense", None, "if the fluid is like a law that fits σ₁₂ (dense library)"),
+        ("tensor_dense", None, "laws that fit σ₁₂, no claim beyond them"),
         (
             "tensor_dense",
             NAMED_BESIDE,
-            "if the fluid is like a law that fits σ₁₂ (dense library, named effects)",
+            "laws and named effects that fit σ₁₂, no claim beyond them",
         ),
         ("tbnn_ude", None, "networks that fit as well"),
     ],

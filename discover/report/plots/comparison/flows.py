@@ -196,12 +196,12 @@ def _new_kind(comparison: Comparison) -> str:
 
 
 _FITTING_AS_WELL = {
-    "tensor_dense": "if the fluid is like a law that fits σ₁₂ (dense library)",
+    "tensor_dense": "laws that fit σ₁₂, no claim beyond them",
     "tbnn_ude": "networks that fit as well",
 }
 
 
-_WITH_NAMES = "if the fluid is like a law that fits σ₁₂ (dense library, named effects)"
+_WITH_NAMES = "laws and named effects that fit σ₁₂, no claim beyond them"
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
