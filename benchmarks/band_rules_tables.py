@@ -41,7 +41,9 @@ def draws(case: Case, flow: Mapping[str, Any]):
 
 def as_it_was(case: Case, flow: Mapping[str, Any]) -> Band:
     """Return what holds 95 % of the weight."""
-    return {q: tuple(case["refuted_bands"][flow["key"]][q]) for q in QUANTITIES}
+    values, kept, _ = draws(case, flow)
+    low, high = weighted_quantiles(values[kept], case["weights"][kept], (0.025, 0.975))
+    return {q: (low[:, i], high[:, i]) for i, q in enumerate(QUANTITIES)}
 
 
 def times(factor: float) -> Rule:
