@@ -45,6 +45,7 @@ from discover.comparison.judging.next_measurement import (
     bands_of_law,
     next_measurement,
 )
+from discover.comparison.judging.second_normal_stress import with_any_second_normal_stress
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
     Statement,
@@ -157,6 +158,8 @@ def judge(
         # what a known instrument did is taken out of the data at hand alone
         data = None if known.effects else undated
         outcomes = _beside_named(outcomes, frames[DENSE], data, flows, expectation)
+    if not normal:
+        outcomes = with_any_second_normal_stress(outcomes, flows, explanation)
     bands = frame.bands(tested.bands)
     statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
     warnings = [

@@ -8,13 +8,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from discover.forward.fluids import observed_on_grid
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.simulate.flow_batch import FlowBatch
+from discover.statistics.one_more import one_more
 from discover.statistics.weighted_quantiles import weighted_quantiles
 
 QUANTITIES = ("sigma12", "N1", "N2")
@@ -41,11 +42,15 @@ class WeightedLaws:
         Adding up to one, shape (laws,).
     moduli
         Of each law in Pa, shape (laws, k); None where all have those of the fluid.
+    kinds
+        Number of the kind of each law, shape (laws,), where the band of N1 is that of a law of one
+        more kind; None where the kinds at hand are all that are meant.
     """
 
     laws: AbstractConstitutiveLaw
     weights: Float[np.ndarray, " laws"]
     moduli: Float[np.ndarray, "laws k"] | None = None
+    kinds: Int[np.ndarray, " laws"] | None = None
 
     def bands(
         self,
@@ -67,7 +72,8 @@ class WeightedLaws:
 
         Returns
         -------
-        None for a flow in which laws of more than half of the weight run away.
+        None for a flow in which laws of more than half of the weight run away, or a single kind is
+        left to tell what one more may do.
         """
         modulus, relaxation_time, viscosity = modes
         if self.moduli is None:
@@ -83,6 +89,14 @@ class WeightedLaws:
                 bands.append(None)
                 continue
             limits = weighted_quantiles(values[kept], self.weights[kept], _LEVELS)
+            if self.kinds is not None:
+                if len(np.unique(self.kinds[kept])) < 2:
+                    bands.append(None)
+                    continue
+                first = QUANTITIES.index("N1")
+                low, high = one_more(values[kept, :, first], self.kinds[kept])
+                limits[0, :, first] = np.minimum(limits[0, :, first], low)
+                limits[-1, :, first] = np.maximum(limits[-1, :, first], high)
             bands.append({q: limits[:, :, i] for i, q in enumerate(QUANTITIES)})
         return bands
 

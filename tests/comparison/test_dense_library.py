@@ -52,7 +52,9 @@ def test_a_narrow_dense_band_leaves_a_statement_and_says_its_width():
     # an open quantity has the band all the same, with what it takes for granted
     assert second.undetermined
     assert "± 20 % of N1 at the widest" in second.text
-    assert "no claim about a fluid unlike all of them" in second.text
+    assert (
+        "takes it for granted that the fluid behaves like one of the laws that fit" in second.text
+    )
 
 
 def test_dense_bands_hold_the_fluid_behind_a_transducer_of_the_gain_that_the_sparse_law_shows():
@@ -181,3 +183,23 @@ def test_a_flow_in_which_most_laws_run_away_has_no_band(eleven_laws):
     result = LearnerResult("tensor_dense", Giesekus(0.3), (), weighted=weighted)
     found = LearnerOutcome.of(result, Fluid.dimensionless(Giesekus(0.3)), [FLOW])
     assert found.bands[FLOW.key] is None
+
+
+def test_of_laws_of_several_kinds_n1_of_one_more_is_in_the_band(eleven_laws):
+    # a mobility beyond those of the laws at hand
+    beyond = Fluid.dimensionless(Giesekus(0.98))
+    truth = LearnerOutcome.of(LearnerResult("", Giesekus(0.98), ()), beyond, [FLOW])
+    n1 = truth.predictions[FLOW.key]["N1"]
+
+    def band_of(kinds):
+        weighted = replace(eleven_laws.weighted, kinds=kinds)
+        result = replace(eleven_laws, weighted=weighted)
+        return LearnerOutcome.of(result, Fluid.dimensionless(Giesekus(0.3)), [FLOW]).bands[FLOW.key]
+
+    known, further = band_of(None), band_of(np.arange(11))
+    assert n1[-1] < known["N1"][0][-1]
+    assert np.all((further["N1"][0] <= n1) & (n1 <= further["N1"][1]))
+    for quantity in ("sigma12", "N2"):
+        np.testing.assert_array_equal(further[quantity], known[quantity])
+    # a single kind says nothing of one more
+    assert band_of(np.zeros(11, dtype=int)) is None

@@ -1,5 +1,6 @@
 """Intervals and bands beside modes from a noisy sweep: sweeps by closed form, records by scipy."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -196,7 +197,7 @@ def test_a_study_hands_every_learner_what_it_knows(monkeypatch):
 
 @pytest.mark.slow
 def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
-    """Where moduli count as exact it does not: a fifth or less of N1 was inside."""
+    """Where moduli count as exact that of the laws at hand does not: a fifth or less was inside."""
     inside = {}
     unseen = records(0, rates=(4.0,))
     exact = stress(4.0, "N1")[1]
@@ -207,6 +208,9 @@ def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
             relaxation_time=spectrum.relaxation_time,
             modulus_covariance=spectrum.modulus_covariance if known else None,
         ).fit(records(0))
+        # Giesekus, one of the named laws, fits only with moduli that may be others
+        assert (dense.draws_.optima is None) == known
+        dense.draws_ = replace(dense.draws_, optima=None)
         low, _, high = dense.predict_band(unseen)[0]["N1"]
         inside[known] = np.mean((exact >= low) & (exact <= high))
     assert inside[True] > 0.9

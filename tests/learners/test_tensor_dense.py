@@ -1,8 +1,10 @@
 """The dense library's bands, on data from simulators that share nothing with the package."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from independent import Giesekus, RoliePoly, UpperConvectedMaxwell
+from independent import KBKZ, Giesekus, RoliePoly, UpperConvectedMaxwell
 from independent import oscillation as imposed
 from independent.noise import white
 
@@ -65,6 +67,28 @@ def test_a_maxwell_fluid_has_narrow_bands_about_maxwell(maxwell):
     assert min(inside.values()) >= 0.9
     # the noise is 1 %, the records are 122; terms that σ12 does not see have a narrow prior
     assert max(width.values()) < 0.06
+
+
+def test_where_a_named_law_fits_the_band_is_of_the_laws_at_hand_alone(maxwell):
+    assert maxwell.draws_.optima is None
+
+
+def test_where_no_named_law_fits_the_band_allows_for_one_more_also_from_a_file(tmp_path):
+    # K-BKZ of scipy, to which none of the five named laws is fitted to the noise
+    law = KBKZ(0.3, -0.15)
+    dense = fitted(law)
+    assert len(np.unique(dense.draws_.optima)) > 1
+    unseen = [run_of(UNSEEN, np.ones_like(TIMES))]
+    (band,) = dense.predict_band(unseen)
+    dense_again = dc.load(dense.save(tmp_path / "law.discover"))
+    (again,) = dense_again.predict_band(unseen)
+    assert np.array_equal(band["N1"], again["N1"])
+    dense.draws_ = replace(dense.draws_, optima=None)
+    (at_hand,) = dense.predict_band(unseen)
+    assert np.all(band["N1"][0] <= at_hand["N1"][0])
+    assert np.all(band["N1"][2] >= at_hand["N1"][2])
+    inside, _ = inside_and_width(dense_again, law)
+    assert inside["N1"] >= 0.9
 
 
 def test_an_estimator_from_a_file_has_the_same_bands(maxwell, tmp_path):

@@ -6,11 +6,11 @@ import pytest
 from matplotlib.path import Path
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import NAMED_BESIDE
+from discover.comparison.judging.dense_library import DENSE, NAMED_BESIDE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
-from discover.report.plots.comparison.flows import _draw_band
+from discover.report.plots.comparison.flows import _condition, _draw_band
 from discover.report.plots.cycles import shade_between
 
 TIMES = np.arange(5.0)
@@ -21,8 +21,12 @@ EMPTY = (np.zeros(0), np.zeros(0))
 @pytest.mark.parametrize(
     ("learner", "detail", "label"),
     [
-        ("tensor_dense", None, "95 % of the dense library's laws"),
-        ("tensor_dense", NAMED_BESIDE, "95 % of the dense library's laws, and of named effects"),
+        ("tensor_dense", None, "laws that fit σ₁₂, no claim beyond them"),
+        (
+            "tensor_dense",
+            NAMED_BESIDE,
+            "laws and named effects that fit σ₁₂, no claim beyond them",
+        ),
         ("tbnn_ude", None, "networks that fit as well"),
     ],
 )
@@ -35,6 +39,15 @@ def test_the_band_of_a_learner_is_shaded_under_its_name(learner, detail, label):
     _draw_band(panel, comparison, FLOW, "N1", TIMES >= 0)
     assert [shade.get_label() for shade in panel.collections] == [label]
     plt.close(drawing)
+
+
+@pytest.mark.parametrize("drawn", [True, False])
+def test_a_picture_says_what_the_dense_band_takes_for_granted_where_it_is_drawn(drawn):
+    bands = {FLOW.key: {"N1": (0.0 * TIMES, TIMES)} if drawn else None}
+    outcomes = {DENSE: LearnerOutcome(DENSE, (), 1.0, EMPTY, bands=bands)}
+    comparison = Comparison("", "", "", [FLOW], {}, outcomes, None, None, (), ())
+    said = _condition(comparison, FLOW)
+    assert ("no claim about any other" in said) == drawn
 
 
 def test_a_band_along_a_closed_curve_is_shaded_where_it_goes_and_nowhere_else():

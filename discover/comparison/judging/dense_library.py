@@ -23,6 +23,16 @@ DENSE = "tensor_dense"
 NAMED_BESIDE = "flows_with_named_effects"
 """Detail of the dense library: keys of the flows whose band is that of effects with a name too."""
 
+ANY_N2 = "flows_with_any_second_normal_stress"
+"""Detail of the dense library: keys of the flows whose band of N2 holds that of any polymer."""
+
+GREEN_BAND = (
+    "Shaded in green is where 95 % of the laws that fit σ₁₂ lie, those of the dense library and "
+    "what has a name: a range for a fluid that behaves like one of them, behind an instrument that "
+    "is sound or has a flaw with a name, and no claim about any other."
+)
+"""Sentence of a picture that draws the dense library's band."""
+
 _FLOOR = 1e-3
 """Relative misfit that the dense library takes no data to go below."""
 
@@ -150,10 +160,17 @@ def _beside_open(statement: Statement, dense: LearnerOutcome, flows: Sequence[Fl
         return statement
     of = _size_of(quantity)
     told = (
-        f"The dense library's band (± {percent_of(max(widths))} of {of} at the widest) holds 95 % "
-        "of its laws, and of effects with a name, that fit σ12. It is no claim about a fluid "
-        "unlike all of them, nor about one behind an instrument with another flaw."
+        f"The green band (± {percent_of(max(widths))} of {of} at the widest) takes it for granted "
+        "that the fluid behaves like one of the laws that fit σ12, of the dense library or with a "
+        "name, and that the instrument is sound or has a flaw with a name: 95 % of those laws lie "
+        f"in it. Shear stress cannot test that. {quantity} of a fluid unlike all of them, or "
+        "behind an instrument with another flaw, may lie outside."
     )
+    if quantity == "N2" and dense.details.get(ANY_N2):
+        told += (
+            " No law explains the runs, so the band holds all N2 from zero to −2/7 of N1 too, as "
+            "polymer melts and solutions have it."
+        )
     return replace(statement, text=f"{statement.text} {told}")
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
@@ -30,6 +30,9 @@ class DenseDraws:
         In Pa, shape (draws, k); None where all have those declared.
     relaxation
         One where the reference laws bring −σ along, else zero.
+    optima
+        Number of the optimum about which each was drawn, shape (draws,), where no named law fits:
+        the fluid's is then one more, and the band of N1 allows for it. None where one fits.
     """
 
     constants: Float[np.ndarray, "draws 5"]
@@ -37,6 +40,7 @@ class DenseDraws:
     weights: Float[np.ndarray, " draws"]
     relaxation: float
     moduli: Float[np.ndarray, "draws k"] | None = None
+    optima: Int[np.ndarray, " draws"] | None = None
 
     def laws(self, library: TermLibrary, base: AbstractConstitutiveLaw) -> WeightedLaws:
         """Return the laws, dimensionless, the known one included."""
@@ -57,4 +61,4 @@ class DenseDraws:
             )
 
         laws = eqx.filter_vmap(law)(jnp.asarray(self.constants), jnp.asarray(self.coefficients))
-        return WeightedLaws(laws, self.weights, self.moduli)
+        return WeightedLaws(laws, self.weights, self.moduli, self.optima)

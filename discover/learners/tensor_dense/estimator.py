@@ -174,6 +174,7 @@ class TensorDense(RunPrediction):
             found.weights_of_draws,
             float(_reference(problem).relaxation),
             found.moduli if np.any(np.asarray(problem.modulus_error)) else None,
+            None if found.named_law_fits else found.optimum_of_draw,
         )
         self.law_ = LibraryExpansion(
             coefficients=jnp.asarray(self.coefficients_),
@@ -218,7 +219,8 @@ class TensorDense(RunPrediction):
         Returns
         -------
         For each run ``"sigma12"``, ``"N1"`` and ``"N2"``: lowest, middle and highest value in Pa at
-        its samples, shape (3, n). None where laws of more than half of the weight run away.
+        its samples, shape (3, n); where no named law fits, those of N1 allow for a law of one more
+        kind. None where laws of more than half of the weight run away.
         """
         check_is_fitted(self, "fluid_")
         fluid, runs = self.fluid_, self._runs(X)

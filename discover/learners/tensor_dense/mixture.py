@@ -22,6 +22,7 @@ from discover.learners.tensor_dense.posterior import (
 from discover.learners.tensor_dense.reference_laws import (
     REFERENCES,
     fit_reference,
+    left_beside_modes,
     with_reference,
 )
 from discover.learners.trajectories.modulus_errors import modulus_columns
@@ -40,6 +41,9 @@ SHARED = 0.5
 
 _NAMED_FITS = 1.05
 """A named law fits whose own misfit is at most so many times the noise."""
+
+_NAMED_NEARLY_FITS = 1.1
+"""Up to so many times the noise a named law is not ruled out, for 64 terms take up noise too."""
 
 _PAIRS = 4
 """Draws about an optimum, in pairs of opposites."""
@@ -111,6 +115,8 @@ class Mixture:
         Of each draw in Pa, shape (draws, k).
     weights_of_draws
         Adding up to one, shape (draws,).
+    named_law_fits
+        Whether one of the reference laws by itself may be the fluid's.
     """
 
     optima: tuple[Optimum, ...]
@@ -122,6 +128,7 @@ class Mixture:
     coefficients: Float[np.ndarray, "draws n"]
     moduli: Float[np.ndarray, "draws k"]
     weights_of_draws: Float[np.ndarray, " draws"]
+    named_law_fits: bool
 
 
 def explore(
@@ -186,6 +193,7 @@ def explore(
         np.concatenate([laws for laws, _ in drawn]) * scale,
         np.concatenate([moduli for _, moduli in drawn]),
         (weights / counts)[owner],
+        _named_law_fits(problem, references, scale, noise, records),
     )
 
 
@@ -205,6 +213,23 @@ def _independent(problem, residual) -> float:
     """Return how many independent records a residual is worth."""
     worth = noise_model([residual[rows] for rows in problem.sequences()]).effective_samples
     return float(np.clip(worth, _FEWEST_RECORDS, problem.n_observations))
+
+
+def _named_law_fits(problem, references, scale, noise: float, records: float) -> bool:
+    """Return whether a reference law may be the fluid's, its moduli as a sweep leaves them."""
+    allowed = _NAMED_NEARLY_FITS * noise
+    if any(misfit <= allowed for _, misfit in references.values()):
+        return True
+    if not np.any(np.asarray(problem.modulus_error)):
+        return False
+    n, nothing = len(scale), np.zeros(len(scale))
+    for name, (constants, _) in references.items():
+        at = with_reference(problem, constants)
+        shifts = modulus_columns(at, range(n), n, nothing, np.zeros(0))
+        prior = noise / np.sqrt(records)
+        if left_beside_modes(problem, name, constants, shifts, prior) <= allowed:
+            return True
+    return False
 
 
 def _weights(fitting: list[Optimum], noise: float) -> Float[np.ndarray, " optima"]:

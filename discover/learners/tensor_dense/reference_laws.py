@@ -122,7 +122,6 @@ def with_reference(
 
 def fit_reference(problem: TrajectoryProblem, name: str) -> tuple[Float[np.ndarray, " 5"], float]:
     """Return the constants of a reference law that fit best, and the relative misfit."""
-    target = np.asarray(problem.weight * problem.target).reshape(-1)
     free = REFERENCES[name].free
     places = list(free)
 
@@ -133,12 +132,7 @@ def fit_reference(problem: TrajectoryProblem, name: str) -> tuple[Float[np.ndarr
         return filled
 
     def residual(values) -> np.ndarray:
-        at = with_reference(problem, constants(values))
-        nothing = jnp.zeros((1, len(problem.library)))
-        predicted = predict_many(at, jnp.arange(nothing.shape[1]), nothing, jnp.zeros((1, 0)))
-        largest = _RUNAWAY / np.sqrt(target.size)
-        left = np.nan_to_num(np.asarray(predicted)[0] - target, nan=largest)
-        return np.clip(left, -largest, largest)
+        return _residual(problem, constants(values))
 
     values = np.zeros(0)
     if free:
@@ -153,3 +147,47 @@ def fit_reference(problem: TrajectoryProblem, name: str) -> tuple[Float[np.ndarr
         )
         values = found.x
     return constants(values), float(np.linalg.norm(residual(values)))
+
+
+def left_beside_modes(
+    problem: TrajectoryProblem,
+    name: str,
+    constants: Float[np.ndarray, " 5"],
+    shifts: Float[np.ndarray, "rows k"],
+    prior: float,
+) -> float:
+    """Return the relative misfit of a fitted reference law where the moduli may move too.
+
+    To first order, constants moving along.
+
+    Parameters
+    ----------
+    problem, name, constants
+        Data, law, and its constants as `fit_reference` returns them.
+    shifts
+        Change of the weighted predictions with each error of the moduli, of unit size.
+    prior
+        Weight of such an error beside the relative misfit, σ/√n.
+    """
+    residual, columns = _residual(problem, constants), [shifts]
+    for place in REFERENCES[name].free:
+        moved = constants.copy()
+        moved[place] += _STEP
+        columns.append((_residual(problem, moved) - residual)[:, None] / _STEP)
+    design = np.hstack(columns)
+    errors = shifts.shape[1]
+    held = np.hstack([prior * np.eye(errors), np.zeros((errors, design.shape[1] - errors))])
+    target = np.append(-residual, np.zeros(errors))
+    change = np.linalg.lstsq(np.vstack([design, held]), target, rcond=None)[0]
+    return float(np.linalg.norm(residual + design @ change))
+
+
+def _residual(problem: TrajectoryProblem, constants) -> Float[np.ndarray, " rows"]:
+    """Return prediction minus data of a reference law; where it runs away, of a size that shows."""
+    target = np.asarray(problem.weight * problem.target).reshape(-1)
+    at = with_reference(problem, constants)
+    nothing = jnp.zeros((1, len(problem.library)))
+    predicted = predict_many(at, jnp.arange(nothing.shape[1]), nothing, jnp.zeros((1, 0)))
+    largest = _RUNAWAY / np.sqrt(target.size)
+    left = np.nan_to_num(np.asarray(predicted)[0] - target, nan=largest)
+    return np.clip(left, -largest, largest)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import NAMED_BESIDE
+from discover.comparison.judging.dense_library import DENSE, GREEN_BAND, NAMED_BESIDE
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
@@ -106,7 +106,8 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is what the data leave open: the 95 % "
             "intervals of the parameters, and the rival laws; what is not determined has no such "
-            "band. Curves of the known part alone may leave the frame.",
+            f"band.{_condition(comparison, flow)} Curves of the known part alone may leave the "
+            "frame.",
         )
 
 
@@ -135,7 +136,8 @@ def start_up_picture(
         return picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
+            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}."
+            f"{_condition(comparison, flow)}",
         )
 
 
@@ -178,6 +180,14 @@ def _seen(comparison: Comparison, flow: Flow) -> str:
     return "no learner saw this flow."
 
 
+def _condition(comparison: Comparison, flow: Flow) -> str:
+    """Return what the dense library's band takes for granted, where it is drawn."""
+    dense = comparison.outcomes.get(DENSE)
+    if dense is None or dense.bands.get(flow.key) is None:
+        return ""
+    return f" {GREEN_BAND}"
+
+
 def _new_kind(comparison: Comparison) -> str:
     """Return how a start-up differs from the flows fitted."""
     if all(flow.oscillatory for flow in comparison.flows_of("training")):
@@ -186,12 +196,12 @@ def _new_kind(comparison: Comparison) -> str:
 
 
 _FITTING_AS_WELL = {
-    "tensor_dense": "95 % of the dense library's laws",
+    "tensor_dense": "laws that fit σ₁₂, no claim beyond them",
     "tbnn_ude": "networks that fit as well",
 }
 
 
-_WITH_NAMES = "95 % of the dense library's laws, and of named effects"
+_WITH_NAMES = "laws and named effects that fit σ₁₂, no claim beyond them"
 
 
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
