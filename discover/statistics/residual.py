@@ -265,6 +265,9 @@ class Expectation:
             return True
         if self.noise is not None:
             return error <= float(np.hypot(self.noise, self.linear_error))
+        if self.patterned == 0.0:
+            # what changes from sample to sample may by chance seem to be all there is
+            return False
         fast = summarise(np.asarray(residual)[rows], np.asarray(weight)[rows]).noise
         pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
         return pattern <= self.patterned
