@@ -92,7 +92,8 @@ class ToleratedMisfit:
         known = self.expectation.noise is not None and left.misfit <= left.expected
         if probability > SIGNIFICANCE or known:
             return left
-        if pattern <= STRUCTURE * self.expectation.linear_error:
+        linear_error = self.expectation.linear_error
+        if linear_error > 0.0 and pattern <= STRUCTURE * linear_error:
             return left
         reason = f"what is left ({percent_of(left.misfit)}) has {PATTERN}"
         return replace(
