@@ -17,7 +17,6 @@ from discover.identify import Structure
 from discover.identify.exact.relations import spell_briefly
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.kinematics import ONLY_STATES
-from discover.statistics import LackOfFit
 from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
@@ -47,12 +46,6 @@ _AS_MANY_TERMS = (
     "terms follow so few flows of a fluid that the library does not hold, and {} is not "
     "determined. Fit more runs."
 )
-_ONE_TERM_MORE = (
-    "But with one term of the library more, {}, as large as the noise lets it be, {} would be open "
-    "to ± {}, so these data do not determine it. Less noise would, or a faster run."
-)
-_MOVED = 0.1
-"""Of N1, so much may one term more leave open in what is said to be determined."""
 IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -229,24 +222,12 @@ def make_statements(
         elif not quantity.open and _flows_measured(flows) <= n_terms:
             text = _AS_MANY_TERMS.format(n_terms, quantity.quantity)
         elif not quantity.open:
-            left = explanation.lack_of_fit["tensor_sindy"]
-            check = check_band(quantity.quantity, flows, bands or {}, left.noise)
+            noise = explanation.lack_of_fit["tensor_sindy"].noise
+            check = check_band(quantity.quantity, flows, bands or {}, noise)
             determined = IN_LIBRARY if check.holds else "no"
             text = f"{text} {_of_band(quantity.quantity, check)}"
-            more = at.one_more.get(quantity.quantity)
-            moved = 0.0 if more is None else more.per_noise * _of_few(left)
-            if check.holds and more is not None and moved > _MOVED:
-                determined = "no"
-                more = _ONE_TERM_MORE.format(more.term, quantity.quantity, percent_of(moved))
-                text = f"{quantity.text} {more}"
         found.append(Statement(quantity.quantity, determined, text))
     return found
-
-
-def _of_few(left: LackOfFit) -> float:
-    """Return the noise, larger by as much as its samples are fewer that are independent."""
-    correlation = float(np.clip(left.lag_one_correlation, 0.0, 0.95))
-    return left.noise * float(np.sqrt((1.0 + correlation) / (1.0 - correlation)))
 
 
 def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
