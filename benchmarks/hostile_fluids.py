@@ -57,7 +57,7 @@ def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path
         write_table(data / name, run.columns)
         lines.append(",".join([name, *(str(run.cells.get(key, "")) for key in keys)]))
     (data / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    source = {"folder": str(data.resolve())}
+    source = {"folder": str(data.resolve()), **case.told}
     if case.held_out:
         source["held_out"] = list(case.held_out)
     lot = np.random.default_rng([seed, 99])
@@ -66,7 +66,8 @@ def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path
         rough = {k: v if k in told else v * (1 + 0.01 * lot.standard_normal(len(v)))
                  for k, v in columns.items()}  # fmt: skip
         write_table(data / name, rough)
-        source[name.removesuffix(".csv")] = "fit"
+        if name != "lve.csv":  # the modes come from it
+            source[name.removesuffix(".csv")] = "fit"
     own = {
         "close-loop": {"loop": {"max_effects": 3}},
         "compare": {"compare": {"learners": ["tensor_sindy"], "library": {"degree": 1}}},

@@ -1,6 +1,21 @@
 """What an evaluator might hand over, and what is true of it. Rules are in `hostile_fluids.py`."""
 
 import numpy as np
+from hostile_fluids_laboratory import (
+    Ageing,
+    CriticalSlip,
+    Networked,
+    PlatePlate,
+    averaged,
+    each,
+    growths,
+    mislabelled,
+    sweep_of,
+    times_stress,
+    to_strain,
+    warmed,
+    with_n1,
+)
 from hostile_fluids_materials import (
     Elastoplastic,
     Heated,
@@ -53,12 +68,14 @@ from hostile_fluids_records import (
 from independent import (
     KBKZ,
     Giesekus,
+    JohnsonSegalman,
     Modes,
     Newtonian,
     PhanThienTanner,
     RoliePoly,
     UpperConvectedMaxwell,
     WhiteMetzner,
+    start_up,
 )
 
 _SHEAR = {"planted": MOBILITY, "terms": SQUARE}
@@ -269,6 +286,75 @@ TESTS = {
                         tables=curve(KBKZ(0.25, **SCALE))),
 }  # fmt: skip
 
+_RATES = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.0}
+_FEW_LOG = growths(np.geomspace(0.05, 8.0, 15), _RATES)
+_FIVE = growths(np.linspace(0.1, 8.0, 80), _RATES)
+_LOW = growths(np.geomspace(0.1, 20.0, 80), {"a.csv": 0.05, "b.csv": 0.1, "c.csv": 0.2})
+_TIMES, _MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
+_MODES = {
+    "a.csv": (start_up(0.1), np.geomspace(0.1, 40.0, 80)),
+    "b.csv": (start_up(1.0), np.geomspace(0.05, 20.0, 80)),
+    "c.csv": (start_up(5.0), np.geomspace(0.02, 6.0, 80)),
+    "held.csv": (start_up(2.0), np.geomspace(0.03, 10.0, 80)),
+}
+_SWEEP = {"law": "ucm", "modes": "lve"}
+_WRONG_SWEEP = {
+    "tables": sweep_of((23.0, 52.2, 134.4), _TIMES), "model": _SWEEP, "outside": True,
+    "same_as": (*_GAINS, "relaxation_mode"),
+}  # fmt: skip
+_BOTH = Modes(
+    Giesekus(0.3, 60.0, 1.0),
+    PhanThienTanner(0.3, "linear", modulus=60.0, relaxation_time=0.2),
+)
+_WITH_N1 = {"told": {"observe": ["sigma12", "N1"]}, "outside": True,
+            "same_as": ("giesekus_mobility",)}  # fmt: skip
+_ALSO_GIESEKUS = {"outside": True, "same_as": ("giesekus_mobility",)}
+LABORATORY = {
+    "plates_giesekus": Case("Giesekus between plates, torque not corrected",
+                            recorded(PlatePlate(GIESEKUS)), **_ALSO_GIESEKUS),
+    "plates_strong": Case("Giesekus of 0.6 between plates, torque not corrected",
+                          recorded(PlatePlate(Giesekus(0.6, **SCALE))), **_ALSO_GIESEKUS),
+    "plates_js": Case("Johnson–Segalman between plates, torque not corrected",
+                      recorded(PlatePlate(JohnsonSegalman(0.3, **SCALE))), outside=True,
+                      same_as=("non_affine_motion",)),
+    "plates_ptt": Case("linear PTT between plates, torque not corrected",
+                       recorded(PlatePlate(PhanThienTanner(0.3, "linear", **SCALE))),
+                       outside=True, same_as=("ptt_linear",)),
+    "wrong_sweep": Case("three Maxwell modes, moduli told 15, −13 and 12 % off",
+                        recorded(Modes(*map(UpperConvectedMaxwell, _MODULI, _TIMES)), _MODES),
+                        **_WRONG_SWEEP),
+    "mixed_laws": Case("Giesekus in one mode, linear PTT in the other", recorded(_BOTH),
+                       tables=sweep_of((60.0, 60.0), (1.0, 0.2)), model=_SWEEP, outside=True,
+                       same_as=("giesekus_mobility", "ptt_linear")),
+    "few_log_k_bkz": Case("K-BKZ, 15 samples a run, evenly in log t",
+                          recorded(KBKZ(0.25, **SCALE), _FEW_LOG), outside=True),
+    "short_k_bkz": Case("K-BKZ, start-ups that end at a strain of 1.2",
+                        recorded(KBKZ(0.25, **SCALE), to_strain(1.2, _RATES)), outside=True),
+    "low_ptt": Case("linear PTT, Wi up to 0.2, none held out",
+                    recorded(PhanThienTanner(0.3, "linear", **SCALE), _LOW), held_out=(),
+                    planted={"ptt_linear": {"epsilon": 0.3}}),
+    "mislabelled": Case("Giesekus, one rate told 20 % high",
+                        each(mislabelled("b.csv", 1.2), flows=_FIVE), **_ALSO_GIESEKUS),
+    "fillings": Case("Giesekus, gaps filled by 1, 1.05, 0.95, held 1.03",
+                     each(times_stress({"fast.csv": 1.05, "wave.csv": 0.95, "held.csv": 1.03})),
+                     **_ALSO_GIESEKUS),
+    "warmed": Case("Giesekus, relaxation times 1, 0.95, 0.9, held 0.85 s",
+                   warmed({"slow.csv": 1.0, "fast.csv": 0.95, "wave.csv": 0.9, "held.csv": 0.85}),
+                   **_ALSO_GIESEKUS),
+    "averaged": Case("Giesekus, means over 0.5 s told", averaged(0.5), **_ALSO_GIESEKUS),
+    "n1_offset": Case("Giesekus, N1 fitted too, 20 Pa on it", each(with_n1(20.0)), **_WITH_N1),
+    "n1_gain": Case("Giesekus, N1 fitted too, read 15 % high", each(with_n1(gain=1.15)),
+                    **_WITH_N1),
+    "networked": Case("Giesekus in a permanent network of 15 Pa", recorded(Networked(GIESEKUS)),
+                      outside=True, same_as=("giesekus_mobility", "relaxation_mode")),
+    "ageing": Case("Giesekus, its time grows by 3 % a second", recorded(Ageing(GIESEKUS)),
+                   **_ALSO_GIESEKUS),
+    "critical_slip": Case("Giesekus, slip beyond 60 Pa, with a memory",
+                          recorded(CriticalSlip(GIESEKUS)), outside=True,
+                          same_as=("giesekus_mobility", "wall_slip")),
+}  # fmt: skip
+
 CASES: dict[str, Case] = {
-    **EMPTY, **FLUIDS, **FAULTS, **SAMPLING, **NONE_HELD, **TESTS, **DECLARED, **NOISY
+    **EMPTY, **FLUIDS, **FAULTS, **SAMPLING, **NONE_HELD, **TESTS, **DECLARED, **NOISY,
+    **LABORATORY,
 }  # fmt: skip

@@ -92,6 +92,8 @@ class Case:
         Makes tables beside the runs, by file name, without noise; each is fitted.
     model
         Section of the study, for both commands.
+    told
+        Further entries of the study's section of data.
     """
 
     truth: str
@@ -105,6 +107,7 @@ class Case:
     tables: Callable[[], dict[str, dict[str, np.ndarray]]] | None = None
     model: Mapping[str, Any] = field(default_factory=lambda: dict(KNOWN))
     held_out: tuple[str, ...] = ("held.csv",)
+    told: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,9 @@ from hostile_fluids_records import Case, Record
 from independent.noise import rms
 
 Records = dict[str, Record]
-QUANTITY = {"stress_Pa": "sigma12", "strain": "strain"}
+QUANTITY = {
+    "stress_Pa": "sigma12", "strain": "strain", "tensile_stress_Pa": "tensile_stress"
+}  # fmt: skip
 
 
 def judge(case: Case, task: str, folder: Path, clean: Records, noisy: Records) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
 from discover.dataset.run import same_samples
+from discover.dataset.spikes import without_spikes
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import with_rate_steps
-from discover.statistics import isolated
 from discover.statistics.residual import fast_part
 
 FEWEST_LINEAR_SAMPLES = 10
@@ -89,10 +89,10 @@ def split_runs(
 def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:
     """Give the runs without the samples that stand alone in them, whose times are noted."""
     for run in runs:
-        off = isolated(run.recorded)
-        if np.any(off):
-            spikes[run.name] = [float(t) for t in run.time[off]]
-        yield run.window(~off) if np.any(off) else run
+        left, times = without_spikes(run)
+        if times:
+            spikes[run.name] = times
+        yield left
 
 
 def with_later_spikes(

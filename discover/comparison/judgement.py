@@ -45,6 +45,7 @@ from discover.comparison.judging.next_measurement import (
     bands_of_law,
     next_measurement,
 )
+from discover.comparison.judging.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.second_normal_stress import with_any_second_normal_stress
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
@@ -148,6 +149,10 @@ def judge(
     if of_modes.alike is not None and explanation.in_library:
         outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
         tested = replace(tested, bands=holding_modes_apart(tested.bands, of_modes.alike))
+    if explanation.in_library:
+        left = explanation.lack_of_fit["tensor_sindy"]
+        wider = holding_one_term_more(tested.bands, beside.structure, left, frame.flows)
+        tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)

@@ -12,6 +12,7 @@ from discover.comparison.fitting.prepared import (
     require_one_known_law,
     settled_by,
     thinned_to,
+    without_spikes_in_fit,
 )
 from discover.comparison.fitting.step_instants import with_step_instants
 from discover.comparison.fitting.training import study_library
@@ -75,7 +76,9 @@ def compare(
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)
+    of_spikes = ""
     if made is None:  # estimators that are fitted already saw every sample
+        data, of_spikes = without_spikes_in_fit(data)
         data = thinned_to(data, options.most_samples)
     require_teacher(study)
     sweep = sweep_studies(study)
@@ -137,7 +140,7 @@ def compare(
         name=study.name,
         data_summary=data_in_words(data, study)
         + (_TAKEN_OUT if known.along is None and known.effects else "")
-        + (f". {of_steps}" if of_steps else "")
+        + "".join(f". {text}" for text in (of_steps, of_spikes) if text)
         + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
         known_part=known_in_words(declared, known, study),
         flows=known.flows,

@@ -20,6 +20,7 @@ from discover.statistics.residual import (
     STRUCTURE,
     Expectation,
     fast_part,
+    slow_part,
     tells_noise,
 )
 from discover.statistics.whiteness import SIGNIFICANCE
@@ -137,7 +138,7 @@ def refutes(unseen: Unseen, residuals: Rows, records: Rows, expectation: Expecta
 def _allowed(unseen: Unseen, expectation: Expectation) -> bool:
     """Return whether these runs are missed by no more than is known to be wrong with them."""
     fast, slow = _parts(unseen)
-    if slow <= expectation.patterned:
+    if expectation.patterned > 0.0 and slow <= expectation.patterned:
         return True
     given = expectation.noise
     if given is None:
@@ -150,8 +151,7 @@ def _parts(unseen: Unseen) -> tuple[float, float]:
     sizes = []
     for row, record in zip(unseen.residuals, unseen.records, strict=True):
         scale = float(np.sqrt(np.mean(np.square(record)))) or 1.0
-        power, fast = float(np.mean(np.square(row))), fast_part(row)
-        sizes.append([fast / scale, np.sqrt(max(power - fast**2, 0.0)) / scale])
+        sizes.append([fast_part(row) / scale, slow_part(row) / scale])
     fast, slow = np.sqrt(np.mean(np.square(sizes), axis=0))
     return float(fast), float(slow)
 

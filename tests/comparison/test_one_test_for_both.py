@@ -16,6 +16,7 @@ from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.least_squares import Fit
 from discover.protocols import start_up
+from discover.protocols.control import steady_rates
 from discover.statistics.residual import Expectation
 
 TIMES = np.linspace(0.1, 10.0, 120)
@@ -97,3 +98,18 @@ def test_the_same_residuals_have_the_same_verdict_in_both(kind, expectation, ver
     assert looped.left.misfit == pytest.approx(compared.misfit)
     assert looped.left.probability == pytest.approx(compared.probability)
     assert looped.left.outliers == compared.outliers
+
+
+@pytest.mark.parametrize("seed", [9, 87, 153])
+def test_a_misfit_of_a_flow_curve_is_none_of_a_sweep_that_errs_by_nothing(seed):
+    # in these draws what changes from point to point seems as large as the misfit beside it
+    rates = np.geomspace(0.1, 10.0, 30)
+    noise = np.random.default_rng(seed).standard_normal(30)
+
+    def said(left, linear_error):
+        run = Run("curve", rates, steady_rates(rates), rates, 100.0 * rates**0.3 - left)
+        return said_by_loop([run], [left], Expectation(linear_error=linear_error)).verdict
+
+    assert said(noise + 0.9, 0.0) == "unexplained"
+    assert said(noise + 0.9, 0.02) == "no_effect_needed"
+    assert said(noise, 0.0) == "no_effect_needed"

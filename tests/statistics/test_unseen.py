@@ -5,7 +5,8 @@ import pytest
 from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
-from discover.statistics.residual import Expectation
+from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.residual import Expectation, fast_part
 from discover.statistics.unseen import Unseen, refutes
 
 TIMES = np.geomspace(0.05, 10.0, 80)
@@ -99,3 +100,26 @@ def test_what_is_wrong_is_refuted_without_its_knocks_too(responses):
     wrong = [knocked(unseen(responses, 1e-3, 0.0, extra, seed), seed) for seed in range(10)]
     found = [against(one.without_outliers(Expectation())) for one in wrong]
     assert np.mean(found) >= 0.9
+
+
+@pytest.mark.parametrize("seed", [24, 103, 112, 158])
+def test_a_misfit_refutes_a_law_though_the_noise_seems_to_be_all_there_is(responses, seed):
+    # in these draws what changes from sample to sample seems as large as the misfit beside it
+    record = responses[ALPHA]
+    size = 0.01 * np.sqrt(np.mean(record**2))
+    noise = size * np.random.default_rng(seed).standard_normal(len(record))
+    row = noise + 0.9 * size
+    assert fast_part(row) > np.sqrt(np.mean(row**2))
+
+    def left(residual, expectation=None):
+        return against(Unseen([residual], [record], [np.zeros((0, 80))], np.ones(1)), expectation)
+
+    # a sweep that errs by a tenth of that excuses it no more than one that errs by nothing
+    for little in (None, Expectation(linear_error=5e-4)):
+        assert left(row, little)
+        assert what_is_left([row], [record], little).verdict == "unexplained"
+    # the noise alone is none, nor is what a sweep of that error leaves
+    assert not left(noise)
+    assert what_is_left([noise], [record]).verdict == "explained"
+    assert not left(row, Expectation(linear_error=0.01))
+    assert what_is_left([row], [record], Expectation(linear_error=0.01)).verdict == "explained"

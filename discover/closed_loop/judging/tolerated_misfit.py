@@ -13,7 +13,7 @@ from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
-from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, fast_part, tells_noise
+from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, slow_part, tells_noise
 from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
 from discover.words import percent_of
 
@@ -86,13 +86,12 @@ class ToleratedMisfit:
         if left.verdict != "explained" or not separate:
             return left
         probability = separate_probability([row for row, _ in separate])
-        fast = np.array([fast_part(row) / size for row, size in separate])
-        sizes = np.array([np.sqrt(np.mean(row**2)) / size for row, size in separate])
-        pattern = float(np.mean(np.sqrt(np.maximum(sizes**2 - fast**2, 0.0))))
+        pattern = float(np.mean([slow_part(row) / size for row, size in separate]))
         known = self.expectation.noise is not None and left.misfit <= left.expected
         if probability > SIGNIFICANCE or known:
             return left
-        if pattern <= STRUCTURE * self.expectation.linear_error:
+        linear_error = self.expectation.linear_error
+        if linear_error > 0.0 and pattern <= STRUCTURE * linear_error:
             return left
         reason = f"what is left ({percent_of(left.misfit)}) has {PATTERN}"
         return replace(

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from discover.dataset import Run
 from discover.dataset.material_functions import as_compared
+from discover.dataset.spikes import without_spikes
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.learners.runs import waiting
@@ -44,6 +45,21 @@ def thinned_to(data: StudyData, most: int) -> StudyData:
     than its hundreds do. What was thinned says so.
     """
     return with_each_run(data, lambda run: thin_run(run, most))
+
+
+def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
+    """Return data whose fitted runs lack the samples that stand alone, and words on them.
+
+    Squares would let them bend the law. Those of runs held out stay, and do not judge.
+    """
+    parts = [without_spikes(run) for run in data.fit.runs]
+    told = [f"{len(times)} of {run.name}" for run, times in parts if times]
+    if not told:
+        return data, ""
+    fit = replace(data.fit, runs=tuple(run for run, _ in parts))
+    return replace(data, fit=fit), (
+        f"Left out before the fit, for they stand alone: {', '.join(told)} samples"
+    )
 
 
 def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:

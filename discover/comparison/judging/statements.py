@@ -41,6 +41,11 @@ _UNTESTED = (
     "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
     "tested the law, and {} is not determined. Fit another run, or hold one out."
 )
+_AS_MANY_TERMS = (
+    "The law has {} terms, and no more flows than that were measured, fitted and held out: so many "
+    "terms follow so few flows of a fluid that the library does not hold, and {} is not "
+    "determined. Fit more runs."
+)
 IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -214,6 +219,8 @@ def make_statements(
             text = ONLY_STATES
         elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
+        elif not quantity.open and _flows_measured(flows) <= n_terms:
+            text = _AS_MANY_TERMS.format(n_terms, quantity.quantity)
         elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
             check = check_band(quantity.quantity, flows, bands or {}, noise)
@@ -228,15 +235,19 @@ def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
 
     As `discover.closed_loop.explanations.untested` asks of a loop; a law without terms takes one.
     """
-    measured = _measured(flows)
-    count = sum(len(flow.times) if flow.is_of_states else 1 for flow in measured)
-    return {flow.kind for flow in measured} == {"training"} and count <= max(n_terms, 1)
+    kinds = {flow.kind for flow in _measured(flows)}
+    return kinds == {"training"} and _flows_measured(flows) <= max(n_terms, 1)
 
 
 def only_states(flows: Sequence[Flow]) -> bool:
     """Return whether all that was measured are steady or periodic states, and no transient."""
     measured = _measured(flows)
     return bool(measured) and all(flow.is_of_states for flow in measured)
+
+
+def _flows_measured(flows: Sequence[Flow]) -> int:
+    """Return how many flows were fitted or held out; each state of a table is one."""
+    return sum(len(flow.times) if flow.is_of_states else 1 for flow in _measured(flows))
 
 
 def _measured(flows: Sequence[Flow]) -> list[Flow]:

@@ -8,7 +8,7 @@ arithmetic where the law is a polynomial.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -24,6 +24,7 @@ from discover.identify.exact.exact_series import compare_series
 from discover.identify.exact.relations import TermRelation, spell_briefly, term_relations
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense, joint_library
 from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
+from discover.identify.structure.one_term_more import OneTermMore, each_moved
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
@@ -106,6 +107,8 @@ class LawStructure(NotebookView):
         Number of exact directions that would be left if N1 were measured as well.
     N2_with_N1
         Verdict on N2 if N1 were measured as well.
+    one_more
+        By quantity, the term beyond the law that leaves it most open.
     """
 
     name: str
@@ -116,6 +119,7 @@ class LawStructure(NotebookView):
     quantities: tuple[QuantityVerdict, ...]
     n_exact_with_N1: int
     N2_with_N1: Verdict
+    one_more: Mapping[str, OneTermMore] = field(default_factory=dict)
 
     @property
     def text(self) -> str:
@@ -151,6 +155,7 @@ class LawStructure(NotebookView):
             "quantities": [asdict(q) for q in self.quantities],
             "unseen_directions_with_N1": self.n_exact_with_N1,
             "N2_with_N1": self.N2_with_N1,
+            "one_term_more": {q: one.to_json() for q, one in self.one_more.items()},
             "text": self.text,
         }
 
@@ -304,8 +309,10 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
     elif n2_with_n1 == "undetermined" and verdicts[1].verdict == "undetermined":
         text = verdicts[1].text + " Measuring N1 as well would not change this."
         verdicts = (verdicts[0], replace(verdicts[1], text=text))
+    support = [library.names.index(term) for term in law.coefficients]
+    moved = each_moved(library.names, support, blocks, observed, int(total))
     return LawStructure(
-        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1
+        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
     )
 
 
