@@ -139,10 +139,9 @@ def solved_on_grid(
     together
         Whether the samples are of use only together, and not one is solved for once another cannot.
     """
-    dynamics = make(numbers)
+    dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
-        return _at_given_stress(dynamics, protocol, grid)
-    fixed = make(without_derivatives(numbers))
+        return _at_given_stress(dynamics, fixed, protocol, grid)
 
     phase = grid.phase
     assert phase is not None  # of oscillations
@@ -178,10 +177,10 @@ def solved_on_grid(
 
 
 def _at_given_stress(
-    dynamics: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
+    dynamics: Dynamics, fixed: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> AtSamples:
     imposed = jax.vmap(protocol.rate)(grid.times)  # the table holds the stress
-    answer = answer_to_stress(dynamics, grid.times, imposed, 0.0, protocol.kinematics)
+    answer = answer_to_stress(dynamics, grid.times, imposed, 0.0, protocol.kinematics, fixed)
     strain, states, rate = (part[grid.sample_index] for part in answer)
     s11, s22, s33, _ = jnp.tensordot(states[:, :4], dynamics.modes.modulus, axes=1).T
     observed = jnp.stack([strain, s11 - s22, s22 - s33], axis=-1)

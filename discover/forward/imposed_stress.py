@@ -9,17 +9,11 @@ from jaxtyping import Array, Float
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import StressWeights
 from tensor_library.contraction import contracted
 
 # dγ̇/dt where the rate is asked for, over 1/h, of the rates there less that before: of the parabola
 # through all three
 _RATE_OF_RATE = np.array([[0.0, 1.0], [-4.0, 3.0]])
-
-# Shares of a step of Newton's, with the slopes of the start of the step. Two leave of the strain
-# less than the collocation does, one fails beyond a strain of 0.5 in a step; the last follows the
-# rates that they found
-_CORRECTIONS = np.array([1.0, 1.0, 0.0])
 
 
 class Answer(NamedTuple):
@@ -46,6 +40,7 @@ def answer_to_stress(
     imposed: Float[Array, " s"],
     inertia: Float[Array, ""] | float = 0.0,
     flow: Kinematics | None = None,
+    fixed: Dynamics | None = None,
 ) -> Answer:
     """Return the strain at step ends, and the modes and the rate there.
 
@@ -68,7 +63,11 @@ def answer_to_stress(
         I of the tool in Pa s².
     flow
         Which flow it is; None is simple shear.
+    fixed
+        The fluid once more, through which no derivative passes: where the rate is looked for, those
+        of its law would cost much and say nothing.
     """
+    fixed = dynamics if fixed is None else fixed
     width = jnp.diff(times)
 
     def step(carry, inputs):
@@ -83,34 +82,43 @@ def answer_to_stress(
         wanted = jnp.stack([0.5 * (from_ + target), target])
         accelerated = inertia / h * _RATE_OF_RATE
 
-        def followed(rates):
-            """Return the modes after a step in which the rate goes through these, and the rest."""
+        def followed(fluid: Dynamics, rates):
+            """Return what the balance misses at rates in the middle and at the end; the modes."""
             middle, last = rates
 
             def stage(state, rate):
-                change = slow * dynamics.change(state, rate, slow, flow)
-                remainder = w.remainder(state, change, dynamics.decay)
+                change = slow * fluid.change(state, rate, slow, flow)
+                remainder = w.remainder(state, change, fluid.decay)
                 return remainder, remainder
 
             in_stages = jnp.stack([2.0 * middle - last, middle, middle, last])
             after, remainders = w.step(stress, stage, in_stages)
             there = (w.middle(stress, *remainders), after)
-            felt = jnp.stack([dynamics.recorded(state, flow) for state in there])
+            felt = jnp.stack([fluid.recorded(state, flow) for state in there])
             viscous = dynamics.viscosity * rates
-            return after, wanted - scale * felt - viscous - contracted(accelerated, rates - before)
+            missing = wanted - scale * felt - viscous - contracted(accelerated, rates - before)
+            return missing, after
 
-        stiffness = scale[:, None] * _by_rates(dynamics, w, stress, before, slow, flow)
-        stiffness = stiffness + dynamics.viscosity * jnp.eye(2) + accelerated
-        (a, b), (c, d) = stiffness
+        # one of Newton's steps, with slopes that no derivative passes through
+        rates = jax.lax.stop_gradient(before + bend * h * jnp.array([0.5, 1.0]))
+
+        def as_it_is(rates):
+            missing, _ = followed(fixed, rates)
+            return missing, missing
+
+        stiffness, missing = jax.lax.stop_gradient(jax.jacfwd(as_it_is, has_aux=True)(rates))
+        (a, b), (c, d) = -stiffness
         inverse = jnp.array([[d, -b], [-c, a]]) / (a * d - b * c)
+        rates = rates + contracted(inverse, missing)
 
         def corrected(carry, share):
             rates, _ = carry
-            after, missing = followed(rates)
+            missing, after = followed(dynamics, rates)
             return (rates + share * contracted(inverse, missing), after), None
 
-        rates = before + bend * h * jnp.array([0.5, 1.0])
-        (rates, after), _ = jax.lax.scan(corrected, (rates, stress), _CORRECTIONS)
+        # one more with the same slopes, by which the rates move as the implicit function does, and
+        # the modes at what that found
+        (rates, after), _ = jax.lax.scan(corrected, (rates, stress), jnp.array([1.0, 0.0]))
         mean, last = rates
         sheared_after, felt = dynamics.sheared(after, mean, flow)
         middle = 0.5 * (sheared + scale[1] * sheared_after)
@@ -136,29 +144,3 @@ def answer_to_stress(
     given = dynamics.series.compliance * (imposed - imposed[0])
     strain = strain + given + dynamics.series.slip * jnp.concatenate([jnp.zeros(1), slipped])
     return Answer(strain, stress, rate)
-
-
-def _by_rates(
-    fluid: Dynamics, w: StressWeights, stress, rate, slow, flow: Kinematics | None
-) -> Float[Array, "2 2"]:
-    """Return by how much rates in the middle and at the end of a step change the stress there.
-
-    For the law as it is at the start of the step.
-    """
-
-    def change(rate):
-        return slow * fluid.change(stress, rate, slow, flow)
-
-    _, by_rate = jax.jvp(change, (rate,), (jnp.ones_like(rate),))
-    none = jnp.zeros_like(stress)
-    # what each of the two is in the four stages
-    in_stages = (2.0, 1.0, 1.0, 0.0), (-1.0, 0.0, 0.0, 1.0)
-    return jnp.array(
-        [
-            [
-                fluid.recorded(state_at(none, *(share * by_rate for share in shares)), flow)
-                for shares in in_stages
-            ]
-            for state_at in (w.middle, w.end)
-        ]
-    )
