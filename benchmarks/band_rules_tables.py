@@ -91,7 +91,9 @@ def one_more_law(by: str) -> Rule:
         own = as_it_was(case, flow)
         if len(np.unique(owner[kept])) < 2:
             return own  # what is kept draws none
-        return _joined(own, *one_more(values[kept], owner[kept]))
+        # a law that has gone far is as far as the band, and no farther
+        ends = [np.stack([own[q][i] for q in QUANTITIES], axis=-1) for i in (0, 1)]
+        return _joined(own, *one_more(np.clip(values[kept], *ends), owner[kept]))
 
     return rule
 

@@ -94,7 +94,9 @@ class WeightedLaws:
                     bands.append(None)
                     continue
                 first = QUANTITIES.index("N1")
-                low, high = one_more(values[kept, :, first], self.kinds[kept])
+                # a law that is about to run away is as far as the band, and no farther
+                known = np.clip(values[kept, :, first], limits[0, :, first], limits[-1, :, first])
+                low, high = one_more(known, self.kinds[kept])
                 limits[0, :, first] = np.minimum(limits[0, :, first], low)
                 limits[-1, :, first] = np.maximum(limits[-1, :, first], high)
             bands.append({q: limits[:, :, i] for i, q in enumerate(QUANTITIES)})

@@ -22,7 +22,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid
 from discover.laws.giesekus import Giesekus
-from discover.learners import LearnerResult
+from discover.learners import LearnerResult, weighted_laws
 from discover.learners.weighted_laws import WeightedLaws
 from discover.protocols import start_up
 from discover.statistics.residual import Expectation
@@ -203,3 +203,20 @@ def test_of_laws_of_several_kinds_n1_of_one_more_is_in_the_band(eleven_laws):
         np.testing.assert_array_equal(further[quantity], known[quantity])
     # a single kind says nothing of one more
     assert band_of(np.zeros(11, dtype=int)) is None
+
+
+def test_a_law_that_is_about_to_run_away_does_not_widen_the_band_of_one_more(monkeypatch):
+    own = weighted_laws._predict
+
+    def far(*arguments):
+        predicted = np.array(own(*arguments))
+        predicted[0] *= 1e9
+        return predicted
+
+    monkeypatch.setattr(weighted_laws, "_predict", far)
+    mobilities = jnp.linspace(0.1, 0.9, 41)
+    weights = np.array([0.001, *[0.999 / 40] * 40])
+    laws = WeightedLaws(eqx.filter_vmap(Giesekus)(mobilities), weights, kinds=np.arange(41))
+    result = LearnerResult("tensor_dense", Giesekus(0.3), (), weighted=laws)
+    found = LearnerOutcome.of(result, Fluid.dimensionless(Giesekus(0.3)), [FLOW])
+    assert found.half_widths(FLOW)["N1"] < 2.0
