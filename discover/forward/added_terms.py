@@ -103,9 +103,12 @@ class AddedTerms:
         theta: Float[Array, " p"],
         used: InUse,
         amplitudes: Mapping[str, Float[Array, " k"]] | None = None,
+        in_one_piece: bool = True,
     ) -> ModesRate:
         """Return the function that sums what is in use, dimensionless."""
-        library = self._library_rate(theta, used) if self._library.tensors else _nothing
+        library = (
+            self._library_rate(theta, used, in_one_piece) if self._library.tensors else _nothing
+        )
         others = self._others_rate(theta, used, amplitudes or {}) if self._others else _nothing
 
         def total(state, gradient):
@@ -116,7 +119,7 @@ class AddedTerms:
 
         return total
 
-    def _library_rate(self, theta, used: InUse) -> ModesRate:
+    def _library_rate(self, theta, used: InUse, in_one_piece: bool) -> ModesRate:
         library, matrix = self._library, self._library.matrix(theta)
         # with one tensor in use all other rows are zero
         row = matrix.sum(axis=0)
@@ -127,7 +130,7 @@ class AddedTerms:
         coefficient = _over_modes(
             lambda stress, rate: jnp.sum(row * library.monomials(stress, rate))
         )
-        every = _over_modes(lambda stress, rate: library.sum(matrix, stress, rate))
+        every = _over_modes(lambda stress, rate: library.sum(matrix, stress, rate, in_one_piece))
 
         def one(stress, gradient):
             tensor = jax.lax.switch(used.tensor, tensors, stress, gradient)

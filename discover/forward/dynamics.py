@@ -79,6 +79,8 @@ class Dynamics(NamedTuple):
         Structure variables of each mode that the law has.
     shares
         Of each tensor that stands first among them, of each mode, as the law's.
+    in_one_piece
+        Whether no matrix product stands in the steps; see `contracted`.
     """
 
     slope: Callable
@@ -93,6 +95,7 @@ class Dynamics(NamedTuple):
     states_in_use: Int[Array, ""] | None = None
     variables: int = 0
     shares: Float[Array, "tensors k"] | None = None
+    in_one_piece: bool = True
 
     @property
     def tensors(self) -> int:
@@ -224,10 +227,15 @@ class Dynamics(NamedTuple):
             return self.slope(stress, self.modes.relaxation_time * gradient)
         return self.slope(stress, slow * self.modes.relaxation_time * gradient) / slow
 
+    def summed(self, of_modes: Float[Array, " k"]) -> Float[Array, ""]:
+        """Return a stress in Pa of that of each mode over its modulus."""
+        modulus = self.modes.modulus
+        return contracted(of_modes, modulus) if self.in_one_piece else of_modes @ modulus
+
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""
         of_modes = stress[3] if flow is None else flow.stress(stress[:4])
-        return contracted(of_modes, self.modes.modulus)
+        return self.summed(of_modes)
 
     def sheared(self, stress, rate, flow: Kinematics | None):
         """Return the stress and the rate that a state feels.
@@ -235,6 +243,6 @@ class Dynamics(NamedTuple):
         Those of a shear of the same intensity that does the same work.
         """
         if flow is None:
-            return contracted(stress[3], self.modes.modulus), rate
+            return self.summed(stress[3]), rate
         of_modes = flow.equivalent_shear_stress(stress[:4])
-        return contracted(of_modes, self.modes.modulus), flow.intensity * rate
+        return self.summed(of_modes), flow.intensity * rate

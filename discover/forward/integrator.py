@@ -12,7 +12,6 @@ from jaxtyping import Array, Float
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
 from discover.simulate.periodic_start import Cycle, periodic_start
-from tensor_library.contraction import contracted
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
@@ -173,8 +172,8 @@ def _compliance_rate(
     full, whole = w.full, w.b1 + 2.0 * w.b23 + w.b4
     own_time = slow * modes.relaxation_time
     stretch = own_time * (1.0 + stress[1])
-    predicted = scale * contracted(full * stress[3] + whole * n1[3], modes.modulus)
-    stiffness = scale * contracted(whole * stretch, modes.modulus)
+    predicted = scale * dynamics.summed(full * stress[3] + whole * n1[3])
+    stiffness = scale * dynamics.summed(whole * stretch)
     # that of the start of the step; what it misses is carried on as well
     slip = series.slip_at(before)
     compliance = series.compliance + 0.5 * slip * h

@@ -53,7 +53,9 @@ class LibraryMatrix:
             values.append(value)
         return jnp.stack(values)
 
-    def sum(self, matrix: Float[Array, "8 m"], stress, rate):
-        """Return the sum of all terms."""
+    def sum(self, matrix: Float[Array, "8 m"], stress, rate, in_one_piece: bool = True):
+        """Return the sum of all terms, without a product of matrices or with."""
+        if not in_one_piece:
+            return (matrix @ self.monomials(stress, rate)) @ integrity_basis(stress, rate)
         coefficients = contracted(matrix, self.monomials(stress, rate))
         return contracted(coefficients, integrity_basis(stress, rate))

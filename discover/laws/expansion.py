@@ -14,7 +14,6 @@ from discover.laws.base import (
     stress_in,
 )
 from tensor_library.algebra import Symmetric
-from tensor_library.contraction import contracted
 from tensor_library.library import TermLibrary
 from tensor_library.terms import TermShare, parse_term
 
@@ -41,7 +40,7 @@ class LibraryExpansion(AbstractExtendedLaw):
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""
         terms = self.library.evaluate(stress_in(stress), rate, self.inner)
-        extra = as_state(contracted(self.coefficients, terms), stress)
+        extra = as_state(jnp.tensordot(self.coefficients, terms, axes=1), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
     def as_terms(self) -> tuple[TermShare, ...] | None:

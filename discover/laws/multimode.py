@@ -14,7 +14,6 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.maxwell import UpperConvectedMaxwell
-from tensor_library.contraction import contracted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
 
 
@@ -210,5 +209,5 @@ class Fluid(eqx.Module):
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
     ) -> Float[Array, "4"]:
         """Return the total extra stress (11, 22, 33, 12) in Pa."""
-        polymer = contracted(self.modulus, state[:, :4])
+        polymer = jnp.tensordot(self.modulus, state[:, :4], axes=1)
         return polymer + self.solvent_viscosity * rate_of_deformation(velocity_gradient)

@@ -10,7 +10,6 @@ from discover.laws.named import NamedLaw
 from discover.laws.rolie_poly import NAMED as MONODISPERSE
 from discover.laws.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like
-from tensor_library.contraction import contracted
 
 _EXPONENT = -0.5  # δ of Likhtman & Graham
 
@@ -84,13 +83,13 @@ class RoliePolyBlend(AbstractConstitutiveLaw):
         pairs = stress[4:].reshape(2, 2, 4)
         share = jnp.stack([self.long_fraction, 1.0 - self.long_fraction])
         times, stretching = self._times()
-        stretch = jax.vmap(stretch_of)(contracted(share, jnp.swapaxes(pairs, 0, 1)))
+        stretch = jax.vmap(stretch_of)(jnp.tensordot(share, pairs, axes=(0, 1)))
         retraction = 2.0 / stretching * (1.0 - 1.0 / stretch)
         lost = 0.5 * (1.0 / times[:, None] + 1.0 / times[None, :])
         released = self.constraint_release * stretch[:, None] ** (2.0 * _EXPONENT) * retraction
         whole = (lost - 1.0 + retraction[:, None] + released)[..., None] * pairs
         extra = whole + retraction[:, None, None] * identity_like(stress[:4])
-        total = contracted(self.shares(), extra.reshape(4, 4))
+        total = jnp.tensordot(self.shares(), extra.reshape(4, 4), axes=1)
         return jnp.concatenate([total, extra.ravel()])
 
 

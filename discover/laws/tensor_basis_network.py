@@ -14,7 +14,6 @@ from discover.laws.base import (
     stress_in,
 )
 from tensor_library.algebra import Symmetric
-from tensor_library.contraction import contracted
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
 from tensor_library.terms import TermShare
@@ -85,7 +84,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
 
     def own_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return Σ gₙ Tₙ, without the base law's."""
-        return contracted(self.coefficients(stress, rate), integrity_basis(stress, rate))
+        return jnp.tensordot(self.coefficients(stress, rate), integrity_basis(stress, rate), axes=1)
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ gₙ Tₙ, plus the base law's."""

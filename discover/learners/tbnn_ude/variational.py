@@ -29,7 +29,6 @@ from discover.protocols.kinematics import FOLLOWED
 from discover.simulate.following import Following, follow
 from discover.simulate.solve import exponential_steps
 from discover.simulate.steady_states import steady_modes
-from tensor_library.contraction import contracted
 
 
 class Along(NamedTuple):
@@ -110,9 +109,7 @@ def states_and_jacobian(
         # one evaluation and four pullbacks give both derivatives
         value, pull = jax.vjp(change, state, weights)
         by_state, by_weight = jax.vmap(pull)(jnp.eye(len(state)))
-        return jnp.concatenate(
-            [value[:, None], contracted(by_state, sensitivity) + by_weight], axis=1
-        )
+        return jnp.concatenate([value[:, None], by_state @ sensitivity + by_weight], axis=1)
 
     @jax.jit  # traced once for all stages of a step
     def field(t, y, protocol):
@@ -123,7 +120,9 @@ def states_and_jacobian(
 
     def observe(t, y, protocol):
         stress = y[:, :4]  # without structure variables, which no record holds
-        return stress[..., 0], protocol.recorded_stress(contracted(modulus, stress[..., 1:]))
+        return stress[..., 0], protocol.recorded_stress(
+            jnp.tensordot(modulus, stress[..., 1:], axes=1)
+        )
 
     def steady_run(protocol, grid):
         def at(time):
@@ -132,7 +131,7 @@ def states_and_jacobian(
             def recorded(w):
                 of_modes = over_modes(lambda made, *flow: made(w).stress_rate(*flow), rebuild)
                 state = steady_modes(of_modes, gradient, fluid.rest())[:, :4]
-                return protocol.recorded_stress(contracted(modulus, state)), state
+                return protocol.recorded_stress(jnp.tensordot(modulus, state, axes=1)), state
 
             # one number recorded: a pullback costs what one weight's tangent would
             by_weight, state = jax.jacrev(recorded, has_aux=True)(weights)

@@ -68,7 +68,7 @@ def _mode_rates(library, active, base, coefficients, inner, state, rate):
     else:
         unit = jnp.eye(size + inner.shape[0], dtype=stress.dtype)
         jacobian = push(unit[:size], unit[size:])
-        along = contracted(jacobian[:, :size], columns)
+        along = jacobian[:, :size] @ columns
         along = along.at[:, n_terms:].add(jacobian[:, size:])
     along = along.at[:, :n_terms].add(-terms.T)
     return jnp.concatenate([change[:, None], along], axis=1)
@@ -88,7 +88,7 @@ def _vector_field(t, state, args):
 def _observe(t, state, args):
     """Return the recorded stress, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
     problem, protocol, *_ = args
-    total = contracted(problem.modulus, state[:, :4])
+    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
     return _recorded(total.at[:, 0].add(_of_solvent(problem, protocol, t)), protocol)
 
 
@@ -207,7 +207,7 @@ def _known_less_terms(problem, active, coefficients, inner):
 
 def _observed(problem, protocol, time, state):
     """Return the recorded stress, N1 and N2 of modes, shape (k, s)."""
-    total = contracted(problem.modulus, state[:, :4])
+    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
     return _recorded(total + _of_solvent(problem, protocol, time), protocol)
 
 
