@@ -39,20 +39,26 @@ class PlatePlate(Material):
 
 
 @dataclass(frozen=True)
-class Networked(RateLaw):
-    """A law beside a permanent neo-Hookean network: σ12 = E γ and N1 = E γ² more."""
+class _OneMore(RateLaw):
+    """A law whose state has one number more, before those of another law: zero at rest."""
 
     law: RateLaw
-    network: float = 15.0
-    modulus: float = 100.0
 
     def rest(self) -> np.ndarray:
-        """Return no strain, and the state of the law at rest."""
+        """Return zero, and the state of the law at rest."""
         return np.append(0.0, self.law.rest())
 
     def scale(self) -> np.ndarray:
         """Return 1, and the scales of the law."""
         return np.append(1.0, self.law.scale())
+
+
+@dataclass(frozen=True)
+class Networked(_OneMore):
+    """A law beside a permanent neo-Hookean network: σ12 = E γ and N1 = E γ² more."""
+
+    network: float = 15.0
+    modulus: float = 100.0
 
     def change(self, state: np.ndarray, rate: float) -> np.ndarray:
         """Return the rate, and the change of the law's state."""
@@ -66,20 +72,11 @@ class Networked(RateLaw):
 
 
 @dataclass(frozen=True)
-class Ageing(RateLaw):
+class Ageing(_OneMore):
     """A law whose relaxation time grows linearly with time from the start of each run."""
 
-    law: RateLaw
     growth: float = 0.03  # 1/s
     modulus: float = 100.0
-
-    def rest(self) -> np.ndarray:
-        """Return time 0, and the state of the law at rest."""
-        return np.append(0.0, self.law.rest())
-
-    def scale(self) -> np.ndarray:
-        """Return 1, and the scales of the law."""
-        return np.append(1.0, self.law.scale())
 
     def change(self, state: np.ndarray, rate: float) -> np.ndarray:
         """Return 1, and the change of the law's state at its age."""
@@ -92,25 +89,16 @@ class Ageing(RateLaw):
 
 
 @dataclass(frozen=True)
-class CriticalSlip(RateLaw):
+class CriticalSlip(_OneMore):
     """Wall slip that sets in beyond a stress, with a memory: γ̇_felt = γ̇ − s m σ, m' = (H − m)/τ.
 
     H goes from 0 to 1 within some 10 Pa of the critical stress.
     """
 
-    law: RateLaw
     slip: float = 0.006  # 1/(Pa s)
     critical: float = 60.0
     memory: float = 1.0
     modulus: float = 100.0
-
-    def rest(self) -> np.ndarray:
-        """Return no slip, and the state of the law at rest."""
-        return np.append(0.0, self.law.rest())
-
-    def scale(self) -> np.ndarray:
-        """Return 1, and the scales of the law."""
-        return np.append(1.0, self.law.scale())
 
     def _felt(self, state: np.ndarray, rate: float) -> float:
         return rate - self.slip * state[0] * self.law.stress(state[1:], rate)[0, 1]

@@ -11,13 +11,19 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
-def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
+def contracted(
+    first: Float[Array, "..."], second: Float[Array, "..."], in_one_piece: bool = True
+) -> Float[Array, "..."]:
     """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
 
     Parameters
     ----------
     first, second
         The last axis of the one and the first of the other are as long.
+    in_one_piece
+        Whether no product of matrices is to stand in the loop.
     """
+    if not in_one_piece:
+        return jnp.tensordot(first, second, axes=1)
     columns = (1,) * (second.ndim - 1)
     return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)

@@ -116,7 +116,7 @@ class Dynamics(NamedTuple):
         """Rate over 1/λ of the relaxation that is integrated exactly."""
         return 1.0 if self.linear_relaxation else 0.0
 
-    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 13 _"], ...]:
+    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 11 _"], ...]:
         """Return what `weights_of_step` wants of steps of these widths in s.
 
         Apart for the declared modes and those of effects; of each the weights of its stress and,
@@ -137,7 +137,7 @@ class Dynamics(NamedTuple):
 
     def weights_of_step(
         self,
-        pieces: tuple[Float[Array, "kinds 13 _"], ...],
+        pieces: tuple[Float[Array, "kinds 11 _"], ...],
         width: Float[Array, ""],
         slow: Float[Array, ""],
     ) -> StressWeights:
@@ -229,8 +229,7 @@ class Dynamics(NamedTuple):
 
     def summed(self, of_modes: Float[Array, " k"]) -> Float[Array, ""]:
         """Return a stress in Pa of that of each mode over its modulus."""
-        modulus = self.modes.modulus
-        return contracted(of_modes, modulus) if self.in_one_piece else of_modes @ modulus
+        return contracted(of_modes, self.modes.modulus, self.in_one_piece)
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""

@@ -55,7 +55,5 @@ class LibraryMatrix:
 
     def sum(self, matrix: Float[Array, "8 m"], stress, rate, in_one_piece: bool = True):
         """Return the sum of all terms, without a product of matrices or with."""
-        if not in_one_piece:
-            return (matrix @ self.monomials(stress, rate)) @ integrity_basis(stress, rate)
-        coefficients = contracted(matrix, self.monomials(stress, rate))
-        return contracted(coefficients, integrity_basis(stress, rate))
+        coefficients = contracted(matrix, self.monomials(stress, rate), in_one_piece)
+        return contracted(coefficients, integrity_basis(stress, rate), in_one_piece)

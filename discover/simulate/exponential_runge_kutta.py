@@ -70,7 +70,8 @@ class KrogstadWeights(NamedTuple):
 
     The stages are Y2 = half y + a21 N1, Y3 = half y + a31 N1 + a32 N2 and Y4 = full y + a41 N1 +
     a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y.
-    A parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle with m.
+    A parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle, in which m4
+    is the weight of N4; those of the others follow from it and from the stages.
     """
 
     half: Float[Array, " ..."]
@@ -83,8 +84,6 @@ class KrogstadWeights(NamedTuple):
     b1: Float[Array, " ..."]
     b23: Float[Array, " ..."]
     b4: Float[Array, " ..."]
-    m1: Float[Array, " ..."]
-    m23: Float[Array, " ..."]
     m4: Float[Array, " ..."]
 
     def tableau(self) -> tuple[Float[Array, "4 ..."], Float[Array, "4 4 ..."]]:
@@ -117,7 +116,9 @@ class KrogstadWeights(NamedTuple):
 
     def middle(self, y, n1, n2, n3, n4):
         """Return the state in the middle of the step, as exact as that after it."""
-        return self.half * y + self.m1 * n1 + self.m23 * (n2 + n3) + self.m4 * n4
+        m1 = self.a21 - 0.5 * self.a32 + self.m4
+        m23 = 0.25 * self.a32 - self.m4
+        return self.half * y + m1 * n1 + m23 * (n2 + n3) + self.m4 * n4
 
 
 class StressWeights(NamedTuple):
@@ -272,8 +273,6 @@ def krogstad_weights(
         b1=step * (first - 3.0 * second + 4.0 * third),
         b23=step * (2.0 * second - 4.0 * third),
         b4=step * (4.0 * third - second),
-        m1=step * (0.5 * half_first - 0.75 * half_second + 0.5 * half_third),
-        m23=0.5 * step * (half_second - half_third),
         m4=step * (0.5 * half_third - 0.25 * half_second),
     )
 

@@ -240,6 +240,14 @@ class Expectation:
         """Relative size that a pattern may have which is due to the sweep or to loadings."""
         return float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
 
+    def excuses(self, pattern: float) -> bool:
+        """Return whether a pattern of this relative size is due to the sweep or to loadings.
+
+        None is where neither leaves one, not even one of size zero: what changes from sample to
+        sample may by chance seem to be all there is.
+        """
+        return self.patterned > 0.0 and pattern <= self.patterned
+
     def floor(
         self,
         residual: Float[np.ndarray, "runs n"],
@@ -287,9 +295,6 @@ class Expectation:
             return True
         if self.noise is not None:
             return error <= float(np.hypot(self.noise, self.linear_error))
-        if self.patterned == 0.0:
-            # what changes from sample to sample may by chance seem to be all there is
-            return False
         judged = zip(np.asarray(residual)[rows], np.asarray(weight)[rows], strict=True)
         slow = [slow_part(r[w > 0] * np.sqrt(np.count_nonzero(w))) for r, w in judged]
-        return float(np.mean(slow)) <= self.patterned
+        return self.excuses(float(np.mean(slow)))

@@ -138,7 +138,7 @@ def refutes(unseen: Unseen, residuals: Rows, records: Rows, expectation: Expecta
 def _allowed(unseen: Unseen, expectation: Expectation) -> bool:
     """Return whether these runs are missed by no more than is known to be wrong with them."""
     fast, slow = _parts(unseen)
-    if expectation.patterned > 0.0 and slow <= expectation.patterned:
+    if expectation.excuses(slow):
         return True
     given = expectation.noise
     if given is None:

@@ -90,8 +90,7 @@ class ToleratedMisfit:
         known = self.expectation.noise is not None and left.misfit <= left.expected
         if probability > SIGNIFICANCE or known:
             return left
-        linear_error = self.expectation.linear_error
-        if linear_error > 0.0 and pattern <= STRUCTURE * linear_error:
+        if replace(self.expectation, repeat_error=0.0).excuses(pattern):
             return left
         reason = f"what is left ({percent_of(left.misfit)}) has {PATTERN}"
         return replace(
