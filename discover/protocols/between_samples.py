@@ -30,6 +30,9 @@ _STRAIGHT, _NEARLY = 1e-3, 3e-4
 """Of the largest rate: as near to the curve as straight lines between its knots have to lie, and
 those between samples that need no knot between them: of a wave read 130 times a cycle."""
 
+_FLAT = 1e-9
+"""Of the largest rate: what straight lines miss of a constant, or of one."""
+
 _MOST_BETWEEN = 16
 _BETWEEN = 4  # points of another curve through the same samples, for each sample
 
@@ -68,8 +71,43 @@ def sampled_rate(
     """
     straight = measured_rate(times, rates)
     t, r = np.asarray(straight.table_times), np.asarray(straight.table_rates)
-    knots, values = _knots(t, r)
+    knots, values = knots_between(t, r)
     return straight if len(knots) == len(t) else measured_rate(knots, values)
+
+
+def knots_between(
+    times: Samples, rates: Samples, another: bool = False
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return knots whose straight lines lie on the curve, and have its area in each interval.
+
+    Parameters
+    ----------
+    times, rates
+        The samples, shape (n,), at increasing times; of a test at a given stress, the stress.
+    another
+        Whether to take another curve through them: see `another_between_samples`.
+    """
+    stretches = _smooth_stretches(times, rates)
+    knots, values = [times], [rates]
+    if another:
+        straight = np.ones(len(times) - 1, dtype=bool)
+        for start, end in stretches:
+            straight[start : end - 1] = False
+        parts = np.where(straight, _BETWEEN, 1)
+        _fill(times, PchipInterpolator(times, rates), parts, knots, values)
+    largest = max(float(np.max(np.abs(rates))), np.finfo(float).tiny)
+    for start, end in stretches:
+        t = times[start:end]
+        cubic = CubicSpline(t, rates[start:end])
+        bend = np.max(np.abs([cubic(t[:-1], 2), cubic(t[1:], 2)]), axis=0)
+        missed = np.diff(t) ** 2 * bend / (8.0 * largest)
+        least = np.where(missed > _NEARLY, 2, 1)
+        parts = np.clip(np.ceil(np.sqrt(missed / _STRAIGHT)), least, _MOST_BETWEEN).astype(int)
+        curve = make_interp_spline(t, rates[start:end], k=5) if another else cubic
+        _fill(t, curve, parts, knots, values)
+    found = np.concatenate(knots)
+    order = np.argsort(found, kind="stable")
+    return found[order], np.concatenate(values)[order]
 
 
 def another_between_samples(
@@ -95,7 +133,7 @@ def another_between_samples(
     read, known = _samples(knots[first:], rates[first:], times)
     if protocol.control != "rate" or len(read) < 4 or np.any(np.diff(read) <= 0.0):
         return None
-    other_knots, other = _knots(read, known, another=True)
+    other_knots, other = knots_between(read, known, another=True)
     return replace(
         protocol,
         table_times=on_device(np.concatenate([knots[:first], other_knots])),
@@ -129,40 +167,13 @@ def _samples(
     read, known = knots[at], rates[at]
     if np.any(np.diff(read) <= 0.0):
         return knots, rates
-    curve = _knots(read, known)
+    curve = knots_between(read, known)
     inside = knots >= read[0]
     same = np.sum(inside) == len(curve[0]) and np.allclose(knots[inside], curve[0], rtol=1e-9)
     close = 1e-6 * np.max(np.abs(rates))
     if not same or np.max(np.abs(rates[inside] - curve[1])) > close:
         return knots, rates  # it was made in another way, and its knots are what is known
     return read, known
-
-
-def _knots(
-    times: np.ndarray, rates: np.ndarray, another: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return knots whose straight lines lie on the curve, and have its area in each interval."""
-    stretches = _smooth_stretches(times, rates)
-    knots, values = [times], [rates]
-    if another:
-        straight = np.ones(len(times) - 1, dtype=bool)
-        for start, end in stretches:
-            straight[start : end - 1] = False
-        parts = np.where(straight, _BETWEEN, 1)
-        _fill(times, PchipInterpolator(times, rates), parts, knots, values)
-    largest = max(float(np.max(np.abs(rates))), np.finfo(float).tiny)
-    for start, end in stretches:
-        t = times[start:end]
-        cubic = CubicSpline(t, rates[start:end])
-        bend = np.max(np.abs([cubic(t[:-1], 2), cubic(t[1:], 2)]), axis=0)
-        missed = np.diff(t) ** 2 * bend / (8.0 * largest)
-        least = np.where(missed > _NEARLY, 2, 1)
-        parts = np.clip(np.ceil(np.sqrt(missed / _STRAIGHT)), least, _MOST_BETWEEN).astype(int)
-        curve = make_interp_spline(t, rates[start:end], k=5) if another else cubic
-        _fill(t, curve, parts, knots, values)
-    found = np.concatenate(knots)
-    order = np.argsort(found, kind="stable")
-    return found[order], np.concatenate(values)[order]
 
 
 def _fill(t: np.ndarray, curve, parts: np.ndarray, knots: list, values: list) -> None:
@@ -192,6 +203,7 @@ def _is_smooth(times: np.ndarray, rates: np.ndarray) -> Bool[np.ndarray, " n"]:
     n = len(times)
     if n < _FEWEST:
         return np.zeros(n, dtype=bool)
+    rates = rates / max(float(np.max(np.abs(rates))), np.finfo(float).tiny)
     inner = np.arange(1, n - 1)
     # two on each side, and at the ends the four nearest on whichever side they lie
     first = np.clip(inner - 2, 0, n - 5)
@@ -203,9 +215,7 @@ def _is_smooth(times: np.ndarray, rates: np.ndarray) -> Bool[np.ndarray, " n"]:
         for some in (line, others)
     ]
     summed = [np.convolve(np.pad(one, 1), np.ones(2 * _REACH + 1), "same") for one in squares]
-    # a constant is predicted by both, and is a straight line
-    least = (1e-9 * np.max(np.abs(rates))) ** 2
-    return (summed[1] < _BETTER * summed[0]) & (summed[0] > least)
+    return (summed[1] < _BETTER * summed[0]) & (summed[0] > _FLAT**2)
 
 
 def _predicted(places: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:

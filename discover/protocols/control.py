@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.errors import InputError
 from discover.programs import on_device
+from discover.protocols.between_samples import knots_between
 from discover.protocols.kinematics import STATES, Control
 from discover.protocols.protocol import FlowProtocol, measured_rate
 
@@ -51,10 +53,10 @@ def oscillations(
 def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:
     """Return the stress at samples as what is imposed, from rest at t = 0.
 
-    It goes in straight lines from sample to sample but where it jumps: at t = 0 if the first
-    samples hold one level, and between two levels, however small the step between them (creep and
-    recovery, a staircase), where the jump comes right after the last sample of the first. A jump
-    takes a thousandth of the time to the next sample.
+    Between samples it is what a rate would be: smooth where the samples are, such as a wave, else
+    straight (`sampled_rate`). It jumps at t = 0 if the first samples hold one level, and between
+    two levels, however small the step between them (creep and recovery, a staircase), right after
+    the last sample of the first. A jump takes a thousandth of the time to the next sample.
 
     Parameters
     ----------
@@ -75,28 +77,41 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
             "A test at a given stress needs two samples or more and a stress other than 0; got "
             f"{len(times)} samples, the largest stress {size:g} Pa. Leave the run out."
         )
-    change = np.abs(np.diff(stress))
-    knots, levels = list(times[times > 0.0]), list(stress[times > 0.0])
     gap = float(times[1] - times[0]) if times[0] == 0.0 else float(times[0])
-    begins = 0.0
-    first = abs(float(stress[0]))
-    if first > _JUMP * size and change[0] < _LEVEL * first:
-        begins = -_AT_ONCE * gap
-        knots, levels = [begins, 0.0, *knots], [0.0, stress[0], *levels]
-    else:
-        knots, levels = [0.0, *knots], [stress[0] if times[0] == 0.0 else 0.0, *levels]
-    for i in np.flatnonzero(change > _JUMP * size):
-        beside = [change[k] for k in (i - 1, i + 1) if 0 <= k < len(change)]
-        if max(beside, default=0.0) < _LEVEL * change[i]:
-            at = times[i] + _AT_ONCE * (times[i + 1] - times[i])
-            place = int(np.searchsorted(knots, at))
-            knots.insert(place, at)
-            levels.insert(place, stress[i + 1])
+    at_once = _jumps_at_once(stress, size)
+    begins = -_AT_ONCE * gap if at_once else 0.0
+    start = [[begins, 0.0], [0.0, stress[0]]] if at_once else [[0.0], [0.0]]
+    if times[0] == 0.0:
+        start = [column[:-1] for column in start]
+    jumps = _jumps(stress, size)
+    parts = [np.array(start)]
+    for first, end in pairwise([0, *(jumps + 1), len(times)]):
+        if first > 0:
+            jumped = times[first - 1] + _AT_ONCE * (times[first] - times[first - 1])
+            parts.append(np.array([[jumped], [stress[first]]]))
+        piece = np.stack([times[first:end], stress[first:end]])
+        if first == 0 and not at_once and times[0] > 0.0:
+            piece, parts = np.concatenate([parts[0], piece], axis=1), []
+        parts.append(np.stack(knots_between(*piece)))
+    knots, levels = np.concatenate(parts, axis=1)
     return replace(
-        measured_rate(np.array(knots), np.array(levels)),
+        measured_rate(knots, levels),
         control="stress",
         begins=jnp.asarray(begins),
     )
+
+
+def _jumps_at_once(stress: Float[np.ndarray, " n"], size: float) -> bool:
+    first = abs(float(stress[0]))
+    return first > _JUMP * size and abs(float(stress[1] - stress[0])) < _LEVEL * first
+
+
+def _jumps(stress: Float[np.ndarray, " n"], size: float) -> Int[np.ndarray, " j"]:
+    """Return after which samples the stress jumps."""
+    change = np.abs(np.diff(stress))
+    neighbours = np.pad(change, 1)
+    beside = np.maximum(neighbours[:-2], neighbours[2:])
+    return np.flatnonzero((change > _JUMP * size) & (beside < _LEVEL * change))
 
 
 def drawn_against(

@@ -30,6 +30,9 @@ _FIRST_AT_REST, _GROWTH_AT_REST = 0.02, 0.2
 # in 60 samples errs by 2e-5 of the strain, that of a law with a solvent by as much
 _JUMP_STEPS, _GROWTH, _STEPS_BETWEEN, _LONGER = 24, 0.3, 2, 2.0
 
+# A stress jumps where it takes less than this share of the time from there to the next knot
+_SUDDEN = 0.01
+
 # A stress is constant while it changes by less than this share of the largest from sample to sample
 _CONSTANT = 0.01
 
@@ -222,9 +225,10 @@ def stress_grid(
 ) -> Float[np.ndarray, " s"]:
     """Return step times for a run at a given stress.
 
-    Every sample and every kink of the imposed stress is a step. A jump, which takes a short time,
-    is gone through in even steps, and what follows it in steps that grow with the time since.
-    Between samples no step takes more than twice `strain_step` of the strain recorded there.
+    Every sample and every kink of the imposed stress is a step, and there is one between any two
+    samples. A jump, which takes a short time, is gone through in even steps, and what follows it
+    in steps that grow with the time since. No step takes more than twice `strain_step` of the
+    strain recorded.
 
     Parameters
     ----------
@@ -242,10 +246,10 @@ def stress_grid(
     slope = np.diff(levels) / np.diff(knots)
     bends = np.concatenate([[True], np.diff(slope) != 0.0, [True]]) if len(knots) > 1 else True
     knots_inside = knots[(knots >= begins) & (knots <= end) & bends]
-    gap = float(np.min(np.diff(times))) if len(times) > 1 else end
     parts = [np.array([begins]), times, knots_inside]
-    jumps = (np.diff(knots) < 0.5 * gap) & (np.diff(levels) != 0.0)
-    for start, stop in zip(knots[:-1][jumps], knots[1:][jumps], strict=True):
+    width = np.diff(knots)
+    jumps = np.flatnonzero((width[:-1] < _SUDDEN * width[1:]) & (np.diff(levels)[:-1] != 0.0))
+    for start, stop in zip(knots[jumps], knots[jumps + 1], strict=True):
         parts.append(np.linspace(start, stop, _JUMP_STEPS + 1))
         later = times[times > stop]
         if later.size:
@@ -258,7 +262,10 @@ def stress_grid(
     if protocol.table_strains is not None:
         strain = np.asarray(protocol.table_strains)
         moved = np.abs(np.diff(np.interp(anchors, knots, _without_noise(levels, strain))))
-    pieces = np.maximum(_STEPS_BETWEEN, np.ceil(moved / (_LONGER * strain_step))).astype(int)
+    # a smooth stress has knots between its samples, which are steps enough
+    between = np.isin(anchors, np.setdiff1d(knots_inside, times)) & (anchors > 0.0)
+    least = np.where(between[1:] | between[:-1], 1, _STEPS_BETWEEN)
+    pieces = np.maximum(least, np.ceil(moved / (_LONGER * strain_step))).astype(int)
     if np.sum(pieces) > MAX_GRID_POINTS:
         raise InputError(
             f"A run at a given stress with {len(times)} samples and strains up to "

@@ -5,6 +5,7 @@ import pytest
 
 from discover.protocols import imposed_stress
 from discover.protocols.control import jumps_at_start
+from discover.simulate.grid import stress_grid
 
 TIMES = np.linspace(0.1, 15.0, 150)
 LEVELS = np.array([6.0, 14.0, 24.0, 36.0, 60.0])
@@ -32,7 +33,28 @@ def test_a_jump_after_rest_is_none_at_the_start_and_times_in_decades_are_none():
     assert not jumps_at_start(later)
     decades = np.geomspace(1e-3, 100.0, 60)  # as short at first as a jump is at the end
     found = imposed_stress(decades, np.sqrt(decades))
-    np.testing.assert_allclose(found.table_times, [0.0, *decades])
+    assert not jumps_at_start(found)
+    # a jump would add its own steps, and those that follow it
+    assert len(stress_grid(found, decades)) < 2 * len(found.table_times)
+
+
+def test_a_wave_of_stress_is_smooth_between_its_samples_on_both_sides_of_a_jump():
+    def truth(times):
+        return 5.0 * np.sin(2.0 * times) + np.where(times > 7.55, 10.0, 0.0)
+
+    found = imposed_stress(TIMES, truth(TIMES))
+    assert jumps(found) == [7.5]
+    dense = np.linspace(0.1, 15.0, 3001)
+    dense = dense[np.abs(dense - 7.55) > 0.06]
+    missed = np.interp(dense, found.table_times, found.table_rates) - truth(dense)
+    straight = np.interp(dense, TIMES, truth(TIMES)) - truth(dense)
+    # 31 samples a cycle: straight lines cut 1 − cos of half the phase between them off its crests
+    assert np.max(np.abs(straight)) == pytest.approx(5.0 * (1.0 - np.cos(0.1)), rel=0.02)
+    assert np.max(np.abs(missed)) < 0.5 * np.max(np.abs(straight))
+    # and the impulse of each crest is kept
+    crest = dense < 1.5
+    lost = [np.trapezoid(each[crest], dense[crest]) for each in (missed, straight)]
+    assert abs(lost[0]) < 0.05 * abs(lost[1])
 
 
 @pytest.mark.parametrize(
