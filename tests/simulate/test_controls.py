@@ -14,7 +14,7 @@ from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.protocols import imposed_stress, start_up, steady_rates
-from discover.simulate.grid import stress_grid
+from discover.simulate.stress_grid import stress_grid
 
 MODULUS, TIME = 100.0, 1.0
 MAXWELL = DeclaredModel.maxwell(MODULUS, TIME)

@@ -11,7 +11,7 @@ from discover.forward.batches.samples import measured
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
-from discover.simulate.grid import stress_grid
+from discover.simulate.stress_grid import stress_grid
 
 
 class StressBatch(eqx.Module):
