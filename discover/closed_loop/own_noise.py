@@ -31,7 +31,9 @@ def searched_by_noise(
         return task, ended
     rows = zip(search.fit.residual, search.problem.weight, strict=True)
     left = [row[w > 0] * np.sqrt(np.count_nonzero(w)) for row, w in rows]
-    weights = weights_by_noise(left, list(map(kind_of_record, task.fitted)), search.explained)
+    # a misfit that the sweep excuses has a size of its own in each run, and is no noise
+    random = search.explained and search.tolerated.left(search.fit.residual).random
+    weights = weights_by_noise(left, list(map(kind_of_record, task.fitted)), random)
     if weights is None:
         return task, ended
     task.say("runs differ in noise: the search once more, each run weighed by its own")

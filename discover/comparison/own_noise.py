@@ -75,6 +75,7 @@ class _Seen:
     flows: Sequence[Flow]
     outcome: LearnerOutcome
     explained: bool
+    random: bool
 
 
 def _seen(study: Study, known: Known, own: Mapping[str, LearnerOutcome]) -> _Seen:
@@ -83,7 +84,7 @@ def _seen(study: Study, known: Known, own: Mapping[str, LearnerOutcome]) -> _See
     flows = [flow for flow in known.flows if flow.kind == "training"]
     outcome = known.frame(own[_BY_ITS_LAW]).outcome(own[_BY_ITS_LAW])
     left = what_it_leaves(outcome, flows, expectation, study.compare.use_normal_stresses)
-    return _Seen(flows, outcome, left.verdict == "explained")
+    return _Seen(flows, outcome, left.verdict == "explained", left.random)
 
 
 def _weights(seen: _Seen, data: StudyData) -> dict[str, float] | None:
@@ -98,7 +99,7 @@ def _weights(seen: _Seen, data: StudyData) -> dict[str, float] | None:
         size = float(np.sqrt(np.mean((even * record) ** 2))) or 1.0
         left.append(even * (predicted["sigma12"] - record) / size)
     runs = data.fit.runs
-    weights = weights_by_noise(left, list(map(kind_of_record, runs)), seen.explained)
+    weights = weights_by_noise(left, list(map(kind_of_record, runs)), seen.random)
     if weights is None:
         return None
     return {run.name: weight for run, weight in zip(runs, weights, strict=True)}

@@ -86,6 +86,12 @@ class LackOfFit:
         """Whether `noise` is no more than what changes from sample to sample."""
         return self.changing is not None and self.noise <= self.changing
 
+    @property
+    def random(self) -> bool:
+        """Whether it is noise, as far as its samples tell: no pattern that other errors excuse."""
+        seen = self.probability is not None and self.probability <= SIGNIFICANCE
+        return self.verdict == "explained" and not seen
+
     def refuted(self, reason: str) -> "LackOfFit":
         """Return the same of a model that other runs refute.
 

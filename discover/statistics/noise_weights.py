@@ -22,7 +22,7 @@ errors of rates, gaps and temperatures, which no sample shows."""
 
 
 def weights_by_noise(
-    left: Sequence[Float[np.ndarray, " _"]], kinds: Sequence[str], explained: bool
+    left: Sequence[Float[np.ndarray, " _"]], kinds: Sequence[str], random: bool
 ) -> tuple[float, ...] | None:
     """Return how much the samples of each run weigh, in inverse proportion to their noise.
 
@@ -39,7 +39,7 @@ def weights_by_noise(
     kinds
         The kind of test of each run: runs of too few samples to tell a noise take that of others of
         their kind.
-    explained
+    random
         Whether it is noise. If not, only what changes from sample to sample is.
 
     Returns
@@ -51,7 +51,7 @@ def weights_by_noise(
     if len(rows) < 2 or not all(np.all(np.isfinite(row)) for row in rows):
         return None
     size = np.array([_robust_size(row) for row in rows])
-    noise = size if explained else np.array([fast_part(row) for row in rows])
+    noise = size if random else np.array([fast_part(row) for row in rows])
     count = np.array([len(row) for row in rows])
     told = count >= FEWEST_TESTED
     for kind in dict.fromkeys(kinds):

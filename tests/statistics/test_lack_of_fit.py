@@ -171,3 +171,13 @@ def test_a_smooth_misfit_of_separate_points_is_no_noise_though_few_are_tested_ot
     left = 3.0 * smooth + np.random.default_rng(0).standard_normal(20)
     assert noise_probability(left[None], np.ones((1, 20))) is None
     assert separate_probability([left]) < 0.01
+
+
+@pytest.mark.parametrize("error", [0.0, 0.02])
+def test_a_pattern_that_the_sweep_excuses_is_explained_and_yet_no_noise(error):
+    noise = 0.003 * 10.0 * correlated(0.0, 1)
+    smooth = 0.15 * np.sin(3.0 * TIMES)
+    excused = lack_of_fit([smooth + noise], [WAVE], Expectation(linear_error=error))
+    assert excused.verdict == ("explained" if error else "unexplained")
+    assert not excused.random
+    assert lack_of_fit([noise], [WAVE], Expectation(linear_error=error)).random
