@@ -1,4 +1,4 @@
-"""What is set up at first use: double precision, kept programs, threads of linear algebra.
+"""What is set up when something that computes is first used: double precision, kept programs.
 
 Importing this module does it. Whatever needs JAX imports it before JAX, so that it holds in every
 process: in a script, in a notebook, and in a worker that only unpickles a fitted estimator.
@@ -9,17 +9,15 @@ import sys
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError
-from discover.linear_algebra_threads import use_one_thread
 from discover.precision import enable_x64
 
 _SINGLE = ("float32", "complex64")
 
 
 def set_up() -> None:
-    """Turn on double precision, keep compiled programs, and leave one thread to each product.
+    """Turn on double precision and keep compiled programs between starts.
 
-    A cache folder, double precision or a number of threads that the user has chosen already is left
-    as it is.
+    A cache folder, or double precision, that the user has chosen already is left as it is.
 
     Raises
     ------
@@ -34,7 +32,6 @@ def set_up() -> None:
         enable_x64()
     require_double()
     enable_compilation_cache()
-    use_one_thread()
 
 
 def require_double() -> None:

@@ -1,23 +1,42 @@
-"""One thread for each product of matrices, where the user has not chosen a number."""
+"""One thread for each product of matrices, while many small ones are wanted."""
 
 import os
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
 
 _CHOSEN = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "BLIS_NUM_THREADS")
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
-def use_one_thread() -> None:
-    """Let NumPy's and SciPy's linear algebra run in the thread that calls it.
+
+def in_one_thread(function: _Function) -> _Function:
+    """Return a function that runs with linear algebra in the thread that calls it.
 
     OpenBLAS lets a thread for each core spin while it waits for the next product. The matrices here
-    have some hundred rows, and what runs side by side are trials, in threads of their own: a
-    product then takes up to thirty times the processor, and the search around it waits for it. It
-    is a setting of the whole process, as double precision is. A number of threads that one of the
-    environment's variables names is left as it is.
+    have some hundred rows, and trials run side by side in threads of their own: a product then
+    takes up to thirty times the processor, and the search around it waits for it. Afterwards all is
+    as it was, and a number of threads that the user chose in the environment stays as it is.
+    OpenBLAS takes a number from the main thread only, so elsewhere the function runs as it would.
     """
-    if any(os.environ.get(name) for name in _CHOSEN):
-        return
-    from threadpoolctl import threadpool_limits
 
-    # for a library that is loaded later, and for processes begun from here
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    threadpool_limits(1, "blas")
+    @wraps(function)
+    def limited(*args: Any, **kwargs: Any) -> Any:
+        if _chosen_by_user():
+            return function(*args, **kwargs)
+        from threadpoolctl import threadpool_limits
+
+        with threadpool_limits(1, "blas"):
+            return function(*args, **kwargs)
+
+    return cast(_Function, limited)
+
+
+def use_one_thread_from_the_start() -> None:
+    """Let libraries that this process, or one begun from it, loads later take one thread."""
+    if not _chosen_by_user():
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+
+def _chosen_by_user() -> bool:
+    return any(os.environ.get(name) for name in _CHOSEN)

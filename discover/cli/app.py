@@ -15,6 +15,7 @@ from discover.cli.fetch_command import fetch_data
 from discover.cli.interruption import obeying_interrupts
 from discover.cli.names_commands import effects, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
+from discover.linear_algebra_threads import use_one_thread_from_the_start
 
 app = typer.Typer(
     name="discover",
@@ -68,5 +69,6 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     warnings.formatwarning = _one_line
+    use_one_thread_from_the_start()
     with obeying_interrupts():
         app()

@@ -46,9 +46,11 @@ from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import instants_found, with_places
 from discover.inference.degrees import lowest_not_refuted
+from discover.linear_algebra_threads import in_one_thread
 from discover.statistics.residual import summarise
 
 
+@in_one_thread
 def run_loop(
     dataset: Dataset,
     declared: DeclaredModel,

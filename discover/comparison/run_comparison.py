@@ -28,6 +28,7 @@ from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
+from discover.linear_algebra_threads import in_one_thread
 from discover.progress import Progress, silent
 from discover.study.data import StudyData, load_study_data
 from discover.study.declared_model import DeclaredModel, declared_model
@@ -36,6 +37,7 @@ from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
 
+@in_one_thread
 def compare(
     study: Study,
     seed: int | None = None,

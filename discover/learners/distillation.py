@@ -17,6 +17,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, starting_values
+from discover.linear_algebra_threads import in_one_thread
 from discover.programs import compiled
 from discover.protocols.paper import (
     TEST_DURATION,
@@ -277,6 +278,7 @@ def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
     return solution.value, lesson.residual(solution.value, kappa)[0]
 
 
+@in_one_thread
 def distil(
     teacher: AbstractConstitutiveLaw | Fluid,
     student: str | Student,

@@ -17,6 +17,7 @@ from discover.learners.known_part import KnownPart, known_part, require_known_ra
 from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.runs import as_runs
 from discover.learners.settings import check_settings
+from discover.linear_algebra_threads import in_one_thread
 
 if TYPE_CHECKING:
     import xarray
@@ -47,6 +48,7 @@ class RunPrediction(RegressorMixin, BaseEstimator):
     _saved_types: ClassVar[tuple[type, ...]]
     """Dataclasses among them and among the parameters."""
 
+    @in_one_thread
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
         """Find the law of these runs.
 
