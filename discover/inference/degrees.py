@@ -151,6 +151,8 @@ def choose_degrees(
             if chosen[name].degree == degree:
                 starts.append(fit.theta)
             fits.append(problem.best_fit(starts, (*rest, *at[:degree]), rivals=True))
+        if not any(trial.usable for trial in fits):
+            continue  # beside the others no constant of its own can be integrated: it stays
         gains = _gains(alone, fits)
         own: tuple[int, ...] = ()
         if fits[-1].usable and (_lowest(gains) == highest or least.get(name, 0) == FREE):
@@ -170,14 +172,14 @@ def choose_degrees(
 
 
 def _gains(problem: FitProblem, fits: Sequence[Fit]) -> list[float]:
-    """Return the evidence for each fit over the first."""
-    best = min((trial for trial in fits if trial.usable), key=lambda trial: trial.cost)
-    effective = problem.independent_samples(best)
-    more = (
-        problem.evidence(fits[0], trial, effective) if trial.usable else -np.inf
-        for trial in fits[1:]
-    )
-    return [0.0, *map(float, more)]
+    """Return the evidence for each fit over the first that is usable, one of them at least."""
+    usable = [trial for trial in fits if trial.usable]
+    effective = problem.independent_samples(min(usable, key=lambda trial: trial.cost))
+    gains = []
+    for trial in fits:
+        more = problem.evidence(usable[0], trial, effective) if trial.usable else -np.inf
+        gains.append(0.0 if trial is usable[0] else float(more))
+    return gains
 
 
 def _lowest(gains: Sequence[float]) -> int:

@@ -1,5 +1,6 @@
 """Constants of many modes that no smooth function of the relaxation time describes, by scipy."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -102,3 +103,27 @@ def test_a_lower_degree_that_was_refuted_gives_way_to_the_next(monkeypatch):
     assert third[NAME].own
     assert one_degree_more(model, third) == {}
     chosen.cache_clear()
+
+
+def without_numbers(fit):
+    return replace(fit, residual=np.full_like(fit.residual, np.nan))
+
+
+def test_where_no_degree_can_be_integrated_the_constant_stays_as_it_was(monkeypatch):
+    """Beside another constant by mode each may run away, as in the polyisoprene melt."""
+    asked, (fit, degrees) = problem(SMOOTH), chosen(SMOOTH)
+    whole = FitProblem.fits
+    monkeypatch.setattr(
+        FitProblem, "fits", lambda *a, **how: [*map(without_numbers, whole(*a, **how))]
+    )
+    assert choose_degrees(asked, fit, degrees) == (fit, degrees)
+
+
+def test_where_one_constant_for_all_modes_runs_away_the_others_are_compared(monkeypatch):
+    asked, (fit, degrees) = problem(SMOOTH), chosen(SMOOTH)
+    plain = FitProblem.fit
+    monkeypatch.setattr(FitProblem, "fit", lambda *a: without_numbers(plain(*a)))
+    found, again = choose_degrees(asked, fit, degrees)
+    assert found.usable
+    assert again[NAME].degree == 2
+    assert again[NAME].evidence[0] == -np.inf
