@@ -33,6 +33,7 @@ from discover.comparison.judging.identifiability import (
     find_rivals,
     structure_of,
 )
+from discover.comparison.judging.late_answers import hold_against_late_answers
 from discover.comparison.judging.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
@@ -256,7 +257,10 @@ def _tested(
         others = other_constants(chosen.terms, frame.model)
         bands = bands if normal else with_other_gain(bands, others)
     seen = frame.bands(bands)
-    explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
+    expectation = at_first.expectation
+    explanation = hold_against_unseen(at_first, outcomes, flows, seen, expectation)
+    if not frame.made:  # what a known instrument does is in the predictions already
+        explanation = hold_against_late_answers(explanation, outcomes, flows, seen, expectation)
     if chosen is None or not explanation.in_library:
         return _Tested(explanation)
     left = at_first.lack_of_fit["tensor_sindy"]
