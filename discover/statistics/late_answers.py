@@ -32,6 +32,10 @@ _SHORTEST, _LONGEST = 0.25, 0.25
 _FINE = 8  # points of a lag's integration from sample to sample
 _CLEAR = 10.0
 """Gain of log likelihood from which on a filter is looked at: of chance 5 has one in a thousand."""
+AGREED = 0.05
+"""Probability of sizes that agree, up to which a filter that describes records so much better is
+believed: noise that is loud where the filter acts, and nowhere else, passes for one as often."""
+
 _SEEN = 0.5
 """Deviation of the filter's size as one run tells it, up to which that run has a say."""
 

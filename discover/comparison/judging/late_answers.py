@@ -16,9 +16,8 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.sampling import sampling_interval
-from discover.statistics.late_answers import Late, LateAnswer, Response, late_answer
+from discover.statistics.late_answers import AGREED, Late, LateAnswer, Response, late_answer
 from discover.statistics.residual import STRUCTURE, Expectation
-from discover.statistics.whiteness import SIGNIFICANCE
 
 _SPARSE = "tensor_sindy"
 
@@ -72,7 +71,7 @@ def hold_against_late_answers(
         if not refuted:
             runs = _responses(explanation, name, outcomes[name], flows, bands)
             late = late_answer(runs) if runs else None
-            if late is None or late.probability > SIGNIFICANCE:
+            if late is None or late.probability > AGREED:
                 continue
             least = max(ARITHMETIC, STRUCTURE * outcomes[name].resolution)
             if late.size <= least or expectation.excuses(late.size):
