@@ -83,6 +83,41 @@ class LateAnswer:
     size: float
 
 
+@dataclass(frozen=True)
+class Filtered:
+    """The filter that describes records best beside constants that may move.
+
+    Attributes
+    ----------
+    kind, time
+        Which, and its time in s.
+    before, after
+        Sums of squares over the noise, without it and with it; that is one in all.
+    worth
+        Share of the samples that are independent.
+    changes
+        What the filter adds to each run, in the unit of its stress.
+    steps
+        How far the constants move with it.
+    noise
+        Of each run, in that unit.
+    """
+
+    kind: Late
+    time: float
+    before: float
+    after: float
+    worth: float
+    changes: Sequence[np.ndarray]
+    steps: Float[np.ndarray, " constants"]
+    noise: Sequence[float]
+
+    @property
+    def gain(self) -> float:
+        """Gain of log likelihood by the one time."""
+        return 0.5 * (self.before - self.after) * self.worth
+
+
 def late_answer(runs: Sequence[Response]) -> LateAnswer | None:
     """Return the filter that describes records clearly better than none; None if none does.
 
@@ -93,44 +128,70 @@ def late_answer(runs: Sequence[Response]) -> LateAnswer | None:
     run alone tells nothing.
     """
     runs = [run for run in runs if len(run.times) > _FINE and np.any(run.residual)]
-    if len(runs) < 2:
+    best = best_filter(runs) if len(runs) > 1 else None
+    if best is None or best.gain < _CLEAR:
         return None
-    noise = [fast_part(run.residual) or 1e-3 * _rms(run.residual) for run in runs]
-    columns = np.concatenate(
-        [_padded(run.columns, noise) for run, noise in zip(runs, noise, strict=True)]
-    )
-    residual = np.concatenate([run.residual / one for run, one in zip(runs, noise, strict=True)])
-    free = _without(columns, residual)
-    before = float(free @ free)
+    sizes = [
+        _rms(change) / (_rms(run.predicted) or 1.0)
+        for change, run in zip(best.changes, runs, strict=True)
+    ]
+    pairs = zip(best.changes, best.noise, strict=True)
+    columns, residual = _stacked(runs, best.noise)
+    probability = _agreement(columns, residual, [change / one for change, one in pairs])
+    return LateAnswer(best.kind, best.time, best.gain, probability, float(np.mean(sizes)))
+
+
+def best_filter(runs: Sequence[Response], noise: Sequence[float] | None = None) -> Filtered | None:
+    """Return the filter that describes records best; None without a run.
+
+    Parameters
+    ----------
+    runs
+        As a law predicts them.
+    noise
+        Of each, in the unit of its stress; by default what changes from sample to sample.
+    """
+    if not runs:
+        return None
+    if noise is None:
+        noise = [fast_part(run.residual) or 1e-3 * _rms(run.residual) or 1.0 for run in runs]
+    columns, residual = _stacked(runs, noise)
     shortest = min(float(np.median(np.diff(run.times))) for run in runs)
     longest = min(float(run.times[-1]) for run in runs)
     times = np.geomspace(_SHORTEST * shortest, max(_LONGEST * longest, shortest), _TIMES)
     best: tuple[float, Late, int, list[np.ndarray]] | None = None
     for kind in get_args(Late):
-        changes = [
-            change / one
-            for change, one in zip((_changes(run, kind, times) for run in runs), noise, strict=True)
-        ]
+        changes = [_changes(run, kind, times) for run in runs]
         for at in range(len(times)):
-            change = np.concatenate([one[at] for one in changes])
-            left = _without(columns, residual + change)
+            own = [change[at] / one for change, one in zip(changes, noise, strict=True)]
+            left = _without(columns, residual + np.concatenate(own))
             after = float(left @ left)
             if best is None or after < best[0]:
-                best = after, kind, at, [one[at] for one in changes]
+                best = after, kind, at, [change[at] for change in changes]
     assert best is not None
-    after, kind, at, own = best
+    after, kind, at, changes = best
+    put = np.concatenate([change / one for change, one in zip(changes, noise, strict=True)])
+    free, left = _without(columns, residual), _without(columns, residual + put)
     freedom = max(len(residual) - columns.shape[1] - 1, 1)
-    gain = 0.5 * (before - after) / max(after / freedom, 1.0)
-    # of correlated noise as many samples are worth fewer
-    gain *= independent_samples(_without(columns, residual + np.concatenate(own))) / len(residual)
-    if gain < _CLEAR:
-        return None
-    sizes = [
-        _rms(one * each) / (_rms(run.predicted) or 1.0)
-        for one, each, run in zip(own, noise, runs, strict=True)
-    ]
-    probability = _agreement(columns, residual, own)
-    return LateAnswer(kind, float(times[at]), gain, probability, float(np.mean(sizes)))
+    scale = max(after / freedom, 1.0)
+    return Filtered(
+        kind,
+        float(times[at]),
+        float(free @ free) / scale,
+        after / scale,
+        # of correlated noise as many samples are worth fewer
+        independent_samples(left) / len(left),
+        changes,
+        -np.linalg.lstsq(columns, residual + put, rcond=1e-8)[0],
+        noise,
+    )
+
+
+def _stacked(runs: Sequence[Response], noise: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns of all runs and their residuals, over the noise."""
+    pairs = list(zip(runs, noise, strict=True))
+    columns = [np.asarray(run.columns, dtype=float).T / one for run, one in pairs]
+    return np.concatenate(columns), np.concatenate([run.residual / one for run, one in pairs])
 
 
 def _agreement(
@@ -196,10 +257,6 @@ def _lagged(
         decay = np.exp(-step / widths)
         out[i + 1] = (out[i] - values[i] + widths * slope) * decay + values[i + 1] - widths * slope
     return out[::_FINE].T[:, len(known) - len(times) :]
-
-
-def _padded(columns: Float[np.ndarray, "q n"], noise: float) -> Float[np.ndarray, "n q"]:
-    return np.asarray(columns, dtype=float).T / noise
 
 
 def _without(columns: Float[np.ndarray, "m q"], values: Float[np.ndarray, " m"]) -> np.ndarray:

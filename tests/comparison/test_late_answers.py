@@ -69,7 +69,7 @@ def judged(drawn, width, expectation=None, learners=("tensor_sindy",)):
     }
     left = replace(what_is_left(residuals, records, expectation), verdict="explained")
     found = Explanation(dict.fromkeys(learners, left), expectation=expectation)
-    return hold_against_late_answers(found, outcomes, flows, bands, expectation)
+    return hold_against_late_answers(found, outcomes, flows, bands)
 
 
 def test_means_over_half_a_second_are_no_explanation(drawn):

@@ -16,8 +16,8 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.sampling import sampling_interval
-from discover.statistics.late_answers import AGREED, Late, LateAnswer, Response, late_answer
-from discover.statistics.residual import STRUCTURE, Expectation
+from discover.statistics.late_answers import AGREED, Late, Response, late_answer
+from discover.statistics.residual import STRUCTURE
 
 _SPARSE = "tensor_sindy"
 
@@ -30,7 +30,7 @@ _DOES: Mapping[Late, str] = {
     "mean_since": "told means over the last {time}",
     "mean_about": "told means over {time} about each sample",
 }
-_ADVICE = (
+ADVICE = (
     "look up the filter and the averaging of the instrument's software, and export what is not "
     "averaged; a lag, a delay or a rise time of the rate can be fitted along, under [model] effects"
 )
@@ -41,7 +41,6 @@ def hold_against_late_answers(
     outcomes: Mapping[str, LearnerOutcome],
     flows: Iterable[Flow],
     bands: Mapping[str, PredictionBand],
-    expectation: Expectation,
 ) -> Explanation:
     """Return what explains the runs as well without a filter of the instrument as with one.
 
@@ -58,10 +57,9 @@ def hold_against_late_answers(
         Of which fitted and measured runs of σ12 at a given rate, from rest, say something.
     bands
         Of the sparse law, by the key of the flow.
-    expectation
-        What a complete law may leave.
     """
-    flows = [flow for flow in flows if _tells(flow)]
+    expectation = explanation.expectation
+    flows = [flow for flow in flows if tells(flow)]
     found = dict(explanation.lack_of_fit)
     refuted = ""
     for name in sorted(explanation.by, key=lambda one: one != _SPARSE):
@@ -76,16 +74,17 @@ def hold_against_late_answers(
             least = max(ARITHMETIC, STRUCTURE * outcomes[name].resolution)
             if late.size <= least or expectation.excuses(late.size):
                 continue
-            said = _in_words(late)
-            one = replace(left.refuted(said), likeness=_ADVICE)
+            as_if = does(late.kind, late.time)
+            said = f"the records follow the law clearly better as if the instrument {as_if}"
+            one = replace(left.refuted(said), likeness=ADVICE)
             refuted = said if name == _SPARSE else ""
         else:
-            one = replace(left.refuted(refuted), likeness=_ADVICE)
+            one = replace(left.refuted(refuted), likeness=ADVICE)
         found[name] = one
     return replace(explanation, lack_of_fit=found)
 
 
-def _tells(flow: Flow) -> bool:
+def tells(flow: Flow) -> bool:
     """Return whether a run shows what an instrument does where the stress changes."""
     if flow.kind not in ("training", "held_out") or (flow.kind == "held_out" and flow.is_truth):
         return False
@@ -137,6 +136,6 @@ def _independent(changes: Sequence[np.ndarray]) -> list[np.ndarray]:
     return list(np.split(kept, ends, axis=1))
 
 
-def _in_words(late: LateAnswer) -> str:
-    does = _DOES[late.kind].format(time=f"{late.time:.2g} s")
-    return f"the records follow the law clearly better as if the instrument {does}"
+def does(kind: Late, time: float) -> str:
+    """Return what an instrument does that has such a filter, as a predicate."""
+    return _DOES[kind].format(time=f"{time:.2g} s")
