@@ -79,10 +79,9 @@ def of_stress(function: Callable[[str, np.ndarray, np.ndarray], np.ndarray]) -> 
     return change
 
 
-def range_switch(name: str, time: np.ndarray, stress: np.ndarray) -> np.ndarray:
-    """Return a stress that is read 2 % higher above 50 Pa, in another range of the torque."""
-    del name, time
-    return stress * (1 + 0.02 * (np.abs(stress) > 50.0))
+def range_switch(more: float):
+    """Return a stress that is read too high above 50 Pa, in another range of the torque."""
+    return lambda name, time, stress: stress * (1 + more * (np.abs(stress) > 50.0))
 
 
 def dried(name: str, time: np.ndarray, stress: np.ndarray) -> np.ndarray:
@@ -107,10 +106,7 @@ def with_strain(offset: float) -> Change:
 
 
 def twice(which: str, law: RateLaw = GIESEKUS):
-    """Return the maker of runs one of which is there a second time, under another name.
-
-    Its noise is another: what is copied exactly is refused.
-    """
+    """Return the maker of runs one of which was measured a second time."""
 
     def make() -> dict[str, Record]:
         runs = recorded(law)()
