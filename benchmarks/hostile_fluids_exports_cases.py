@@ -20,7 +20,7 @@ from hostile_fluids_exports import (
 )
 from hostile_fluids_laboratory import averaged, each, sweep_of
 from hostile_fluids_materials import Heated
-from hostile_fluids_records import GIESEKUS, MOBILITY, SCALE, SQUARE, Case, only, recorded
+from hostile_fluids_records import FLOWS, GIESEKUS, MOBILITY, SCALE, SQUARE, Case, only, recorded
 from independent import Giesekus, JohnsonSegalman, Modes, start_up
 
 _ALONE = {"planted": MOBILITY, "terms": SQUARE}
@@ -110,4 +110,31 @@ LITTLE = {
                          each(of_stress(range_switch(0.01))), terms=SQUARE, **_ALSO_GIESEKUS),
 }  # fmt: skip
 
-CASES: dict[str, Case] = {**LABORATORY_AND_BEFORE, **EXPORTS, **LITTLE}
+# the same where the run held out asks for no rate that was not fitted
+_WITHIN = {**FLOWS, "held.csv": (start_up(1.2), FLOWS["held.csv"][1])}
+WITHIN = {
+    "within_averaged": Case("Giesekus, means over 0.5 s told, held out within",
+                            averaged(0.5, flows=_WITHIN), terms=SQUARE, **_ALSO_GIESEKUS),
+    "within_averaged_little": Case("Giesekus, means over 0.3 s told, held out within",
+                                   averaged(0.3, flows=_WITHIN), terms=SQUARE, **_ALSO_GIESEKUS),
+    "within_lag": Case("Giesekus, a lag of 0.03 s, held out within",
+                       recorded(GIESEKUS, _WITHIN, lag=0.03), terms=SQUARE,
+                       planted={**MOBILITY, "transducer_lag": {"tau": 0.03}},
+                       same_as=("time_delay", "rate_rise_time")),
+    "within_compliance": Case("Giesekus, a tool of 3e-4 1/Pa, held out within",
+                              recorded(GIESEKUS, _WITHIN, compliance=3e-4), terms=SQUARE,
+                              planted={**MOBILITY, "tool_compliance": {}}),
+    "within_offset": Case("Giesekus and 1 Pa, held out within",
+                          recorded(GIESEKUS, _WITHIN, offset=1.0), terms=SQUARE,
+                          planted={**MOBILITY, "stress_offset": {"offset": 1.0}}),
+    "within_drift": Case("Giesekus, 0.3 Pa/s of drift, held out within",
+                         recorded(GIESEKUS, _WITHIN, drift=0.3), terms=SQUARE,
+                         planted={**MOBILITY, "stress_drift": {"drift": 0.3}}),
+    "within_slip": Case("Giesekus, slip of 2e-4 1/(Pa s), held out within",
+                        recorded(GIESEKUS, _WITHIN, slip=2e-4), terms=SQUARE,
+                        planted={**MOBILITY, "wall_slip": {}}, same_as=_TIMES),
+    "within_rounded_mean": Case("Giesekus, every fourth sample, straight lines, held out within",
+                                recorded(GIESEKUS, _WITHIN), interpolated(4), **_ALONE),
+}  # fmt: skip
+
+CASES: dict[str, Case] = {**LABORATORY_AND_BEFORE, **EXPORTS, **LITTLE, **WITHIN}
