@@ -1,5 +1,7 @@
 """What exports, transducers and sessions do, and what is true of it; and every case together."""
 
+from dataclasses import replace
+
 import numpy as np
 from hostile_fluids_cases import LABORATORY_AND_BEFORE
 from hostile_fluids_exports import (
@@ -137,4 +139,12 @@ WITHIN = {
                                 recorded(GIESEKUS, _WITHIN), interpolated(4), **_ALONE),
 }  # fmt: skip
 
-CASES: dict[str, Case] = {**LABORATORY_AND_BEFORE, **EXPORTS, **LITTLE, **WITHIN}
+# and where no run is held out
+NONE_HELD_OUT = {
+    f"all_{name}": replace(case, held_out=())
+    for name, case in {**LITTLE, **{n: EXPORTS[n] for n in ("averaged_little", "cooled")}}.items()
+}
+
+CASES: dict[str, Case] = {
+    **LABORATORY_AND_BEFORE, **EXPORTS, **LITTLE, **WITHIN, **NONE_HELD_OUT,
+}  # fmt: skip
