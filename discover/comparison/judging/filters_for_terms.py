@@ -20,6 +20,7 @@ from discover.identify.rivals.bands import PredictionBand
 from discover.inference.evidence import WINDOW
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
+from discover.learners import RecoveredTerm
 from discover.statistics.late_answers import Filtered, Response, best_filter
 from discover.statistics.residual import fast_part
 from discover.study.declared_model import DeclaredModel
@@ -180,7 +181,7 @@ def _with_bands(
     return wider
 
 
-def _weak(term) -> bool:
+def _weak(term: RecoveredTerm) -> bool:
     if term.ci95 is None:
         return False
     half = 0.5 * (term.ci95[1] - term.ci95[0])
