@@ -9,7 +9,8 @@ data folder and a study file and no more. The rules, written before the first ru
    the runs fitted, or by more than the noise in the run held out.
 3. **Names**: under such a verdict of the loop every effect with a probability of one half or more
    is there, or is an alias of one that is. A name that is less likely than not is listed.
-4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others.
+4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others
+   but such whose interval holds zero, or which are told to be another declared constant.
 5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
 6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
    than two half-bands (rms); 1 % where there is no band.
@@ -29,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import answer
-from hostile_fluids_cases import CASES
+from hostile_fluids_exports_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
 from independent.folders import write_study, write_table

@@ -189,7 +189,9 @@ FLUIDS = {
                              outside=True, model=FITTED),
     "rubber": Case("no fluid: a rubber with a dashpot", recorded(Rubber()), outside=True,
                    model=FITTED, same_as=("solvent_viscosity",)),
-    "rubber_told": Case("no fluid: a rubber", recorded(Rubber()), outside=True),
+    # a Maxwell fluid that does not relax, and a solvent, are one
+    "rubber_told": Case("no fluid: a rubber", recorded(Rubber()), outside=True,
+                        same_as=("solvent_viscosity", "sigma")),
 }  # fmt: skip
 _HEAT = ("viscous_heating",)
 FAULTS = {
@@ -290,7 +292,7 @@ _RATES = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.
 _FEW_LOG = growths(np.geomspace(0.05, 8.0, 15), _RATES)
 _FIVE = growths(np.linspace(0.1, 8.0, 80), _RATES)
 _LOW = growths(np.geomspace(0.1, 20.0, 80), {"a.csv": 0.05, "b.csv": 0.1, "c.csv": 0.2})
-_TIMES, _MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
+THREE_TIMES, _MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
 _MODES = {
     "a.csv": (start_up(0.1), np.geomspace(0.1, 40.0, 80)),
     "b.csv": (start_up(1.0), np.geomspace(0.05, 20.0, 80)),
@@ -299,7 +301,7 @@ _MODES = {
 }
 _SWEEP = {"law": "ucm", "modes": "lve"}
 _WRONG_SWEEP = {
-    "tables": sweep_of((23.0, 52.2, 134.4), _TIMES), "model": _SWEEP, "outside": True,
+    "tables": sweep_of((23.0, 52.2, 134.4), THREE_TIMES), "model": _SWEEP, "outside": True,
     "same_as": (*_GAINS, "relaxation_mode"),
 }  # fmt: skip
 _BOTH = Modes(
@@ -321,7 +323,7 @@ LABORATORY = {
                        recorded(PlatePlate(PhanThienTanner(0.3, "linear", **SCALE))),
                        outside=True, same_as=("ptt_linear",)),
     "wrong_sweep": Case("three Maxwell modes, moduli told 15, −13 and 12 % off",
-                        recorded(Modes(*map(UpperConvectedMaxwell, _MODULI, _TIMES)), _MODES),
+                        recorded(Modes(*map(UpperConvectedMaxwell, _MODULI, THREE_TIMES)), _MODES),
                         **_WRONG_SWEEP),
     "mixed_laws": Case("Giesekus in one mode, linear PTT in the other", recorded(_BOTH),
                        tables=sweep_of((60.0, 60.0), (1.0, 0.2)), model=_SWEEP, outside=True,
@@ -354,7 +356,7 @@ LABORATORY = {
                           same_as=("giesekus_mobility", "wall_slip")),
 }  # fmt: skip
 
-CASES: dict[str, Case] = {
+LABORATORY_AND_BEFORE: dict[str, Case] = {
     **EMPTY, **FLUIDS, **FAULTS, **SAMPLING, **NONE_HELD, **TESTS, **DECLARED, **NOISY,
     **LABORATORY,
 }  # fmt: skip

@@ -18,6 +18,7 @@ from hostile_fluids_records import Case, Record
 from independent.noise import rms
 
 Records = dict[str, Record]
+CONSTANT = {"sigma": "relaxation_time_s", "gammadot": "modulus_Pa"}
 QUANTITY = {
     "stress_Pa": "sigma12", "strain": "strain", "tensile_stress_Pa": "tensile_stress"
 }  # fmt: skip
@@ -89,7 +90,11 @@ def of_compare(case: Case, said: dict, rows, clean: Records, found: dict) -> Non
             found["notes"].append("not explained, though it could be")
         return
     if case.terms is not None:
-        if {t["term"] for t in terms} != set(case.terms):
+        # a term that may be zero, as an interval says, is no claim
+        sure = {t["term"] for t in terms if not _holds_zero(t.get("ci95"))}
+        # nor is one of which it is told that it may as well be another declared constant
+        sure -= {term for term, one in CONSTANT.items() if one in said["undetermined"]}
+        if sure != set(case.terms):
             text = f"the law is {', '.join(found['terms']) or 'the declared one'}"
             found["falsehoods"].append(f"{text}, not {', '.join(case.terms) or 'the declared one'}")
         for term in terms:
@@ -100,6 +105,10 @@ def of_compare(case: Case, said: dict, rows, clean: Records, found: dict) -> Non
     for quantity in ("N1", "N2", "sigma12"):
         if quantity not in open_ and quantity not in said["undetermined"]:
             _band(quantity, rows, clean, found)
+
+
+def _holds_zero(interval) -> bool:
+    return interval is not None and None not in interval and interval[0] <= 0.0 <= interval[1]
 
 
 def _interval(name: str, value: dict, true: float, found: dict) -> None:

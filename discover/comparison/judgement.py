@@ -28,11 +28,9 @@ from discover.comparison.judging.dense_library import (
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
-from discover.comparison.judging.identifiability import (
-    Rival,
-    find_rivals,
-    structure_of,
-)
+from discover.comparison.judging.filters_for_terms import holding_filters
+from discover.comparison.judging.identifiability import Rival, find_rivals, structure_of
+from discover.comparison.judging.late_answers import hold_against_late_answers
 from discover.comparison.judging.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
@@ -154,6 +152,11 @@ def judge(
         wider = holding_one_term_more(tested.bands, beside.structure, left, frame.flows)
         tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
+    of_filters: tuple[str, ...] = ()
+    if chosen is not None and explanation.in_library and not (normal or frame.made):
+        seen = outcomes, tested.bands, chosen, frame.model, frame.flows
+        outcomes, bands, of_filters = holding_filters(*seen)
+        tested = replace(tested, bands=bands)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
     outcomes = with_gain_in_dense(outcomes, tested.others)
@@ -170,6 +173,7 @@ def judge(
     warnings = [
         *_of_modes(outcomes, explanation, expectation),
         *((of_modes.said,) if of_modes.said else ()),
+        *of_filters,
         *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
         *refuted,
         *disagreements(outcomes, _judged(flows), bands),
@@ -257,6 +261,8 @@ def _tested(
         bands = bands if normal else with_other_gain(bands, others)
     seen = frame.bands(bands)
     explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
+    if not frame.made:  # what a known instrument does is in the predictions already
+        explanation = hold_against_late_answers(explanation, outcomes, flows, seen)
     if chosen is None or not explanation.in_library:
         return _Tested(explanation)
     left = at_first.lack_of_fit["tensor_sindy"]

@@ -113,6 +113,16 @@ def test_other_terms_are_no_other_constant(terms):
     assert other_constants(terms, declared()) == []
 
 
+def test_a_small_linear_term_that_the_data_saw_is_another_constant_too():
+    """A law with 0.006 γ̇ is one of a modulus 0.6 % smaller, which nobody knows so well."""
+    seen = RecoveredTerm("gammadot", 0.006, ci95=(0.003, 0.009))
+    (other,) = other_constants([seen], declared())
+    assert other.name == "modulus_Pa"
+    assert other.factor == pytest.approx(0.994)
+    arithmetic = RecoveredTerm("gammadot", 1e-5, ci95=(0.9e-5, 1.1e-5))
+    assert other_constants([arithmetic], declared()) == []
+
+
 def test_where_relaxation_is_left_to_the_learner_its_term_is_no_wrong_time():
     elastic = law_of_terms([], [], {}, linear_relaxation=False)
     model = replace(declared(), law=elastic)

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, PomPom, UpperConvectedMaxwell, oscillation
-from independent.flow import steps
-from independent.instruments import Instrument
+from independent import Giesekus, PomPom, oscillation
 from independent.noise import correlated, white
 
 from discover.comparison.fitting.sampled_rates import with_sampled_rates
@@ -19,15 +17,12 @@ from discover.identify import HiddenStresses, LawTerms
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
-from discover.laws.expansion import law_of_terms
-from discover.learners import RecoveredTerm
 from discover.protocols.control import steady_rates
 from discover.protocols.protocol import (
     in_flow,
     measured_rate,
     oscillatory_shear,
     start_up,
-    step_rates,
 )
 from discover.statistics.residual import Expectation
 
@@ -151,42 +146,6 @@ def test_a_law_that_runs_away_in_a_training_run_explains_nothing(responses):
     assert found.verdict == "unexplained"
     assert found.to_json()["lack_of_fit"]["tensor_sindy"]["probability"] is None
     assert "runs away in laos_1_0.25" in found.lack_of_fit["tensor_sindy"].reason
-
-
-# five terms that a search chose for a Maxwell fluid in steps behind a bearing's friction
-RESTLESS = {
-    "I": 0.26240704183850394,
-    "gammadot": -0.42589412514790925,
-    "sigma.gammadot.gammadot+gammadot.gammadot.sigma": 1.5514043861830438,
-    "tr(gammadot.gammadot)*I": 0.6242168717959209,
-    "tr(sigma.gammadot)*gammadot": -1.5507287562727032,
-}
-
-
-@pytest.mark.parametrize(
-    ("law", "instrument", "verdict"),
-    [
-        (RESTLESS, Instrument(friction=6.166), "unexplained"),
-        # the negative control: a gain is a law of another modulus, which rests
-        ({"gammadot": -0.1}, Instrument(gain=0.1), "explained"),
-    ],
-)
-def test_a_law_that_builds_up_stress_at_rest_explains_no_run_from_rest(law, instrument, verdict):
-    times, at = np.linspace(0.02, 8.0, 120), [0.0, 4.0]
-    fluid = UpperConvectedMaxwell(100.0, 1.0)
-    rates = ((1.0, 3.0), (3.0, 0.5))
-    records = [instrument.record(fluid, steps(at, pair), times).stress for pair in rates]
-    flows = [
-        Flow(f"{pair}", "training", step_rates(at, pair), times, times, {"sigma12": record}, record)
-        for pair, record in zip(rates, noisy(records, correlated, 0.01, 0.6), strict=True)
-    ]
-    terms = tuple(RecoveredTerm(name, value) for name, value in law.items())
-    found = Fluid(law_of_terms([*law], [*law.values()], {}, True), [100.0], [1.0])
-    one = outcome("tensor_sindy", flows, [predict(found, flow)["sigma12"] for flow in flows])
-    # by its fit alone it would explain the records, the friction as well as the gain
-    assert explain({"tensor_sindy": one}, flows, Expectation()).verdict == "explained"
-    one = replace(one, terms=terms)
-    assert explain({"tensor_sindy": one}, flows, Expectation()).verdict == verdict
 
 
 def test_one_learner_is_enough_to_explain_but_not_to_determine(responses):

@@ -26,6 +26,10 @@ TIME_TERM, MODULUS_TERM = "sigma", "gammadot"
 LINEAR_TERMS = (TIME_TERM, MODULUS_TERM)
 """Terms that change the moduli at vanishing strain."""
 
+_SEEN = 1e-3
+"""Relative difference of a constant that a term amounts to, from which on it is told if its
+interval says that there is one; exact data tell smaller ones, which are arithmetic."""
+
 
 @dataclass(frozen=True)
 class OtherConstant:
@@ -80,8 +84,9 @@ class OtherConstant:
 def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> list[OtherConstant]:
     """Return which declared constants the linear terms of a law amount to.
 
-    What differs by less than an experiment can be expected to see is none; nor is a term that
-    leaves no positive time or modulus, or one without an interval, which other terms may replace.
+    What differs by less than an experiment can be expected to see is none, unless this one saw it;
+    nor is a term that leaves no positive time or modulus, or one without an interval, which other
+    terms may replace.
     """
     found = []
     for term in terms:
@@ -101,11 +106,21 @@ def other_constants(terms: Iterable[RecoveredTerm], model: DeclaredModel) -> lis
         if min(totals) > 0.0:
             low, high = sorted(1.0 / t if term.term == TIME_TERM else t for t in totals[1:])
             limits = low, high
-        if abs(factor - 1.0) > SEPARATED:
+        if abs(factor - 1.0) > (_SEEN if _found(term, model) else SEPARATED):
             alone = float(declared[0]) if len(declared) == 1 else None
             slip = _slip(term, model) if term.term == TIME_TERM and alone is not None else None
             found.append(OtherConstant(term.term, term.coefficient, alone, factor, limits, slip))
     return found
+
+
+def _found(term: RecoveredTerm, model: DeclaredModel) -> bool:
+    """Return whether a linear term is more than its interval leaves of none.
+
+    Where relaxation is left to the learner its term is there in any case.
+    """
+    if term.ci95 is None or (term.term == TIME_TERM and not model.law.linear_relaxation):
+        return False
+    return not term.ci95[0] <= 0.0 <= term.ci95[1]
 
 
 def _slip(term: RecoveredTerm, model: DeclaredModel) -> float | None:

@@ -11,6 +11,7 @@ from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import Repeats
+from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.sampling import sampling_interval
@@ -19,6 +20,9 @@ from discover.statistics.residual import STRUCTURE, Expectation
 
 ARITHMETIC = 1e-5
 """Relative misfit that both integrations together may leave: the floor of the sparse search."""
+
+_NONE = 1e-3
+"""Coefficient of I, of the modulus, up to which arithmetic and rates between samples make one."""
 
 _RESTLESS = (
     "the law builds up stress without any flow, which no fluid does that these runs, from rest, "
@@ -183,7 +187,13 @@ def _rests(outcome: LearnerOutcome) -> bool:
     Of all terms only I alone is there at rest. With it σ + c I is the stress of a law of another
     modulus, so that it takes the start from rest for one from a strained state.
     """
-    return not any(t.term == "I" and abs(t.coefficient) > SEPARATED for t in outcome.terms)
+    return not any(t.term == "I" and _there(t) for t in outcome.terms)
+
+
+def _there(term: RecoveredTerm) -> bool:
+    """Return whether a term is more than its interval, or arithmetic, leaves of none."""
+    size, (low, high) = abs(term.coefficient), term.ci95 or (0.0, 0.0)
+    return size > SEPARATED or (size > _NONE and (low > 0.0 or high < 0.0))
 
 
 def _from_rest(flow: Flow) -> bool:

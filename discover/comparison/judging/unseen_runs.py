@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from discover.comparison.judging.explanation import ARITHMETIC, Explanation
 from discover.comparison.judging.statements import IN_NOISE
@@ -54,7 +55,9 @@ def hold_against_unseen(
     for name in explanation.by:
         outliers[name] = _outliers(outcomes[name], unseen, expectation)
         own = bands if name == banded else None
-        columns = [_columns(outcomes[name], flow, own) for flow in unseen]
+        columns = [
+            flow.even(_measured(flow)) * changes_along(outcomes[name], flow, own) for flow in unseen
+        ]
         reason = _refuted(
             outcomes[name], training, unseen, columns, found[name], expectation, outliers[name]
         )
@@ -186,20 +189,29 @@ def _residual(outcome: LearnerOutcome, flow: Flow) -> np.ndarray | None:
     return flow.even(record) * (predicted["sigma12"] - record)
 
 
-def _columns(
+def changes_along(
     outcome: LearnerOutcome, flow: Flow, bands: Mapping[str, PredictionBand] | None
-) -> np.ndarray:
-    """Return changes of σ12 by one standard deviation each, shape (directions, n); (0, n): none."""
-    even = flow.even(_measured(flow))
+) -> Float[np.ndarray, "directions n"]:
+    """Return changes of σ12 by one standard deviation each; none, shape (0, n), where not known.
+
+    Parameters
+    ----------
+    outcome
+        Of a learner.
+    flow
+        Any that is drawn.
+    bands
+        Of its law, by the key of the flow; None where it has its own.
+    """
     if bands is not None:
         band = bands.get(flow.key)
         directions = None if band is None else band.directions
-        return np.zeros((0, len(flow.times))) if directions is None else even * directions
+        return np.zeros((0, len(flow.times))) if directions is None else directions
     limits = outcome.bands.get(flow.key)
     if limits is None:
         return np.zeros((0, len(flow.times)))
     low, high = limits["sigma12"]
-    return even * (high - low)[None] / (2.0 * _HALF_BAND)
+    return (high - low)[None] / (2.0 * _HALF_BAND)
 
 
 def _size(values: np.ndarray) -> float:

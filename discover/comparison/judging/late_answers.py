@@ -1,0 +1,141 @@
+"""A law that explains records only up to a filter of the instrument explains nothing yet.
+
+Terms of the library that act where the stress changes fast take up part of what a filter does, and
+pass for terms of the fluid. So it is asked whether the records follow the law better as through an
+instrument that answers late, or averages (`discover.statistics.late_answers`).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.judging.unseen_runs import changes_along
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+from discover.protocols.sampling import sampling_interval
+from discover.statistics.late_answers import AGREED, Late, Response, late_answer
+from discover.statistics.residual import STRUCTURE
+
+_SPARSE = "tensor_sindy"
+
+_SAME = 3e-2
+"""Of the largest change that constants make: below it lies what is not linear in them."""
+
+_DOES: Mapping[Late, str] = {
+    "delay": "told each stress {time} late",
+    "lag": "followed the stress with a lag of {time}",
+    "mean_since": "told means over the last {time}",
+    "mean_about": "told means over {time} about each sample",
+}
+ADVICE = (
+    "look up the filter and the averaging of the instrument's software, and export what is not "
+    "averaged; a lag, a delay or a rise time of the rate can be fitted along, under [model] effects"
+)
+
+
+def hold_against_late_answers(
+    explanation: Explanation,
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Iterable[Flow],
+    bands: Mapping[str, PredictionBand],
+) -> Explanation:
+    """Return what explains the runs as well without a filter of the instrument as with one.
+
+    Where the sparse law does not, nothing else does: what it needs the filter for is in the
+    records, which another law has taken for the fluid's.
+
+    Parameters
+    ----------
+    explanation
+        What explains the runs, those held out among them.
+    outcomes
+        By learner, with predictions of the records.
+    flows
+        Of which fitted and measured runs of σ12 at a given rate, from rest, say something.
+    bands
+        Of the sparse law, by the key of the flow.
+    """
+    expectation = explanation.expectation
+    flows = [flow for flow in flows if tells(flow)]
+    found = dict(explanation.lack_of_fit)
+    refuted = ""
+    for name in sorted(explanation.by, key=lambda one: one != _SPARSE):
+        left = found[name]
+        if expectation.noise is not None and left.misfit <= left.expected:
+            continue  # of a noise that is given only who gives it knows what is in it
+        if not refuted:
+            runs = _responses(explanation, name, outcomes[name], flows, bands)
+            late = late_answer(runs) if runs else None
+            if late is None or late.probability > AGREED:
+                continue
+            least = max(ARITHMETIC, STRUCTURE * outcomes[name].resolution)
+            if late.size <= least or expectation.excuses(late.size):
+                continue
+            as_if = does(late.kind, late.time)
+            said = f"the records follow the law clearly better as if the instrument {as_if}"
+            one = replace(left.refuted(said), likeness=ADVICE)
+            refuted = said if name == _SPARSE else ""
+        else:
+            one = replace(left.refuted(refuted), likeness=ADVICE)
+        found[name] = one
+    return replace(explanation, lack_of_fit=found)
+
+
+def tells(flow: Flow) -> bool:
+    """Return whether a run shows what an instrument does where the stress changes."""
+    if flow.kind not in ("training", "held_out") or (flow.kind == "held_out" and flow.is_truth):
+        return False
+    return bool(np.isfinite(sampling_interval(flow.times, flow.protocol)))
+
+
+def _responses(
+    explanation: Explanation,
+    name: str,
+    outcome: LearnerOutcome,
+    flows: Sequence[Flow],
+    bands: Mapping[str, PredictionBand],
+) -> list[Response]:
+    """Return the runs as a law predicts them; none where it does not follow them all."""
+    left = explanation.lack_of_fit[name]
+    training = [flow for flow in flows if flow.kind == "training"]
+    fitted = zip(training, left.outlier_samples, strict=False)
+    knocks = {flow.key: samples for flow, samples in fitted if len(flows)}
+    knocks |= explanation.outliers.get(name, {})
+    rows, changes = [], []
+    for flow in flows:
+        prediction = outcome.predictions.get(flow.key)
+        record = flow.measured if flow.kind == "training" else flow.reference.get("sigma12")
+        if prediction is None or record is None or not np.all(np.isfinite(prediction["sigma12"])):
+            return []
+        columns = changes_along(outcome, flow, bands if name == _SPARSE else None)
+        kept = np.delete(np.arange(len(flow.times)), list(knocks.get(flow.key, ())))
+        stress = np.asarray(prediction["sigma12"], dtype=float)
+        rows.append((flow.times[kept], stress[kept], (stress - np.asarray(record))[kept]))
+        changes.append(columns[:, kept])
+    if outcome.terms and not all(len(change) for change in changes):
+        return []  # how uncertain the constants are is not known
+    return [
+        Response(*row, columns=change)
+        for row, change in zip(rows, _independent(changes), strict=True)
+    ]
+
+
+def _independent(changes: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return as many combinations of the changes as differ, those of all runs together."""
+    if len({len(change) for change in changes}) != 1 or not all(map(len, changes)):
+        return [np.zeros((0, change.shape[1])) for change in changes]
+    every = np.concatenate(changes, axis=1)
+    if not np.all(np.isfinite(every)):
+        return [np.zeros((0, change.shape[1])) for change in changes]
+    _, size, rows = np.linalg.svd(every, full_matrices=False)
+    kept = rows[size > _SAME * size[0]] if size[0] > 0.0 else rows[:0]
+    ends = np.cumsum([change.shape[1] for change in changes])[:-1]
+    return list(np.split(kept, ends, axis=1))
+
+
+def does(kind: Late, time: float) -> str:
+    """Return what an instrument does that has such a filter, as a predicate."""
+    return _DOES[kind].format(time=f"{time:.2g} s")
