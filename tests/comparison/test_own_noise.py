@@ -14,8 +14,8 @@ NOISES = {"sigma12": 0.002, "N1": 0.05}
 """Relative noise: a transducer of torque, and one of thrust."""
 
 
-def found_in(material):
-    """Return what a comparison finds in start-ups by scipy with σ12 and N1, both fitted."""
+def start_ups(material) -> dc.Dataset:
+    """Return start-ups by scipy with σ12 and N1, each with its noise."""
     rng, runs = np.random.default_rng(3), []
     for rate in RATES:
         exact = material.respond(start_up(rate), TIMES)
@@ -29,8 +29,13 @@ def found_in(material):
                 first_normal_stress_difference=n1,
             )
         )  # fmt: skip
+    return dc.Dataset("noisy N1", tuple(runs))
+
+
+def found_in(material, of=lambda data: data):
+    """Return what a comparison finds where both are fitted."""
     return dc.compare(
-        dc.Dataset("noisy N1", tuple(runs)),
+        of(start_ups(material)),
         dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
         learners=["tensor_sindy"],
         library={"degree": 0},
@@ -81,3 +86,8 @@ def test_with_equal_weights_the_noise_of_n1_leaves_a_pattern_in_the_stress(monke
 def test_a_fluid_of_another_kind_stays_unexplained_beside_a_noisy_n1():
     found = found_in(Structured(2.0, (2.0,), in_modulus=True, modulus=MODULUS, mobility=0.0))
     assert found.explanation.verdict == "unexplained"
+
+
+def test_normal_stresses_that_are_records_of_their_own_are_not_fitted_once_more():
+    with pytest.raises(dc.InputError, match="would fit once more"):
+        found_in(Giesekus(MOBILITY, MODULUS, TIME), dc.Dataset.quantity_by_quantity)

@@ -126,9 +126,15 @@ def make_problem(
     Raises
     ------
     InputError
-        If runs or moduli are unusable.
+        If runs or moduli are unusable, or normal stresses would be fitted twice.
     """
     runs = as_runs(runs)
+    own = [run.name for run in runs if run.quantity in ("N1", "N2")]
+    if use_normal_stresses and own:
+        raise InputError(
+            f"{own[0]!r} is a record of its own, which use_normal_stresses would fit once more. "
+            "Leave out one of the two."
+        )
     modulus = np.atleast_1d(np.asarray(modulus, dtype=float))
     relaxation_time = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
     if modulus.shape != relaxation_time.shape or modulus.ndim != 1:
