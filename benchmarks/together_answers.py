@@ -57,6 +57,7 @@ def of_compare(folder: Path, fluid: str) -> dict[str, Any]:
     fits = found.explanation.lack_of_fit
     row["error"] = fits["tensor_sindy"].misfit if "tensor_sindy" in fits else None
     row["by_mode"] = None if found.by_mode is None else found.by_mode.to_json()
+    by_mode(row, case)
     explained = verdict == "explained"
     for term in terms:
         if term.term in case.terms and term.ci95 is not None:
@@ -67,6 +68,19 @@ def of_compare(folder: Path, fluid: str) -> dict[str, Any]:
         row["false"].append("another law is called an explanation")
     _unseen(row, fluid, found.equation("tensor_sindy").fluid(), explained, row["undetermined"])
     return row
+
+
+def by_mode(row: dict[str, Any], case: Case) -> None:
+    """Add to a row of a comparison what its law with a constant of each mode says."""
+    law = row.get("by_mode")
+    if law is None or law["verdict"] != "explained":
+        return
+    for effect, found in law["constants"].items():
+        if effect not in case.effects:
+            row["false"].append(f"{effect} by mode is not there")
+        for value, one in zip(case.by_mode.get(effect, ()), found["modes"], strict=False):
+            name = f"at {one['relaxation_time_s']:g} s"
+            _constant(row, name, value, one["value"], one["ci95"], claimed=True)
 
 
 def _modes(stage) -> tuple:

@@ -14,6 +14,8 @@ def line(row: dict) -> str:
         f"{row['together']} {row['fluid']:10s} {row['task']:10s} {row['verdict']:17s} "
         f"{names_of(row) or '-'} [{_constants(row)}] {_missed(row)} {row['seconds']:.0f} s"
     )
+    if _of_modes(row):
+        text += f" by mode: {_of_modes(row)}"
     if row.get("undetermined"):
         text += f" open: {', '.join(row['undetermined'])}"
     return with_falsehoods(text, row)
@@ -50,12 +52,23 @@ def _cell(row: dict) -> str:
     other = len(row["named"]) - len(said)
     said += [f"{other} other term{'s' * (other > 1)}"] if other else []
     text = ", ".join(said or ["nothing"])
-    text += f": {_constants(row)}" if row["constants"] else ""
+    if row["constants"] and not _of_modes(row):
+        text += f": {_constants(row)}"
     parts = [text, "*unexplained*"] if row["verdict"] == "unexplained" else [text]
     if row.get("undetermined"):
         parts.append(f"open: {', '.join(row['undetermined'])}")
     parts.append(_missed(row))
+    if _of_modes(row):
+        parts.append(f"by mode *explained*, {_of_modes(row)}: {_constants(row)}")
     return "; ".join([*filter(None, parts), *(f"**{text}**" for text in row["false"])])
+
+
+def _of_modes(row: dict) -> str:
+    """Return what has a constant of each mode in a comparison that explains by it."""
+    law = row.get("by_mode")
+    if law is None or law["verdict"] != "explained":
+        return ""
+    return ", ".join(f"`{name}`" for name in law["constants"])
 
 
 def _constants(row: dict) -> str:
