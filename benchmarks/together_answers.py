@@ -116,15 +116,19 @@ def _constant(row, name: str, value: float, found: float, interval, claimed: boo
 def _unseen(row, fluid: str, said, claimed: bool, open_) -> None:
     """Add how far a law misses a start-up that no fit saw, and that it is false where claimed."""
     import discover as dc
-    from discover.simulate import simulate
+    from discover.simulate import SimulationError, simulate
 
     times, exact = unseen(fluid)
-    stress = simulate(said, dc.start_up(UNSEEN_RATE), times)
-    predicted = {
-        "sigma12": stress.shear_stress,
-        "N1": stress.first_normal_stress_difference,
-        "N2": stress.second_normal_stress_difference,
-    }
+    try:
+        stress = simulate(said, dc.start_up(UNSEEN_RATE), times)
+    except SimulationError:  # the law runs away there
+        predicted = dict.fromkeys(("sigma12", "N1", "N2"), np.inf)
+    else:
+        predicted = {
+            "sigma12": stress.shear_stress,
+            "N1": stress.first_normal_stress_difference,
+            "N2": stress.second_normal_stress_difference,
+        }
     for quantity, there in predicted.items():
         true = getattr(exact, quantity)
         # N2 may be zero, and is measured by N1

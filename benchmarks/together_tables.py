@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from answer_tables import TASKS, answers, names_of, table, with_falsehoods, with_interval
 from together_records import FLUIDS, TOGETHER
 
@@ -77,6 +78,8 @@ def _constants(row: dict) -> str:
 
 def _missed(row: dict) -> str:
     """Return the miss in the start-up that was not seen, in percent."""
+    if np.inf in row["unseen"].values():
+        return "runs away"
     return ", ".join(
         f"{name} {100 * miss if miss > _ARITHMETIC else 0.0:.2g} %"
         for name, miss in row["unseen"].items()
