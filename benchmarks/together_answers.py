@@ -57,6 +57,7 @@ def of_compare(folder: Path, fluid: str) -> dict[str, Any]:
     fits = found.explanation.lack_of_fit
     row["error"] = fits["tensor_sindy"].misfit if "tensor_sindy" in fits else None
     row["by_mode"] = None if found.by_mode is None else found.by_mode.to_json()
+    by_mode(row, case)
     explained = verdict == "explained"
     for term in terms:
         if term.term in case.terms and term.ci95 is not None:
@@ -67,6 +68,19 @@ def of_compare(folder: Path, fluid: str) -> dict[str, Any]:
         row["false"].append("another law is called an explanation")
     _unseen(row, fluid, found.equation("tensor_sindy").fluid(), explained, row["undetermined"])
     return row
+
+
+def by_mode(row: dict[str, Any], case: Case) -> None:
+    """Add to a row of a comparison what its law with a constant of each mode says."""
+    law = row.get("by_mode")
+    if law is None or law["verdict"] != "explained":
+        return
+    for effect, found in law["constants"].items():
+        if effect not in case.effects:
+            row["false"].append(f"{effect} by mode is not there")
+        for value, one in zip(case.by_mode.get(effect, ()), found["modes"], strict=False):
+            name = f"at {one['relaxation_time_s']:g} s"
+            _constant(row, name, value, one["value"], one["ci95"], claimed=True)
 
 
 def _modes(stage) -> tuple:
@@ -102,15 +116,19 @@ def _constant(row, name: str, value: float, found: float, interval, claimed: boo
 def _unseen(row, fluid: str, said, claimed: bool, open_) -> None:
     """Add how far a law misses a start-up that no fit saw, and that it is false where claimed."""
     import discover as dc
-    from discover.simulate import simulate
+    from discover.simulate import SimulationError, simulate
 
     times, exact = unseen(fluid)
-    stress = simulate(said, dc.start_up(UNSEEN_RATE), times)
-    predicted = {
-        "sigma12": stress.shear_stress,
-        "N1": stress.first_normal_stress_difference,
-        "N2": stress.second_normal_stress_difference,
-    }
+    try:
+        stress = simulate(said, dc.start_up(UNSEEN_RATE), times)
+    except SimulationError:  # the law runs away there
+        predicted = dict.fromkeys(("sigma12", "N1", "N2"), np.inf)
+    else:
+        predicted = {
+            "sigma12": stress.shear_stress,
+            "N1": stress.first_normal_stress_difference,
+            "N2": stress.second_normal_stress_difference,
+        }
     for quantity, there in predicted.items():
         true = getattr(exact, quantity)
         # N2 may be zero, and is measured by N1

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from answer_tables import TASKS, answers, names_of, table, with_falsehoods, with_interval
 from together_records import FLUIDS, TOGETHER
 
@@ -14,6 +15,8 @@ def line(row: dict) -> str:
         f"{row['together']} {row['fluid']:10s} {row['task']:10s} {row['verdict']:17s} "
         f"{names_of(row) or '-'} [{_constants(row)}] {_missed(row)} {row['seconds']:.0f} s"
     )
+    if _of_modes(row):
+        text += f" by mode: {_of_modes(row)}"
     if row.get("undetermined"):
         text += f" open: {', '.join(row['undetermined'])}"
     return with_falsehoods(text, row)
@@ -50,12 +53,23 @@ def _cell(row: dict) -> str:
     other = len(row["named"]) - len(said)
     said += [f"{other} other term{'s' * (other > 1)}"] if other else []
     text = ", ".join(said or ["nothing"])
-    text += f": {_constants(row)}" if row["constants"] else ""
+    if row["constants"] and not _of_modes(row):
+        text += f": {_constants(row)}"
     parts = [text, "*unexplained*"] if row["verdict"] == "unexplained" else [text]
     if row.get("undetermined"):
         parts.append(f"open: {', '.join(row['undetermined'])}")
     parts.append(_missed(row))
+    if _of_modes(row):
+        parts.append(f"by mode *explained*, {_of_modes(row)}: {_constants(row)}")
     return "; ".join([*filter(None, parts), *(f"**{text}**" for text in row["false"])])
+
+
+def _of_modes(row: dict) -> str:
+    """Return what has a constant of each mode in a comparison that explains by it."""
+    law = row.get("by_mode")
+    if law is None or law["verdict"] != "explained":
+        return ""
+    return ", ".join(f"`{name}`" for name in law["constants"])
 
 
 def _constants(row: dict) -> str:
@@ -64,6 +78,8 @@ def _constants(row: dict) -> str:
 
 def _missed(row: dict) -> str:
     """Return the miss in the start-up that was not seen, in percent."""
+    if np.inf in row["unseen"].values():
+        return "runs away"
     return ", ".join(
         f"{name} {100 * miss if miss > _ARITHMETIC else 0.0:.2g} %"
         for name, miss in row["unseen"].items()

@@ -10,10 +10,12 @@ from discover.comparison.instrument.known import Known
 from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.learning import Learning
 from discover.comparison.outcomes.expected import expectation_of
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
+from discover.dataset.run import Run
 from discover.dataset.run_table import kind_of_record
+from discover.learners.trajectories.problem import OBSERVED
 from discover.progress import Progress
 from discover.statistics.noise_weights import weights_by_noise
 from discover.study.data import StudyData
@@ -55,11 +57,11 @@ def learned_by_noise(
     if _BY_ITS_LAW not in own:
         return learnt
     seen = _seen(study, known, own)
-    weights = _weights(seen, data)
+    weights = _weights(seen, data.fit.runs, study.compare.use_normal_stresses)
     if weights is None:
         return learnt
-    progress("runs differ in noise: once more, each run weighed by its own", 1.0)
-    weighed = with_each_run(data, lambda run: replace(run, weight=weights.get(run.name, 1.0)))
+    progress("records differ in noise: once more, each weighed by its own", 1.0)
+    weighed = with_each_run(data, lambda run: _weighed(run, weights))
     there = known_in(weighed)
     again = replace(learning, prefix="by_noise_").outcomes(list(own), there, progress)
     before, after = ({t.term for t in of[_BY_ITS_LAW].terms} for of in (own, again))
@@ -87,19 +89,40 @@ def _seen(study: Study, known: Known, own: Mapping[str, LearnerOutcome]) -> _See
     return _Seen(flows, outcome, left.verdict == "explained", left.random)
 
 
-def _weights(seen: _Seen, data: StudyData) -> dict[str, float] | None:
-    """Return the weight of each run by name; None where equal weights are as good."""
-    left = []
-    for flow in seen.flows:
+def _weights(seen: _Seen, runs: Sequence[Run], normal: bool) -> dict[str, list[float]] | None:
+    """Return how much each record of a run weighs, by the run's name; None where all weigh alike.
+
+    The records are what the run records and, where they are fitted beside it, N1 and N2. Weights of
+    the former are those that they would have without the others.
+    """
+    places, kinds, left = [], [], []
+    for flow, run in zip(seen.flows, runs, strict=True):
         predicted = seen.outcome.predictions[flow.key]
         if predicted is None:
             return None
-        record = np.asarray(flow.measured, dtype=float)
-        even = flow.even(record)
-        size = float(np.sqrt(np.mean((even * record) ** 2))) or 1.0
-        left.append(even * (predicted["sigma12"] - record) / size)
-    runs = data.fit.runs
-    weights = weights_by_noise(left, list(map(kind_of_record, runs)), seen.random)
-    if weights is None:
+        for place, (quantity, column) in enumerate(zip(QUANTITIES, OBSERVED, strict=True)):
+            record = getattr(run, column)
+            if record is None or (place > 0 and not (normal and np.any(record))):
+                continue
+            even = flow.even(record)
+            size = float(np.sqrt(np.mean((even * record) ** 2))) or 1.0
+            left.append(even * (predicted[quantity] - record) / size)
+            places.append((run.name, place))
+            kinds.append(kind_of_record(run) + (f", {quantity}" if place else ""))
+    found = weights_by_noise(left, kinds, seen.random)
+    if found is None:
         return None
-    return {run.name: weight for run, weight in zip(runs, weights, strict=True)}
+    of = dict(zip(places, found, strict=True))
+    unit = np.mean([1.0 / weight for (_, place), weight in of.items() if place == 0])
+    return {
+        run.name: [float(unit) * of.get((run.name, place), 1.0) for place in range(3)]
+        for run in runs
+    }
+
+
+def _weighed(run: Run, weights: Mapping[str, Sequence[float]]) -> Run:
+    """Return a run with its weights; one that is not fitted keeps its own."""
+    if run.name not in weights:
+        return run
+    own, first, second = weights[run.name]
+    return replace(run, weight=own, normal_weights=(first, second))

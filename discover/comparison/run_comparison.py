@@ -169,7 +169,7 @@ def compare(
     )
 
 
-_BY_NOISE = ". Runs differ in noise, and each weighs by its own"
+_BY_NOISE = ". Records differ in noise, and each weighs by its own"
 _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 
 

@@ -90,6 +90,8 @@ class Run:
     weight
         How much its samples weigh in a fit beside those of other runs: one over the size of its
         noise, in units of the mean. Misfits that are told or judged do not know it.
+    normal_weights
+        The same of its N1 and N2, where they are fitted beside the stress.
 
     Examples
     --------
@@ -119,6 +121,7 @@ class Run:
     loss_modulus: Float[np.ndarray, " _"] | None = None
     rate_steps: tuple[RateStep, ...] = ()
     weight: float = 1.0
+    normal_weights: tuple[float, float] = (1.0, 1.0)
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -49,7 +49,8 @@ class TrajectoryProblem(eqx.Module):
     weight
         Of each observation: one over the root-mean-square of its run and kind, in a flow curve
         over its own size, over the square root of the number of observations; zero where nothing
-        was observed. A residual vector thus has a norm equal to the relative misfit.
+        was observed; times how much it weighs. With equal weights a residual vector thus has a norm
+        equal to the relative misfit.
     order_of_time
         Time over the duration of the run, shape (runs, n).
     """
@@ -125,9 +126,15 @@ def make_problem(
     Raises
     ------
     InputError
-        If runs or moduli are unusable.
+        If runs or moduli are unusable, or normal stresses would be fitted twice.
     """
     runs = as_runs(runs)
+    own = [run.name for run in runs if run.quantity in ("N1", "N2")]
+    if use_normal_stresses and own:
+        raise InputError(
+            f"{own[0]!r} is a record of its own, which use_normal_stresses would fit once more. "
+            "Leave out one of the two."
+        )
     modulus = np.atleast_1d(np.asarray(modulus, dtype=float))
     relaxation_time = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
     if modulus.shape != relaxation_time.shape or modulus.ndim != 1:
@@ -145,6 +152,7 @@ def make_problem(
     order = np.full((len(runs), padded), np.inf)
     for i, run in enumerate(runs):
         order[i, : len(run)] = run.time / max(run.time[-1], np.finfo(float).tiny)
+        share = (run.weight, *run.normal_weights)
         for kind, name in enumerate(OBSERVED):
             values = getattr(run, name)
             if values is None or (kind > 0 and not use_normal_stresses):
@@ -158,7 +166,7 @@ def make_problem(
                     )
                 continue  # a normal stress difference may vanish in truth, but sets no scale
             target[i, : len(run), kind] = values
-            weight[i, : len(run), kind] = run.weight / run.sizes(values)
+            weight[i, : len(run), kind] = share[kind] / run.sizes(values)
     base = UpperConvectedMaxwell(known_relaxation) if base is None else base
     fluid = Fluid(base, modulus, relaxation_time)
     flows = lay_out(
