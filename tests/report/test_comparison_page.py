@@ -11,10 +11,10 @@ import pytest
 from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.comparison.judging.statements import IN_LIBRARY, Statement, no_flow_left
 from discover.dataset.repeats import Repeats
 from discover.learners import RecoveredTerm
-from discover.protocols.control import steady_rates
+from discover.protocols.control import oscillations, steady_rates
 from discover.protocols.kinematics import ONLY_STATES
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
@@ -240,6 +240,23 @@ def test_a_law_of_one_run_is_fitted_and_not_tested():
     found = comparison_verdict(made_up(flows=flows[:1]))[0]
     assert found.startswith("Fitted, not tested")
     assert comparison_verdict(made_up(flows=flows))[0].startswith("Explained")  # the control
+
+
+@pytest.mark.parametrize(("strain", "untested"), [(0.01, True), (2.0, False)])
+def test_a_sweep_at_small_strain_is_no_flow_that_a_law_could_fail_in(strain, untested):
+    sweep = oscillations(np.full(len(TIMES), strain), np.geomspace(0.1, 10.0, len(TIMES)))
+    one = made_up().flows[0]
+    flows = [one, replace(one, name="sweep", protocol=sweep)]
+    assert no_flow_left(flows, n_terms=2) == untested
+
+
+def test_in_flows_that_nothing_tested_a_fitted_law_leaves_the_shear_stress_open_too():
+    statement = Statement("sigma12", "no", "No.", in_others=True)
+    fitted, held_out = made_up().flows
+    assert not statement.leaves_open("sigma12", fitted)
+    assert not statement.leaves_open("sigma12", held_out)
+    assert statement.leaves_open("sigma12", replace(fitted, kind="test"))
+    assert statement.title == "σ12 in other flows"
 
 
 def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):

@@ -37,6 +37,10 @@ _ONLY_EXTENSION = (
     "the choice of the law that fits."
 )
 _IN_TRANSIENTS = "σ12 in transients"
+_IN_OTHERS = "σ12 in other flows"
+_MEASURED = ("training", "held_out")
+LINEAR_STRAIN = 0.4
+"""Amplitude up to which an oscillation says what modes are there, and hardly anything of terms."""
 _UNTESTED = (
     "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
     "tested the law, and {} is not determined. Fit another run, or hold one out."
@@ -66,6 +70,8 @@ class Statement:
         What the verdict says of it; empty where that needs no words of its own.
     in_transients
         Whether it is of transients only, and not of steady and periodic states.
+    in_others
+        Whether it is only of flows that were neither fitted nor held out.
     """
 
     quantity: str
@@ -73,12 +79,15 @@ class Statement:
     text: str
     brief: str = ""
     in_transients: bool = False
+    in_others: bool = False
 
     @property
     def title(self) -> str:
         """The quantity as a reader knows it."""
         if self.in_transients:
             return _IN_TRANSIENTS
+        if self.in_others:
+            return _IN_OTHERS
         return _TITLES.get(self.quantity, self.quantity)
 
     def leaves_open(self, quantity: str, flow: Flow) -> bool:
@@ -90,6 +99,8 @@ class Statement:
             return False
         if quantity != "sigma12":
             return True
+        if self.in_others and flow.kind in _MEASURED:
+            return False
         return flow.in_shear and not (self.in_transients and flow.is_of_states)
 
     @property
@@ -210,6 +221,8 @@ def make_statements(
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
     untested = no_flow_left(flows, n_terms)
+    if untested and not states:
+        found = [Statement("sigma12", "no", _UNTESTED.format("σ12 in them"), in_others=True)]
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
@@ -246,12 +259,21 @@ def only_states(flows: Sequence[Flow]) -> bool:
 
 
 def _flows_measured(flows: Sequence[Flow]) -> int:
-    """Return how many flows were fitted or held out; each state of a table is one."""
-    return sum(len(flow.times) if flow.is_of_states else 1 for flow in _measured(flows))
+    """Return how many flows were fitted or held out that a law could fail in.
+
+    Each state of a table is one, but none of an oscillation so small that it is linear.
+    """
+    return sum(_flows_in(flow) for flow in _measured(flows))
+
+
+def _flows_in(flow: Flow) -> int:
+    if flow.protocol.control == "oscillation":
+        return int(np.count_nonzero(np.asarray(flow.strain) > LINEAR_STRAIN))
+    return len(flow.times) if flow.is_of_states else 1
 
 
 def _measured(flows: Sequence[Flow]) -> list[Flow]:
-    return [flow for flow in flows if flow.kind in ("training", "held_out")]
+    return [flow for flow in flows if flow.kind in _MEASURED]
 
 
 def claimed(
