@@ -8,9 +8,7 @@ from discover.closed_loop.judging.before_after import strain_of
 from discover.closed_loop.runs import FEWEST_LINEAR_SAMPLES
 from discover.closed_loop.search import Search
 from discover.dataset import Run
-
-LINEAR_STRAIN = 0.4
-"""Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress."""
+from discover.protocols.kinematics import LINEAR_STRAIN
 
 
 def find_instrument_effects(

@@ -36,6 +36,10 @@ FOLLOWED: tuple[Control, ...] = ("rate", "steady")
 STATES: tuple[Control, ...] = ("steady", "oscillation")
 """Controls of which each sample is a state of its own, and time only counts them."""
 
+LINEAR_STRAIN = 0.4
+"""Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress, so
+what is found there owes nothing to any law, and speaks for none."""
+
 ONLY_STATES = (
     "Only steady or periodic states were measured, which do not tell how they are reached: another "
     "law, or a structure that flow breaks down, can give the same states and another transient."

@@ -17,6 +17,7 @@ from discover.forward.least_squares import Fit, fit_batch
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners.shorter_holds import with_shorter_holds
 from discover.protocols import strains
+from discover.protocols.kinematics import LINEAR_STRAIN
 from discover.study.declared_model import MODE_CONSTANTS
 
 CLASSICAL_EFFECTS: Mapping[str, str] = {
@@ -26,10 +27,6 @@ CLASSICAL_EFFECTS: Mapping[str, str] = {
     "ptt_exponential": "ptt_exponential",
 }
 """The classical laws as effects on a Maxwell law, which one compiled program holds."""
-
-LINEAR_STRAIN = 0.4
-"""Up to this strain a Maxwell-type law is linear in start-up to a few per cent of the stress, so
-that constants found there owe nothing to any law."""
 
 _FEWEST_LINEAR = 10
 

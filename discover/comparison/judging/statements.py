@@ -16,7 +16,7 @@ from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.identify import Structure
 from discover.identify.exact.relations import spell_briefly
 from discover.identify.rivals.bands import PredictionBand
-from discover.protocols.kinematics import ONLY_STATES
+from discover.protocols.kinematics import LINEAR_STRAIN, ONLY_STATES
 from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
@@ -39,8 +39,6 @@ _ONLY_EXTENSION = (
 _IN_TRANSIENTS = "σ12 in transients"
 _IN_OTHERS = "σ12 in other flows"
 _MEASURED = ("training", "held_out")
-LINEAR_STRAIN = 0.4
-"""Amplitude up to which an oscillation says what modes are there, and hardly anything of terms."""
 _UNTESTED = (
     "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
     "tested the law, and {} is not determined. Fit another run, or hold one out."
