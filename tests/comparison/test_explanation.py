@@ -248,8 +248,10 @@ def test_one_run_with_none_held_out_determines_nothing(good):
     explanation, flows = good
     one = [replace(flow, kind="test") for flow in flows[1:]]
     found = make_statements(explanation, [flows[0], *one], [], STRUCTURE, bands(flows))
-    assert [s.determined for s in found] == ["no", "no"]
-    assert "no other flow tested the law" in found[0].text
+    assert [s.quantity for s in found if s.undetermined] == ["sigma12", "N1", "N2"]
+    assert all("no other flow tested the law" in s.text for s in found[:2])
+    # what was fitted is no prediction
+    assert [found[0].leaves_open("sigma12", flow) for flow in (flows[0], one[0])] == [False, True]
     unseen = [replace(one[0], kind="held_out"), *one[1:]]
     found = make_statements(explanation, [flows[0], *unseen], [], STRUCTURE, bands(flows))
     assert found[0].determined == "if_the_law_is_in_the_library"
@@ -259,11 +261,11 @@ def test_as_many_terms_as_flows_with_none_held_out_determine_nothing(good):
     # three to five terms follow two start-ups of fluids that the library does not hold
     explanation, flows = good
     two = [flows[0], replace(flows[0], name="another")]
-    told = [
-        make_statements(explanation, two, [], STRUCTURE, bands(flows), n_terms=n)[0].determined
-        for n in (1, 2)
-    ]
-    assert told == ["if_the_law_is_in_the_library", "no"]
+    few, many = (
+        make_statements(explanation, two, [], STRUCTURE, bands(flows), n_terms=n) for n in (1, 2)
+    )
+    assert (few[0].quantity, few[0].determined) == ("N1", "if_the_law_is_in_the_library")
+    assert [s.quantity for s in many if s.undetermined] == ["sigma12", "N1", "N2"]
 
 
 def test_as_many_terms_as_flows_determine_nothing_though_one_was_held_out(good):
