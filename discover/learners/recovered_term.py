@@ -45,3 +45,8 @@ class RecoveredTerm:
     inner_at_one: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     ci95_given_equal_modes: tuple[float, float] | None = field(default=None, kw_only=True)
     ci95_given_declared: tuple[float, float] | None = field(default=None, kw_only=True)
+
+    @property
+    def is_told_from_zero(self) -> bool:
+        """Whether its interval says that it is there; not so without one."""
+        return self.ci95 is not None and not self.ci95[0] <= 0.0 <= self.ci95[1]

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from discover.comparison.instrument.corrected import InRecord
-from discover.comparison.outcomes.flows import Flow, Stresses
+from discover.comparison.outcomes.flows import MEASURED, Flow, Stresses
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
-
-_RUNS = ("training", "held_out")
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class Frame:
     made: Mapping[str, InRecord] = field(default_factory=dict)
 
     def _of(self, flow: Flow) -> InRecord | None:
-        return self.made.get(flow.name) if flow.kind in _RUNS else None
+        return self.made.get(flow.name) if flow.kind in MEASURED else None
 
     def recorded(self, flow: Flow, stresses: Stresses | None) -> Stresses | None:
         """Return what would be recorded of the stresses in a flow."""

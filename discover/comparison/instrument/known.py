@@ -11,7 +11,7 @@ from discover.comparison.instrument import (
     corrected,
     fixed_with_the_law,
 )
-from discover.comparison.outcomes.flows import Flow, Stresses, comparison_flows, predict
+from discover.comparison.outcomes.flows import MEASURED, Flow, Stresses, comparison_flows, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Dataset
 from discover.effects import KnownEffect
@@ -130,8 +130,6 @@ def corrected_flows(
     commanded = {run.name: run.protocol for run in data.dataset}
     flows = comparison_flows(free_of_it, high_deborah, pipkin)
     return [
-        replace(flow, commanded=commanded[flow.name])
-        if flow.kind in ("training", "held_out")
-        else flow
+        replace(flow, commanded=commanded[flow.name]) if flow.kind in MEASURED else flow
         for flow in flows
     ]

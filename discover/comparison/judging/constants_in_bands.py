@@ -6,56 +6,19 @@ where no term was found nothing else does: a band of no width would say that the
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.comparison.judging.moved_law import MovedLaw
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.laws.expansion import law_of_terms
-from discover.laws.multimode import Fluid
-from discover.laws.registry import make_law
 from discover.statistics import least_squares_covariance, root_of
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 
-_STEP = 1e-3
-"""Of a difference, relative; of what is near zero, of `_SMALL`."""
-
-_SMALL = 1e-2
 _HALF_BAND = 1.96
-
-
-@dataclass(frozen=True)
-class _Moved:
-    """The law found, with constants of the declared model and coefficients that can be moved."""
-
-    declared: DeclaredModel
-    terms: Mapping[str, float]
-    inner: Mapping[str, float]
-    names: tuple[str, ...]
-
-    @property
-    def start(self) -> Float[np.ndarray, " q"]:
-        """Logarithms of factors on the modes, constants of the law, and coefficients."""
-        law = self.declared.parameters
-        constants = [0.0 if name in MODE_CONSTANTS else law[name] for name in self.names]
-        return np.array([*constants, *self.terms.values()])
-
-    def fluid(self, values: Float[np.ndarray, " q"]) -> Fluid:
-        """Return the fluid with other values."""
-        own = dict(zip(self.names, map(float, values), strict=False))
-        modulus, time = (np.exp(own.pop(name, 0.0)) for name in MODE_CONSTANTS)
-        known = self.declared
-        law = make_law(known.law_name, {**known.parameters, **own}) if own else known.law
-        coefficients = [float(value) for value in values[len(self.names) :]]
-        found = law_of_terms(
-            list(self.terms), coefficients, self.inner, known.law.linear_relaxation, law
-        )
-        return Fluid(
-            found, known.modulus * modulus, known.relaxation_time * time, known.solvent_viscosity
-        )
 
 
 def with_fitted_constants(
@@ -86,11 +49,9 @@ def with_fitted_constants(
     training = [flow for flow in flows if flow.kind == "training"]
     if not kept or not bands or not training:
         return dict(bands)
-    terms = {term.term: term.coefficient for term in chosen.terms}
-    inner = {name: value for term in chosen.terms for name, value in term.inner.items()}
-    law = _Moved(declared, terms, inner, kept)
-    told = {flow.key: _derivatives(law, flow) for flow in flows if flow.key in bands}
-    told |= {flow.key: _derivatives(law, flow) for flow in training if flow.key not in told}
+    law = MovedLaw.of(chosen.terms, declared, kept)
+    told = {flow.key: law.derivatives(flow) for flow in flows if flow.key in bands}
+    told |= {flow.key: law.derivatives(flow) for flow in training if flow.key not in told}
     root = _root(training, told)
     if root is None:
         return dict(bands)
@@ -100,28 +61,6 @@ def with_fitted_constants(
         if slopes is not None:
             found[key] = _wider(band, np.einsum("qr,qnc->rnc", root, slopes[1]))
     return found
-
-
-def _derivatives(
-    law: _Moved, flow: Flow
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]] | None:
-    """Return predictions in a flow and their derivatives; None where one runs away."""
-    start = law.start
-    rows, steps = [start], []
-    for i, value in enumerate(start):
-        of_factor = i < len(law.names) and law.names[i] in MODE_CONSTANTS
-        step = _STEP * (1.0 if of_factor else max(abs(value), _SMALL))
-        for sign in (1.0, -1.0):
-            moved = start.copy()
-            moved[i] += sign * step
-            rows.append(moved)
-        steps.append(step)
-    found = [predict(law.fluid(row), flow) for row in rows]
-    columns = [np.stack([one[q] for q in QUANTITIES], axis=-1) for one in found if one is not None]
-    if len(columns) < len(rows) or not np.all(np.isfinite(columns)):
-        return None
-    up, down = np.array(columns[1::2]), np.array(columns[2::2])
-    return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
 
 
 def _root(training: Sequence[Flow], told: Mapping[str, tuple | None]) -> np.ndarray | None:

@@ -118,9 +118,8 @@ def _found(term: RecoveredTerm, model: DeclaredModel) -> bool:
 
     Where relaxation is left to the learner its term is there in any case.
     """
-    if term.ci95 is None or (term.term == TIME_TERM and not model.law.linear_relaxation):
-        return False
-    return not term.ci95[0] <= 0.0 <= term.ci95[1]
+    learnt = term.term == TIME_TERM and not model.law.linear_relaxation
+    return term.is_told_from_zero and not learnt
 
 
 def _slip(term: RecoveredTerm, model: DeclaredModel) -> float | None:

@@ -192,8 +192,8 @@ def _rests(outcome: LearnerOutcome) -> bool:
 
 def _there(term: RecoveredTerm) -> bool:
     """Return whether a term is more than its interval, or arithmetic, leaves of none."""
-    size, (low, high) = abs(term.coefficient), term.ci95 or (0.0, 0.0)
-    return size > SEPARATED or (size > _NONE and (low > 0.0 or high < 0.0))
+    size = abs(term.coefficient)
+    return size > SEPARATED or (size > _NONE and term.is_told_from_zero)
 
 
 def _from_rest(flow: Flow) -> bool:

@@ -14,12 +14,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.comparison.judging.late_answers import ADVICE, does, tells
+from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.evidence import WINDOW
-from discover.laws.expansion import law_of_terms
-from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
 from discover.statistics.late_answers import Filtered, Response, best_filter
 from discover.statistics.residual import fast_part
@@ -28,7 +27,6 @@ from discover.study.declared_model import DeclaredModel
 _WEAK = 6.0
 """Half-widths of its interval up to which a term may stand for a filter that nothing else shows."""
 
-_STEP, _SMALL = 1e-3, 1e-2
 _MOST = 6  # weak terms whose sets are all tried
 
 
@@ -86,8 +84,9 @@ def filter_for_terms(
     training = [flow for flow in flows if flow.kind == "training"]
     if not weak or len(weak) > _MOST or not all(tells(flow) for flow in training):
         return None
-    start = np.array([term.coefficient for term in chosen.terms])
-    told = [_response(chosen, model, start, flow) for flow in training]
+    law = MovedLaw.of(chosen.terms, model)
+    start = law.start
+    told = [_response(law, flow) for flow in training]
     runs = [one for one in told if one is not None]
     if not runs or len(runs) < len(told):
         return None
@@ -113,7 +112,7 @@ def filter_for_terms(
     kept = [i for i in range(len(start)) if i not in out]
     values = np.zeros_like(start)
     values[kept] = start[kept] + found.steps
-    fluid = _fluid(chosen, model, values)
+    fluid = law.fluid(values)
     predictions = {
         flow.key: predict(fluid, flow) for flow in flows if flow.key in chosen.predictions
     }
@@ -188,37 +187,15 @@ def _weak(term: RecoveredTerm) -> bool:
     return bool(abs(term.coefficient) < _WEAK * half)
 
 
-def _fluid(chosen: LearnerOutcome, model: DeclaredModel, values: np.ndarray) -> Fluid:
-    names = [term.term for term in chosen.terms]
-    inner = {name: value for term in chosen.terms for name, value in term.inner.items()}
-    law = law_of_terms(
-        names, [float(v) for v in values], inner, model.law.linear_relaxation, model.law
-    )
-    return Fluid(law, model.modulus, model.relaxation_time, model.solvent_viscosity)
-
-
-def _response(
-    chosen: LearnerOutcome, model: DeclaredModel, start: np.ndarray, flow: Flow
-) -> Response | None:
+def _response(law: MovedLaw, flow: Flow) -> Response | None:
     """Return a run as the law predicts it, one column for each coefficient; None if not."""
-    columns = []
-    for i, value in enumerate(start):
-        step = _STEP * max(abs(value), _SMALL)
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = start.copy()
-            moved[i] += sign * step
-            ends.append(predict(_fluid(chosen, model, moved), flow))
-        up, down = ends
-        if up is None or down is None:
-            return None
-        columns.append((up["sigma12"] - down["sigma12"]) / (2.0 * step))
-    predicted = chosen.predictions.get(flow.key)
-    if predicted is None or flow.measured is None or not np.all(np.isfinite(columns)):
+    told = law.derivatives(flow)
+    if told is None or flow.measured is None:
         return None
-    stress = np.asarray(predicted["sigma12"], dtype=float)
-    residual = stress - np.asarray(flow.measured, dtype=float)
-    return Response(np.asarray(flow.times, dtype=float), stress, residual, np.array(columns))
+    predicted, slopes = told
+    residual = predicted[:, 0] - np.asarray(flow.measured, dtype=float)
+    times = np.asarray(flow.times, dtype=float)
+    return Response(times, predicted[:, 0], residual, slopes[..., 0])
 
 
 def _left_out(run: Response, start: np.ndarray, out: Sequence[int]) -> Response:

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.judging.explanation import ARITHMETIC, Explanation
-from discover.comparison.judging.unseen_runs import changes_along
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.judging.unseen_runs import changes_along, outliers_of
+from discover.comparison.outcomes.flows import MEASURED, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.sampling import sampling_interval
@@ -86,7 +86,7 @@ def hold_against_late_answers(
 
 def tells(flow: Flow) -> bool:
     """Return whether a run shows what an instrument does where the stress changes."""
-    if flow.kind not in ("training", "held_out") or (flow.kind == "held_out" and flow.is_truth):
+    if flow.kind not in MEASURED or (flow.kind == "held_out" and flow.is_truth):
         return False
     return bool(np.isfinite(sampling_interval(flow.times, flow.protocol)))
 
@@ -99,10 +99,8 @@ def _responses(
     bands: Mapping[str, PredictionBand],
 ) -> list[Response]:
     """Return the runs as a law predicts them; none where it does not follow them all."""
-    left = explanation.lack_of_fit[name]
     training = [flow for flow in flows if flow.kind == "training"]
-    fitted = zip(training, left.outlier_samples, strict=False)
-    knocks = {flow.key: samples for flow, samples in fitted if len(flows)}
+    knocks = outliers_of(outcome, training, explanation.expectation)
     knocks |= explanation.outliers.get(name, {})
     rows, changes = [], []
     for flow in flows:

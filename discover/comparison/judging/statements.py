@@ -12,7 +12,7 @@ import numpy as np
 
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import EXACT, SEPARATED, Rival, law_structure
-from discover.comparison.outcomes.flows import QUANTITIES, Flow
+from discover.comparison.outcomes.flows import MEASURED, QUANTITIES, Flow
 from discover.identify import Structure
 from discover.identify.exact.relations import spell_briefly
 from discover.identify.rivals.bands import PredictionBand
@@ -38,7 +38,6 @@ _ONLY_EXTENSION = (
 )
 _IN_TRANSIENTS = "σ12 in transients"
 _IN_OTHERS = "σ12 in other flows"
-_MEASURED = ("training", "held_out")
 _UNTESTED = (
     "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
     "tested the law, and {} is not determined. Fit another run, or hold one out."
@@ -97,7 +96,7 @@ class Statement:
             return False
         if quantity != "sigma12":
             return True
-        if self.in_others and flow.kind in _MEASURED:
+        if self.in_others and flow.kind in MEASURED:
             return False
         return flow.in_shear and not (self.in_transients and flow.is_of_states)
 
@@ -271,7 +270,7 @@ def _flows_in(flow: Flow) -> int:
 
 
 def _measured(flows: Sequence[Flow]) -> list[Flow]:
-    return [flow for flow in flows if flow.kind in _MEASURED]
+    return [flow for flow in flows if flow.kind in MEASURED]
 
 
 def claimed(

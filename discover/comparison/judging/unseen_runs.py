@@ -53,7 +53,7 @@ def hold_against_unseen(
         return _held_against_folds(explanation, outcomes)
     found, outliers = dict(explanation.lack_of_fit), {}
     for name in explanation.by:
-        outliers[name] = _outliers(outcomes[name], unseen, expectation)
+        outliers[name] = outliers_of(outcomes[name], unseen, expectation)
         own = bands if name == banded else None
         columns = [
             flow.even(_measured(flow)) * changes_along(outcomes[name], flow, own) for flow in unseen
@@ -112,11 +112,11 @@ def _held_against_folds(
     return replace(explanation, lack_of_fit=found)
 
 
-def _outliers(
-    outcome: LearnerOutcome, unseen: Sequence[Flow], expectation: Expectation
+def outliers_of(
+    outcome: LearnerOutcome, runs: Sequence[Flow], expectation: Expectation
 ) -> dict[str, tuple[int, ...]]:
-    """Return which samples of the runs held out are outliers, by the key of the run."""
-    told = [(flow, row) for flow in unseen if (row := _residual(outcome, flow)) is not None]
+    """Return which samples of measured runs are outliers, by the key of the run."""
+    told = [(flow, row) for flow in runs if (row := _residual(outcome, flow)) is not None]
     if not told:
         return {}
     records = [_record(flow) for flow, _ in told]

@@ -37,6 +37,9 @@ HIGH_DEBORAH_AMPLITUDE = 3.0
 
 FlowKind = Literal["training", "held_out", "test", "high_deborah", "pipkin"]
 
+MEASURED: tuple[FlowKind, ...] = ("training", "held_out")
+"""Kinds that are runs, fitted or kept from the fit."""
+
 DRAWN: tuple[FlowKind, ...] = ("training", "held_out", "test")
 """Kinds whose curves are drawn with bands; of the others errors alone are told."""
 

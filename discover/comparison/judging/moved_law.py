@@ -1,0 +1,93 @@
+"""A law of terms whose coefficients, and constants of the known part, can be moved."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.laws.expansion import law_of_terms
+from discover.laws.multimode import Fluid
+from discover.laws.registry import make_law
+from discover.learners.recovered_term import RecoveredTerm
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+
+_STEP = 1e-3
+"""Of a difference, relative; of what is near zero, of `_SMALL`."""
+
+_SMALL = 1e-2
+
+
+@dataclass(frozen=True)
+class MovedLaw:
+    """The law found, with constants of the declared model and coefficients that can be moved.
+
+    Attributes
+    ----------
+    declared
+        The known part.
+    terms
+        Coefficients of the terms, by their spelling.
+    inner
+        Inner parameters of the terms.
+    names
+        Constants that move beside the coefficients: of the modes, or of the declared law.
+    """
+
+    declared: DeclaredModel
+    terms: Mapping[str, float]
+    inner: Mapping[str, float]
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls, terms: Sequence[RecoveredTerm], declared: DeclaredModel, names: tuple[str, ...] = ()
+    ) -> "MovedLaw":
+        """Return the law of these terms beside the known part."""
+        inner = {name: value for term in terms for name, value in term.inner.items()}
+        return cls(declared, {term.term: term.coefficient for term in terms}, inner, names)
+
+    @property
+    def start(self) -> Float[np.ndarray, " q"]:
+        """Logarithms of factors on the modes, constants of the law, and coefficients."""
+        law = self.declared.parameters
+        constants = [0.0 if name in MODE_CONSTANTS else law[name] for name in self.names]
+        return np.array([*constants, *self.terms.values()])
+
+    def fluid(self, values: Float[np.ndarray, " q"]) -> Fluid:
+        """Return the fluid with other values."""
+        own = dict(zip(self.names, map(float, values), strict=False))
+        modulus, time = (np.exp(own.pop(name, 0.0)) for name in MODE_CONSTANTS)
+        known = self.declared
+        law = make_law(known.law_name, {**known.parameters, **own}) if own else known.law
+        coefficients = [float(value) for value in values[len(self.names) :]]
+        found = law_of_terms(
+            list(self.terms), coefficients, self.inner, known.law.linear_relaxation, law
+        )
+        return Fluid(
+            found, known.modulus * modulus, known.relaxation_time * time, known.solvent_viscosity
+        )
+
+    def derivatives(
+        self, flow: Flow
+    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]] | None:
+        """Return predictions in a flow and their derivatives; None where one runs away."""
+        start = self.start
+        rows, steps = [start], []
+        for i, value in enumerate(start):
+            of_factor = i < len(self.names) and self.names[i] in MODE_CONSTANTS
+            step = _STEP * (1.0 if of_factor else max(abs(value), _SMALL))
+            for sign in (1.0, -1.0):
+                moved = start.copy()
+                moved[i] += sign * step
+                rows.append(moved)
+            steps.append(step)
+        found = [predict(self.fluid(row), flow) for row in rows]
+        columns = [
+            np.stack([one[q] for q in QUANTITIES], axis=-1) for one in found if one is not None
+        ]
+        if len(columns) < len(rows) or not np.all(np.isfinite(columns)):
+            return None
+        up, down = np.array(columns[1::2]), np.array(columns[2::2])
+        return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
