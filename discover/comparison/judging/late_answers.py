@@ -66,22 +66,31 @@ def hold_against_late_answers(
         left = found[name]
         if expectation.noise is not None and left.misfit <= left.expected:
             continue  # of a noise that is given only who gives it knows what is in it
-        if not refuted:
-            runs = _responses(explanation, name, outcomes[name], flows, bands)
-            late = late_answer(runs) if runs else None
-            if late is None or late.probability > AGREED:
-                continue
-            least = max(ARITHMETIC, STRUCTURE * outcomes[name].resolution)
-            if late.size <= least or expectation.excuses(late.size):
-                continue
-            as_if = does(late.kind, late.time)
-            said = f"the records follow the law clearly better as if the instrument {as_if}"
-            one = replace(left.refuted(said), likeness=ADVICE)
-            refuted = said if name == _SPARSE else ""
-        else:
-            one = replace(left.refuted(refuted), likeness=ADVICE)
-        found[name] = one
+        said = refuted or _described_better(explanation, name, outcomes[name], flows, bands)
+        if said:
+            found[name] = replace(left.refuted(said), likeness=ADVICE)
+        if name == _SPARSE:
+            refuted = said
     return replace(explanation, lack_of_fit=found)
+
+
+def _described_better(
+    explanation: Explanation,
+    name: str,
+    outcome: LearnerOutcome,
+    flows: Sequence[Flow],
+    bands: Mapping[str, PredictionBand],
+) -> str:
+    """Return by which filter a law describes the records better, in words; empty if by none."""
+    runs = _responses(explanation, name, outcome, flows, bands)
+    late = late_answer(runs) if runs else None
+    if late is None or late.probability > AGREED:
+        return ""
+    least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
+    if late.size <= least or explanation.expectation.excuses(late.size):
+        return ""
+    as_if = does(late.kind, late.time)
+    return f"the records follow the law clearly better as if the instrument {as_if}"
 
 
 def tells(flow: Flow) -> bool:
