@@ -292,16 +292,16 @@ _RATES = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.
 _FEW_LOG = growths(np.geomspace(0.05, 8.0, 15), _RATES)
 _FIVE = growths(np.linspace(0.1, 8.0, 80), _RATES)
 _LOW = growths(np.geomspace(0.1, 20.0, 80), {"a.csv": 0.05, "b.csv": 0.1, "c.csv": 0.2})
-THREE_TIMES, _MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
-_MODES = {
+THREE_TIMES, THREE_MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
+OF_THREE_MODES = {
     "a.csv": (start_up(0.1), np.geomspace(0.1, 40.0, 80)),
     "b.csv": (start_up(1.0), np.geomspace(0.05, 20.0, 80)),
     "c.csv": (start_up(5.0), np.geomspace(0.02, 6.0, 80)),
     "held.csv": (start_up(2.0), np.geomspace(0.03, 10.0, 80)),
 }
-_SWEEP = {"law": "ucm", "modes": "lve"}
+TOLD_BY_SWEEP = {"law": "ucm", "modes": "lve"}
 _WRONG_SWEEP = {
-    "tables": sweep_of((23.0, 52.2, 134.4), THREE_TIMES), "model": _SWEEP, "outside": True,
+    "tables": sweep_of((23.0, 52.2, 134.4), THREE_TIMES), "model": TOLD_BY_SWEEP, "outside": True,
     "same_as": (*_GAINS, "relaxation_mode"),
 }  # fmt: skip
 _BOTH = Modes(
@@ -323,10 +323,11 @@ LABORATORY = {
                        recorded(PlatePlate(PhanThienTanner(0.3, "linear", **SCALE))),
                        outside=True, same_as=("ptt_linear",)),
     "wrong_sweep": Case("three Maxwell modes, moduli told 15, −13 and 12 % off",
-                        recorded(Modes(*map(UpperConvectedMaxwell, _MODULI, THREE_TIMES)), _MODES),
+                        recorded(Modes(*map(UpperConvectedMaxwell, THREE_MODULI, THREE_TIMES)),
+                                 OF_THREE_MODES),
                         **_WRONG_SWEEP),
     "mixed_laws": Case("Giesekus in one mode, linear PTT in the other", recorded(_BOTH),
-                       tables=sweep_of((60.0, 60.0), (1.0, 0.2)), model=_SWEEP, outside=True,
+                       tables=sweep_of((60.0, 60.0), (1.0, 0.2)), model=TOLD_BY_SWEEP, outside=True,
                        same_as=("giesekus_mobility", "ptt_linear")),
     "few_log_k_bkz": Case("K-BKZ, 15 samples a run, evenly in log t",
                           recorded(KBKZ(0.25, **SCALE), _FEW_LOG), outside=True),

@@ -2,8 +2,13 @@
 
 from dataclasses import replace
 
-import numpy as np
-from hostile_fluids_cases import LABORATORY_AND_BEFORE
+from hostile_fluids_cases import (
+    LABORATORY_AND_BEFORE,
+    OF_THREE_MODES,
+    THREE_MODULI,
+    THREE_TIMES,
+    TOLD_BY_SWEEP,
+)
 from hostile_fluids_exports import (
     averaged_since,
     banded,
@@ -28,16 +33,8 @@ from independent import Giesekus, JohnsonSegalman, Modes, start_up
 _ALONE = {"planted": MOBILITY, "terms": SQUARE}
 _ALSO_GIESEKUS = {"outside": True, "same_as": ("giesekus_mobility",)}
 _TIMES = ("relaxation_time_factor", "relaxation_time_s", "wall_slip", "sigma", "tool_compliance")
-_T, _G = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
-_MODES = {
-    "a.csv": (start_up(0.1), np.geomspace(0.1, 40.0, 80)),
-    "b.csv": (start_up(1.0), np.geomspace(0.05, 20.0, 80)),
-    "c.csv": (start_up(5.0), np.geomspace(0.02, 6.0, 80)),
-    "held.csv": (start_up(2.0), np.geomspace(0.03, 10.0, 80)),
-}
 _BANDED = JohnsonSegalman(0.3, **SCALE)
-_SWEEP = {"law": "ucm", "modes": "lve"}
-_THREE = Modes(*(Giesekus(0.3, g, t) for g, t in zip(_G, _T, strict=True)))
+_THREE = Modes(*(Giesekus(0.3, g, t) for g, t in zip(THREE_MODULI, THREE_TIMES, strict=True)))
 EXPORTS = {
     "averaged_since": Case("Giesekus, means over the last 0.5 s told", averaged_since(0.5),
                            **_ALSO_GIESEKUS),
@@ -64,13 +61,13 @@ EXPORTS = {
                   each(of_stress(dried)), **_ALSO_GIESEKUS),
     "cooled": Case("Giesekus, its modulus rises by 5 % in each run", each(of_stress(cooled)),
                    **_ALSO_GIESEKUS),
-    "mode_missing": Case("Giesekus in three modes, two told", recorded(_THREE, _MODES),
-                         tables=sweep_of(_G[:2], _T[:2]), model=_SWEEP,
+    "mode_missing": Case("Giesekus in three modes, two told", recorded(_THREE, OF_THREE_MODES),
+                         tables=sweep_of(THREE_MODULI[:2], THREE_TIMES[:2]), model=TOLD_BY_SWEEP,
                          outside=True, same_as=("giesekus_mobility", "relaxation_mode")),
     "other_temperature": Case("Giesekus in three modes, all times told 25 % long",
-                              recorded(_THREE, _MODES),
-                              tables=sweep_of(_G, tuple(1.25 * t for t in _T)),
-                              model=_SWEEP, outside=True,
+                              recorded(_THREE, OF_THREE_MODES),
+                              tables=sweep_of(THREE_MODULI, tuple(1.25 * t for t in THREE_TIMES)),
+                              model=TOLD_BY_SWEEP, outside=True,
                               same_as=("giesekus_mobility", *_TIMES)),
     "held_and_rounded": Case("Giesekus, every second value that before it, three digits",
                              recorded(GIESEKUS), held_and_rounded(), **_ALONE),
