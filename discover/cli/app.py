@@ -71,4 +71,4 @@ def main() -> None:
     warnings.formatwarning = _one_line
     use_one_thread_from_the_start()
     with obeying_interrupts():
-        app()
+        app(prog_name="discover")

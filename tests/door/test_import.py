@@ -112,3 +112,12 @@ import equinox
 print(equinox._config.EQX_ON_ERROR)
 """
     assert python(code).strip() == "nan"
+
+
+def test_python_m_discover_is_the_command():
+    done = subprocess.run(
+        [sys.executable, "-m", "discover", "--help"], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0
+    assert "discover [OPTIONS] COMMAND" in done.stdout
+    assert "__main__" not in done.stdout
