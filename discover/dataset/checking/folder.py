@@ -89,9 +89,38 @@ def check_folder(
         before = rates_before(index, None)
     except InputError as error:
         return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
-    runs: list[Run] = []
     unused: dict[str, list[str]] = {}
     converted: dict[str, list[str]] = {}
+    runs, of_runs = _runs(root, index, before, unused, converted)
+    findings += of_runs
+    for column, files in unused.items():
+        text = f"The column {shown(column)} in {_files(files)} is not used."
+        findings.append(Finding("note", "columns", files[0], text))
+    sweep, spectrum, said = _sweep(root, converted)
+    _convert_tables(root, index, converted)
+    for text, files in converted.items():
+        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
+    findings += said
+    findings += _transients(runs, sweep, spectrum)
+    if clock_factor is None and not _shift_columns(index):
+        findings += doubts_of_temperature(runs)
+    tables, of_tables = _tables(root, index, sweep)
+    findings += of_tables
+    findings += _folder(root, index, [*runs, *tables.values()])
+    rank = {"error": 0, "warning": 1, "note": 2}
+    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
+
+
+def _runs(
+    root: Path,
+    index: Table,
+    before: np.ndarray | None,
+    unused: dict[str, list[str]],
+    converted: dict[str, list[str]],
+) -> tuple[list[Run], list[Finding]]:
+    """Return the runs that can be read, and what is wrong or doubtful in each; fill the columns."""
+    runs: list[Run] = []
+    findings: list[Finding] = []
     for row, name in enumerate(index.columns["file"]):
         try:
             reason = reason_to_set_aside(index, row, rate_before=True)
@@ -106,15 +135,15 @@ def check_folder(
             continue
         findings += doubts_of_run(runs[-1])
         findings += _columns(root, name, unused, converted)
-    for column, files in unused.items():
-        text = f"The column {shown(column)} in {_files(files)} is not used."
-        findings.append(Finding("note", "columns", files[0], text))
-    sweep, spectrum, said = _sweep(root, converted)
-    _convert_tables(root, index, converted)
-    for text, files in converted.items():
-        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
-    findings += said
+    return runs, findings
+
+
+def _transients(
+    runs: list[Run], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
+) -> list[Finding]:
+    """Return what is doubtful in runs at a given rate: each, against linear theory, together."""
     transients = [run for run in runs if run.protocol.control == "rate"]
+    findings: list[Finding] = []
     for run in transients:
         doubts = list(doubts_of_start(run, sweep, spectrum))
         if not doubts and spectrum is None:
@@ -123,13 +152,18 @@ def check_folder(
         findings += doubts_of_normal_stress(run, sweep, spectrum)
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
-    if clock_factor is None and not _shift_columns(index):
-        findings += doubts_of_temperature(runs)
+    return findings
+
+
+def _tables(
+    root: Path, index: Table, sweep: LinearSweep | None
+) -> tuple[dict[str, Run], list[Finding]]:
+    """Return the tables of steady and periodic states, and what each was taken for."""
+    findings: list[Finding] = []
     try:
         tables, aside = read_material_functions(root, index.columns["file"])
     except InputError as error:
-        tables, aside = {}, {}
-        findings.append(Finding("error", "tables", "", str(error)))
+        return {}, [Finding("error", "tables", "", str(error))]
     for table in tables.values():
         kind = str(run_line(table)["flow"])
         what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
@@ -137,17 +171,16 @@ def check_folder(
         findings.append(Finding("note", "tables", table.name, text))
     for name, reason in aside.items():
         findings.append(Finding("warning", "tables", name, f"{name} is set aside: {reason}."))
-    if sweep is not None and "amplitude_sweep" in tables:
-        text = (
-            f"{SWEEP_FILE} is taken for a frequency sweep at small strain, {len(sweep)} "
-            "frequencies: it gives the modes, and is fitted or judges only if the study says so."
-        )
-        findings.append(Finding("note", "tables", SWEEP_FILE, text))
     if "amplitude_sweep" in tables:
+        if sweep is not None:
+            text = (
+                f"{SWEEP_FILE} is taken for a frequency sweep at small strain, {len(sweep)} "
+                "frequencies: it gives the modes, and is fitted or judges only if the study says "
+                "so."
+            )
+            findings.append(Finding("note", "tables", SWEEP_FILE, text))
         findings += doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)
-    findings += _folder(root, index, [*runs, *tables.values()])
-    rank = {"error": 0, "warning": 1, "note": 2}
-    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
+    return tables, findings
 
 
 def _shift_columns(index: Table) -> list[str]:

@@ -13,7 +13,7 @@ from discover.effects import make_effect
 from discover.equations.mathml import law_element
 from discover.errors import InputError
 from discover.inference.constants import ConstantByMode
-from discover.report.loop.verdict import KINDS, named
+from discover.report.loop.found import KINDS, named
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay
 from discover.report.page import safe_name

@@ -1,0 +1,28 @@
+"""What all three answers of a loop's verdict ask of its result."""
+
+from collections.abc import Sequence
+
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.dataset.coarse_rates import CoarseRates, coarse_in
+
+MOST_NAMES = 3
+
+EXPLAINED = ("effects_added", "no_effect_needed")
+
+
+def several(names: Sequence[str], word: str) -> str:
+    """Return the first of several names, and how many more there are."""
+    shown = list(names[:MOST_NAMES])
+    if more := len(names) - len(shown):
+        shown.append(f"{more} more")
+    return f" {word} ".join(shown)
+
+
+def coarse_rates(result: LoopResult) -> CoarseRates | None:
+    """Return what rates read in too few samples leave open, if that is not small."""
+    return coarse_in(result.remaining.get("sampled_rate"))
+
+
+def untested_by(result: LoopResult) -> str:
+    """Return why nothing tested what explains the records, `Untested`; empty where it was."""
+    return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""

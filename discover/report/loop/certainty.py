@@ -1,0 +1,130 @@
+"""How sure a closed loop is: errors before and after, and what these data do not decide."""
+
+from collections.abc import Iterator
+
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.protocols.kinematics import ONLY_STATES
+from discover.report.loop.asked import EXPLAINED, MOST_NAMES, coarse_rates, several, untested_by
+from discover.report.wording import effect_title, percent, sentence, significant
+from discover.words import listed
+
+_SETTLED = 0.95
+_SLOW = 0.5  # correlation from which noise and a slow effect look alike for some samples on end
+
+
+def how_sure(result: LoopResult) -> str:
+    """Return by how much the error fell, and after it what these data do not decide."""
+    sentences = [_errors(result)]
+    if untested_by(result) == "states":
+        sentences.append(ONLY_STATES)
+    if (coarse := coarse_rates(result)) is not None:
+        sentences.append(coarse.sentence)
+    if steps := result.remaining.get("step_instants"):
+        runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
+        sentences.append(
+            f"The rate of {runs} steps between two samples, which do not tell "
+            "when: the instants are fitted along, those of a run held out to that run itself."
+        )
+    doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
+    return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
+
+
+def _errors(result: LoopResult) -> str:
+    """Return the errors before and after, on runs that no fit saw and on those fitted."""
+    before, after = result.error_before, result.error_after
+    parts, said = [], ""
+    if before.held_out is not None and after.held_out is not None:
+        unseen = "on runs that no fit saw"
+        if result.folds:
+            unseen = "on each run, by a search that did not see it,"
+        said, sizes = _change(result, before.held_out, after.held_out)
+        parts.append(f"{unseen} the error {said} {sizes}")
+        if result.held_in_band is not None:
+            share = percent(result.held_in_band)
+            parts.append(f"the 95 % band of all explanations holds {share} of their samples")
+    verb, sizes = _change(result, before.fit, after.fit)
+    # a verb is said again only where it is another one
+    told = sizes if verb == said else f"the error {verb} {sizes}"
+    return sentence([*parts, f"on the fitted runs {told}, {_share_of_noise(result)}"])
+
+
+def _share_of_noise(result: LoopResult) -> str:
+    """Return how much of the error of the fitted runs is noise, as far as that is known."""
+    if not result.remaining.get("noise_known", True):
+        return "of which nobody knows how much is noise"
+    floor = percent(result.noise_floor)
+    linear = result.remaining.get("linear_error") or 0.0
+    if linear > result.noise_floor:
+        misfit = f"the misfit of the linear sweep by its modes {percent(linear)}"
+        return f"where noise explains {floor} and {misfit}"
+    if result.verdict == "unexplained" and result.remaining.get("noise_unsure"):
+        # slow noise is not told from a misfit
+        return f"of which {floor} changes from sample to sample, as noise does"
+    return f"where noise explains {floor}"
+
+
+def _what_tests_it(result: LoopResult) -> Iterator[str]:
+    """Tell what no run tests, and how probable it is that something else is right."""
+    together = result.remaining.get("autocorrelation") or 0.0
+    if result.verdict in EXPLAINED and together > _SLOW:
+        yield (
+            f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
+            "for noise, and an effect that varies slowly would look the same"
+        )
+    none = percent(result.explanations.unexplained_probability)
+    nothing = f"that something else is right has a probability of {none}"
+    untested = untested_by(result)
+    if untested == "flows":
+        yield (
+            "no run was held out, and no more flows were measured than what was fitted takes, so "
+            f"none tested it: {nothing}"
+        )
+    elif result.error_before.held_out is None:
+        yield "no run was held out to judge by"
+    if untested == "states" and result.stages:
+        yield nothing
+
+
+def _samples_that_count(result: LoopResult) -> Iterator[str]:
+    """Tell which runs and samples did not count, or not as much as others."""
+    if few := result.remaining.get("not_judging", ()):
+        verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
+        yield f"{several(few, 'and')} {verb}"
+    if weights := result.remaining.get("weights"):
+        ratio = significant(max(weights.values()) / min(weights.values()), 2)
+        yield f"the noise of runs differs by up to a factor of {ratio}, and each weighs by its own"
+    if count := result.remaining.get("outliers", 0):
+        which = "samples are outliers" if count > 1 else "sample is an outlier"
+        yield f"{count} {which} and did not count"
+
+
+def _what_else_fits(result: LoopResult) -> Iterator[str]:
+    """Tell of explanations that fit alike, and of aliases of the effects that were found."""
+    if result.verdict == "effects_added" and (told := _alternatives(result)):
+        yield told
+    for stage in result.stages:
+        if stage.aliases:
+            others = several([*map(effect_title, stage.aliases)], "or")
+            yield f"these data cannot tell {effect_title(stage.effect)} from {others}"
+
+
+def _alternatives(result: LoopResult) -> str:
+    """Return what is likelier than what was found, or nearly as likely; empty if nothing is."""
+    found = result.explanations.likeliest_first
+    own = result.explanations.holding([stage.effect for stage in result.stages])
+    others = [e for e in found if e is not own]
+    if own is None or not others:
+        return ""
+    share = own.probability / sum(e.probability for e in found)
+    if share > _SETTLED:
+        return ""
+    names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
+    rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
+    return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
+
+
+def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:
+    """Return what an error did, as a verb, and from where to where, as far as digits show it."""
+    if percent(before) == percent(after):
+        return "stays at" if result.stages or result.folds else "is", percent(after)
+    return "falls" if after < before else "rises", f"from {percent(before)} to {percent(after)}"

@@ -1,0 +1,139 @@
+"""What a closed loop found: the effects with their constants, and how the declared model stands."""
+
+from collections.abc import Sequence
+
+from discover.closed_loop.results.law_fit import LawFit
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import Stage
+from discover.inference.constants import ConstantByMode, StageParameter
+from discover.laws.registry import LAWS
+from discover.report.free_form_words import free_form_sentence
+from discover.report.loop.asked import coarse_rates, several, untested_by
+from discover.report.wording import (
+    effect_title,
+    estimate,
+    interval,
+    readable,
+    sentence,
+    significant,
+)
+from discover.words import listed
+
+KINDS = {
+    "constitutive": "in the fluid",
+    "kinematic": "in the flow that the fluid felt",
+    "signal": "in the instrument's signal",
+}
+
+_LOOP = {
+    "effects_added": "The declared model lacked something, and adding it explains the data",
+    "no_effect_needed": "Nothing is missing that these data show: the declared model explains them",
+    "unexplained": "What is left still has structure that no candidate explains",
+    "no_signal": "The records hold no signal that a law could be told from",
+}
+
+_UNTESTED = {
+    "effects_added": "Fitted, not tested: with what is added the declared model describes",
+    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model "
+    "describes",
+}
+
+_MEASURED = {
+    "flows": "what was measured",
+    "states": "the states that were measured",
+}
+
+_UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
+
+_UNKNOWN_RATE = "What the rate did between its samples hides all that could tell what is missing"
+
+_NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
+
+
+def what_was_found(result: LoopResult) -> str:
+    """Return the effects found, with their constants, and whether they explain the data."""
+    names = several([effect_title(stage.effect) for stage in result.stages], "and")
+    if result.verdict == "no_signal":
+        why = (
+            f"{names} would explain them, with a fluid that is as good as absent"
+            if names
+            else "they hold hardly anything but noise, or do not follow what was imposed"
+        )
+        return f"{_LOOP['no_signal']}: {why}."
+    if result.verdict == "unexplained" and names and result.remaining.get("without_fluid"):
+        return (
+            f"No candidate explains the data: what comes nearest ({names}) leaves as much without "
+            "the fluid."
+        )
+    parts = [
+        f"{KINDS[stage.kind]}: {effect_title(stage.effect)}, {_values(stage)}"
+        for stage in result.stages
+    ]
+    if parts:
+        # what comes near without explaining is not called added
+        lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
+        parts[0] = lead + parts[0]
+    if result.verdict == "unexplained" and result.free_form:
+        curve = result.free_form[0]
+        parts.append(f"{'but' if curve.explains else 'and'} {free_form_sentence(curve)}")
+    if result.laws:
+        parts.append(_law_chosen(result.laws))
+    return sentence([_how_it_stands(result), *parts])
+
+
+def _how_it_stands(result: LoopResult) -> str:
+    """Return the verdict in words, with what untested or unknown things make of it."""
+    if untested := untested_by(result):
+        return f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
+    if result.verdict == "unexplained":
+        if (coarse := coarse_rates(result)) is not None and coarse.hides:
+            return _UNKNOWN_RATE
+        if not result.remaining.get("noise_known", True):
+            return _UNKNOWN_NOISE
+        if not result.remaining.get("carries_over", True):
+            return _NOT_CARRIED
+    return _LOOP[result.verdict]
+
+
+def _values(stage: Stage) -> str:
+    """Return the constants of an effect, and which of them these data leave open."""
+    told = [
+        f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
+        + f" (95 % {interval(p.ci95)})"
+        for name, p in stage.parameters.items()
+        if name not in stage.left_open
+    ]
+    for one in stage.told_together:
+        value = f"{estimate(one.value, one.ci95)} {one.unit}".rstrip()
+        told.append(f"{_in_words(one.name)} = {value} (95 % {interval(one.ci95)})")
+    if stage.left_open:
+        names = listed([_in_words(name) for name in stage.left_open])
+        alone = " alone" if stage.told_together else ""
+        left = f"{names}{alone} not determined by these data"
+        return f"{', '.join(told)}, with {left}" if told else left
+    return ", ".join(told)
+
+
+def _in_words(name: str) -> str:
+    """Return the name of a constant as it is read."""
+    return readable(name.replace("_", " ").replace("build up", "build-up"))
+
+
+def _law_chosen(laws: Sequence[LawFit]) -> str:
+    """Return which law was taken of several, and from which these runs do not tell it."""
+    best, *others = laws
+    alike = [LAWS[one.law].title for one in others if not one.is_told_apart]
+    told = f"; these runs do not tell it from {several(alike, 'and')}" if alike else ""
+    ends = f" ({several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
+    return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
+
+
+def named(name: str, parameter: StageParameter) -> str:
+    """Return a parameter's name in the field's letters, and of one by mode, what it stands for."""
+    text = _in_words(name)
+    if not isinstance(parameter, ConstantByMode):
+        return text
+    if not parameter.degree:
+        return f"{text} (one for all modes; the interval lets them differ)"
+    time = significant(parameter.mean_time_s, 3)
+    return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"

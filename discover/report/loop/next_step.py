@@ -1,0 +1,89 @@
+"""What to measure next after a closed loop."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discover.closed_loop.results.loop_result import LoopResult
+from discover.closed_loop.results.stages import Stage
+from discover.dataset.coarse_rates import MORE_SAMPLES
+from discover.report.loop.asked import EXPLAINED, coarse_rates, several, untested_by
+from discover.report.wording import (
+    A_TRANSIENT,
+    FIGURE_SYMBOLS,
+    effect_title,
+    effects_title,
+    percent,
+    significant,
+)
+from discover.statistics.residual import FEWEST_TESTED
+
+
+def what_to_measure_next(result: LoopResult) -> str:
+    """Return what would tell most: more samples, a check of an effect, another test."""
+    if coarse_rates(result) is not None:
+        return MORE_SAMPLES
+    rates = [float(np.max(np.abs(record.rate))) for record in result.records]
+    faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
+    if result.verdict == "no_signal" or result.remaining.get("without_fluid"):
+        return (
+            "See that the sensor is connected and the sample there, and measure where the stress "
+            "stands out of the noise: with a larger sample, a more sensitive transducer, or "
+            f"{faster}."
+        )
+    untested = untested_by(result)
+    if untested == "states":
+        return A_TRANSIENT
+    if result.verdict in EXPLAINED and (told := _telling_test(result)):
+        return told
+    if untested:
+        return "Fit another run, or hold one out: at another rate, or of another test."
+    doubtful = _most_doubtful(result.stages)
+    if doubtful is not None and result.verdict != "unexplained":
+        check = doubtful.check.rstrip(". ")
+        if not check[1:2].isdigit():  # N2 keeps its capital
+            check = check[:1].lower() + check[1:]
+        title = effect_title(doubtful.effect)
+        if not doubtful.aliases:
+            return f"To confirm {title}: {check}."
+        others = several([*map(effect_title, doubtful.aliases)], "and")
+        return f"To tell {title} from {others}: {check}."
+    if not result.remaining.get("noise_known", True):
+        return (
+            f"Record at least {FEWEST_TESTED} samples in each run, or repeat a run to learn its "
+            "noise and write it in the study ([loop] noise)."
+        )
+    if result.verdict == "unexplained":
+        return (
+            "Repeat one run with another geometry or instrument: what changes is the instrument's, "
+            "what stays is the fluid's."
+        )
+    hidden = max(
+        result.noise_floor,
+        *(float(result.remaining.get(name, 0.0)) for name in ("resolution", "linear_error")),
+    )
+    return (
+        f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
+        f"tests the model hardest is a faster flow: {faster}."
+    )
+
+
+def _telling_test(result: LoopResult) -> str:
+    """Return the test that tells the likeliest explanation from others; empty if none does."""
+    following = result.next_tests
+    best = following.best
+    if best is None:
+        return ""
+    titles = [effects_title(effects) for effects in following.explanations]
+    first, *_ = best.pairs
+    chosen = first[0]
+    others = several([titles[j] for i, j in best.pairs if i == chosen], "and")
+    what = f" ({FIGURE_SYMBOLS[best.quantity]})" if best.quantity != "sigma12" else ""
+    count = len(following.tests)
+    return f"To tell {titles[chosen]} from {others}: {best.title}{what}, of {count} tests weighed."
+
+
+def _most_doubtful(stages: Sequence[Stage]) -> Stage | None:
+    """Return the stage to confirm first: one with aliases before one without."""
+    with_aliases = [stage for stage in stages if stage.aliases]
+    return next(iter([*with_aliases, *stages]), None)
