@@ -8,7 +8,7 @@ from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
 from discover.comparison.judging.explanation import Explanation, explain
-from discover.comparison.judging.unseen_runs import hold_against_unseen
+from discover.comparison.judging.unseen_runs import hold_against_unseen, outliers_of
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
@@ -70,6 +70,22 @@ def test_knocks_in_a_run_held_out_refute_no_law(drawn):
     assert judged(drawn).outliers["tensor_sindy"] == {}
     # and excuse none that misses the rest
     assert judged(drawn, held=1.1 * knocked).verdict == "unexplained"
+
+
+def test_knocks_are_told_by_the_run_they_are_in_where_another_cannot_be_predicted(drawn):
+    generator, flows, predictions = np.random.default_rng(2), [], {}
+    for name, knock in (("slow", None), ("fast", 30), ("held", 50)):
+        record = white(drawn[name][0], 0.01, generator)
+        if knock is not None:
+            record[knock] *= 2.0
+        rates = np.full(len(TIMES), RATES[name])
+        flow = Flow(name, "training", protocol(RATES[name]), TIMES, rates, {"sigma12": record})
+        flows.append(replace(flow, measured=record))
+        predictions[flow.key] = {"sigma12": drawn[name][0]}
+    predictions[flows[0].key] = None  # the law runs away in the first of them
+    outcome = LearnerOutcome("tensor_sindy", (), 1.0, EMPTY, predictions=predictions)
+    told = outliers_of(outcome, flows, Expectation())
+    assert told == {flows[1].key: (30,), flows[2].key: (50,)}
 
 
 def test_a_law_that_holds_in_a_run_held_out_explains(drawn):
