@@ -31,9 +31,9 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import answer
-from hostile_fluids_exports_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
+from hostile_fluids_sessions_cases import CASES
 from independent.folders import write_study, write_table
 
 TASKS = ("compare", "close-loop")
@@ -46,7 +46,9 @@ def make(case: Case, seed: int) -> tuple[Records, Records]:
         lot = np.random.default_rng([seed, number])
         changed = {run.observed: case.noise(run.columns[run.observed], lot)}
         noisy[name] = replace(run, columns={**run.columns, **changed})
-    return clean, noisy
+    if case.export is None:
+        return clean, noisy
+    return case.export(clean), case.export(noisy)
 
 
 def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path]:
