@@ -10,8 +10,9 @@ data folder and a study file and no more. The rules, written before the first ru
 3. **Names**: under such a verdict of the loop every effect with a probability of one half or more
    is there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others
-   but such whose interval holds zero, or which are told to be another declared constant (these two
-   exceptions came later, with the words that the page has for them).
+   but such whose interval holds zero, or which are told to be another declared constant where that
+   is what is there (these two exceptions came later, with the words that the page has for them; for
+   a day the second held whether or not the constant was told wrong).
 5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
 6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
    than two half-bands (rms); 1 % where there is no band.

@@ -107,8 +107,8 @@ def holding_misreading(
             continue
         low, high = bounds[position]
         wider[position] = (
-            max(min(low, low + step), float(model.low[position])),
-            min(max(high, high + step), float(model.high[position])),
+            max(low + min(float(step), 0.0), float(model.low[position])),
+            min(high + max(float(step), 0.0), float(model.high[position])),
         )
     return wider, found
 
