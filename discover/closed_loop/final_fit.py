@@ -38,7 +38,7 @@ from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
 from discover.inference.varying_constant import freer_fits
-from discover.statistics.misread import Misread, Reading
+from discover.statistics.misread import Misread, Reading, not_ruled_out
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,11 @@ class FinalConstants:
     by_mode: Mapping[str, ConstantByMode]
     possible: Sequence[Float[np.ndarray, " p"]] = ()
     misread: Misread | None = None
+
+    @property
+    def misread_said(self) -> str:
+        """How else the fitted runs may have been read, in a sentence; empty if not."""
+        return "" if self.misread is None else not_ruled_out(self.misread)
 
     @property
     def rates_known(self) -> bool:

@@ -165,13 +165,24 @@ def reads(found: Misread) -> str:
         return (
             f"as if the moduli of the modes were {1 + low:.3g} to {1 + high:.3g} times those told"
         )
-    span = f"by factors that differ by {100 * (high - low):.2g} %"
-    return f"as if each run had been read by a factor of its own ({span})"
+    return (
+        "as if each run had been read by a factor of its own, of which the largest is "
+        f"{100 * (high - low):.2g} % more than the least"
+    )
 
 
 def advice(found: Misread) -> str:
     """Return what to do about it, as a clause."""
     return _ADVICE[found.kind]
+
+
+def not_ruled_out(found: Misread) -> str:
+    """Return what is to be known of a fault with which all that is said has to hold, too."""
+    once = 1.0 / max(found.probability, 1e-9)
+    return (
+        f"The records follow the law a little better {reads(found)}, which chance alone does once "
+        f"in {once:.0f} data sets. Intervals and bands hold either; {advice(found)}."
+    )
 
 
 class _Problem:

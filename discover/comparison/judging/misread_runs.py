@@ -20,7 +20,16 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.kinematics import STATES
 from discover.statistics import root_of
-from discover.statistics.misread import CLEAR, POSSIBLE, Misread, Reading, advice, misread, reads
+from discover.statistics.misread import (
+    CLEAR,
+    POSSIBLE,
+    Misread,
+    Reading,
+    advice,
+    misread,
+    not_ruled_out,
+    reads,
+)
 from discover.statistics.outliers import stray
 from discover.statistics.residual import STRUCTURE, Expectation
 
@@ -135,14 +144,8 @@ def holding_misreading(
     values = law.start + found.steps
     fluid = law.fluid(values)
     predictions = {flow.key: predict(fluid, flow) for flow in flows if flow.key in bands}
-    once = 1.0 / max(found.probability, 1e-9)
-    said = (
-        f"The records follow the law a little better {reads(found)}, which chance alone does once "
-        f"in {once:.0f} data sets. Intervals and bands hold either; {advice(found)}"
-    )
-    coefficients = values[len(law.names) :]
-    wider = intervals_of_either(outcomes, coefficients)
-    return wider, bands_of_either(bands, predictions), (said,)
+    wider = intervals_of_either(outcomes, values[len(law.names) :])
+    return wider, bands_of_either(bands, predictions), (not_ruled_out(found),)
 
 
 def _of_flows(law: MovedLaw, flows: Sequence[Flow]) -> list[Reading]:
