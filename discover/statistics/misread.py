@@ -110,7 +110,7 @@ class Misread:
     gain
         Of log likelihood.
     steps
-        How far the constants move with it.
+        How far the constants move with it from where they fit best without.
     changes
         What it adds to each run, in its unit.
     size
@@ -270,7 +270,7 @@ class _Problem:
         gain = worth * np.log(float(before @ before) / max(float(after @ after), 1e-300))
         sizes = (turned[kept].T / seen[kept]) @ values
         change = own.T @ sizes
-        steps = -np.linalg.lstsq(beside.T, self._residual + change, rcond=1e-9)[0]
+        steps = -np.linalg.lstsq(beside.T, change, rcond=1e-9)[0]
         changes = [
             change[rows] / weight for rows, weight in zip(self._rows, self._weights, strict=True)
         ]
