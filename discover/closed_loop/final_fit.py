@@ -17,11 +17,7 @@ from discover.closed_loop.judging.between_samples import (
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
-from discover.closed_loop.judging.misread_runs import (
-    fitted_readings,
-    holding_misreading,
-    unseen_readings,
-)
+from discover.closed_loop.judging.misread_runs import holding_misreading
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.own_noise import weighed_like
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -37,6 +33,7 @@ from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
+from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
 from discover.statistics.misread import Misread, Reading, not_ruled_out
 

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from scipy.stats import f as fisher
 
 from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.residual import Expectation
 
 Misreading = Literal["factor", "zero", "growth", "above", "below", "modes"]
 """A factor, a zero or a factor that grows in time, of each run; a factor above or below a level;
@@ -146,6 +147,27 @@ def misread(runs: Sequence[Reading]) -> Misread | None:
     problem = _Problem(runs)
     found = [one for kind in get_args(Misreading) if (one := problem.best(kind)) is not None]
     return min(found, key=lambda one: one.probability, default=None)
+
+
+def clear_misreading(
+    sets: Sequence[Sequence[Reading]], expectation: Expectation, least: float
+) -> Misread | None:
+    """Return the fault by which records are described clearly better; None if by none.
+
+    Parameters
+    ----------
+    sets
+        Sets of runs that are asked, such as those fitted and those with others beside them.
+    expectation
+        What a complete law may leave: the error of linear data, or what repeats differ by.
+    least
+        Relative size that arithmetic explains.
+    """
+    sets = [runs for runs in sets if runs]
+    found = [one for runs in sets if (one := misread(runs)) is not None]
+    clear = [one for one in found if len(sets) * one.probability <= CLEAR and one.size > least]
+    seen = [one for one in clear if not expectation.excuses(one.size)]
+    return min(seen, key=lambda one: one.probability, default=None)
 
 
 def reads(found: Misread) -> str:

@@ -19,9 +19,11 @@ from discover.inference.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
+from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
+from discover.statistics.misread import advice, clear_misreading, reads
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 
@@ -40,6 +42,9 @@ _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 _MOST_TERMS = 3
 
 _DRAWS = 40
+
+_ARITHMETIC = 1e-4
+"""Relative misfit that finite steps of the fit may leave."""
 
 _STARTS = (1.0, 10.0)
 """Multiples of an effect's first trial, which is the size from which it shows."""
@@ -193,7 +198,7 @@ def fit_laws_by_mode(
         constants, bands = _told(problem, fit, degrees, model, flows)
         yield LawByMode(
             constants,
-            problem.lack_of_fit(fit, fitted, expectation),
+            _left(problem, fit, fitted, held_out, expectation),
             worth - problem.worth(fit, [*degrees], effective),
             _errors(forward, fit, held_out),
             bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
@@ -240,6 +245,31 @@ def coefficients_in_modes(
     if set(constants) != set(names):
         return None
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
+
+
+def _left(
+    problem: FitProblem,
+    fit: Fit,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    expectation: Expectation,
+) -> LackOfFit:
+    """Return what a law by mode leaves; it explains nothing where runs were read otherwise."""
+    left = problem.lack_of_fit(fit, fitted, expectation)
+    known = expectation.noise is not None and left.misfit <= left.expected
+    if left.verdict != "explained" or known:
+        return left
+    model = problem.model
+    seen = fitted_readings(model, problem.batch, fitted, fit)
+    sets = [seen]
+    if held_out:
+        unseen = unseen_readings(model, make_batch(held_out), held_out, fit, fit.theta)
+        sets.append([*seen, *unseen])
+    found = clear_misreading(sets, expectation, _ARITHMETIC)
+    if found is None:
+        return left
+    said = f"the records follow the law clearly better {reads(found)}"
+    return replace(left.refuted(said), likeness=advice(found))
 
 
 def _told(

@@ -21,11 +21,11 @@ from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.kinematics import STATES
 from discover.statistics import root_of
 from discover.statistics.misread import (
-    CLEAR,
     POSSIBLE,
     Misread,
     Reading,
     advice,
+    clear_misreading,
     misread,
     not_ruled_out,
     reads,
@@ -87,21 +87,17 @@ def _described_better(
     """Return how else the records were read if a law describes them clearly better so."""
     fitted = [flow for flow in flows if flow.kind == "training"]
     sets = [fitted, list(flows)] if len(fitted) < len(flows) else [fitted]
-    least, best = max(ARITHMETIC, STRUCTURE * outcome.resolution), None
-    for some in sets:
-        # band directions hold errors of the moduli too, which here are no free constants
+
+    def told(some: Sequence[Flow]) -> list[Reading]:
+        # directions of a band hold errors of the moduli too, which here are no free constants
         runs = [] if law is None or law.inner else _of_flows(law, some)
-        if not runs:
-            told = runs_as_predicted(explanation, name, outcome, some, bands)
-            runs = [_reading(run, law) for run in told]
-        found = misread(runs)
-        if found is None or len(sets) * found.probability > CLEAR or found.size <= least:
-            continue
-        if explanation.expectation.excuses(found.size):
-            continue
-        if best is None or found.probability < best.probability:
-            best = found
-    return best
+        if runs:
+            return runs
+        runs = runs_as_predicted(explanation, name, outcome, some, bands)
+        return [_reading(run, law) for run in runs]
+
+    least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
+    return clear_misreading([*map(told, sets)], explanation.expectation, least)
 
 
 def holding_misreading(

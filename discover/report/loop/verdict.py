@@ -206,7 +206,7 @@ def _loop_sure(result: LoopResult) -> str:
             parts.append(nothing)
     if (coarse := _coarse(result)) is not None:
         sentences.append(coarse.sentence)
-    if result.verdict in _EXPLAINED and (said := result.remaining.get("read_otherwise")):
+    if said := result.remaining.get("read_otherwise"):
         sentences.append(said)
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= _MOST_NAMES else f"{len(steps)} runs"
