@@ -23,7 +23,7 @@ from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
-from discover.statistics.misread import advice, clear_misreading, reads
+from discover.statistics.misread import Misread, clear_misreading
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 
@@ -89,6 +89,8 @@ class LawByMode:
         alone spoke for, leave it open.
     refuted
         Whether it explains the fitted runs, and runs held out speak against it.
+    misread
+        How else the runs were read, if it describes them clearly better so.
     """
 
     constants: Mapping[str, ConstantByMode]
@@ -97,6 +99,7 @@ class LawByMode:
     errors: Mapping[str, float | None]
     bands: Mapping[str, PredictionBand] = field(default_factory=dict)
     refuted: bool = False
+    misread: Misread | None = None
 
     @property
     def explains(self) -> bool:
@@ -198,10 +201,11 @@ def fit_laws_by_mode(
         constants, bands = _told(problem, fit, degrees, model, flows)
         yield LawByMode(
             constants,
-            _left(problem, fit, fitted, held_out, expectation),
+            left := problem.lack_of_fit(fit, fitted, expectation),
             worth - problem.worth(fit, [*degrees], effective),
             _errors(forward, fit, held_out),
             bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
+            misread=_misread(problem, fit, left, fitted, held_out, expectation),
         )
         least = one_degree_more(forward, degrees)
         before = degrees
@@ -247,29 +251,25 @@ def coefficients_in_modes(
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
 
 
-def _left(
+def _misread(
     problem: FitProblem,
     fit: Fit,
+    left: LackOfFit,
     fitted: Sequence[Run],
     held_out: Sequence[Run],
     expectation: Expectation,
-) -> LackOfFit:
-    """Return what a law by mode leaves; it explains nothing where runs were read otherwise."""
-    left = problem.lack_of_fit(fit, fitted, expectation)
+) -> Misread | None:
+    """Return how else the runs were read, if a law by mode describes them clearly better so."""
     known = expectation.noise is not None and left.misfit <= left.expected
     if left.verdict != "explained" or known:
-        return left
+        return None
     model = problem.model
     seen = fitted_readings(model, problem.batch, fitted, fit)
     sets = [seen]
     if held_out:
         unseen = unseen_readings(model, make_batch(held_out), held_out, fit, fit.theta)
         sets.append([*seen, *unseen])
-    found = clear_misreading(sets, expectation, _ARITHMETIC)
-    if found is None:
-        return left
-    said = f"the records follow the law clearly better {reads(found)}"
-    return replace(left.refuted(said), likeness=advice(found))
+    return clear_misreading(sets, expectation, _ARITHMETIC)
 
 
 def _told(

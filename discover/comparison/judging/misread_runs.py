@@ -19,7 +19,7 @@ from discover.comparison.outcomes.flows import MEASURED, Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.kinematics import STATES
-from discover.statistics import root_of
+from discover.statistics import LackOfFit, root_of
 from discover.statistics.misread import (
     POSSIBLE,
     Misread,
@@ -69,11 +69,16 @@ def hold_against_misreading(
         own = law if name == SPARSE else None
         one = refuted or _described_better(explanation, name, outcomes[name], flows, bands, own)
         if one is not None:
-            said = f"the records follow the law clearly better {reads(one)}"
-            found[name] = replace(left.refuted(said), likeness=advice(one))
+            found[name] = described_as_misread(left, one)
         if name == SPARSE:
             refuted = one
     return replace(explanation, lack_of_fit=found)
+
+
+def described_as_misread(left: LackOfFit, found: Misread) -> LackOfFit:
+    """Return what a law leaves that describes the records clearly better as read otherwise."""
+    said = f"the records follow the law clearly better {reads(found)}"
+    return replace(left.refuted(said), likeness=advice(found))
 
 
 def _described_better(
