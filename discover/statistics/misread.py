@@ -26,8 +26,9 @@ CLEAR = 1e-4
 """Probability up to which a fault is believed: of right laws in white noise one in a thousand has a
 fault of 1e-3, in noise correlated to 0.95 from sample to sample one in a hundred one of 1e-4."""
 
-POSSIBLE = 0.02
-"""Probability up to which a fault is not ruled out, so that what is said has to hold with it."""
+POSSIBLE = 0.1
+"""Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
+right laws in white noise one in thirty, in noise correlated to 0.9 one in four."""
 
 _LEVELS = 24
 _LOWEST, _HIGHEST = 0.05, 0.95

@@ -199,9 +199,10 @@ def fit_laws_by_mode(
     worth = _worth_of(sparse, problem, fitted, effective)
     while fit.usable:
         constants, bands = _told(problem, fit, degrees, model, flows)
+        left = problem.lack_of_fit(fit, fitted, expectation)
         yield LawByMode(
             constants,
-            left := problem.lack_of_fit(fit, fitted, expectation),
+            left,
             worth - problem.worth(fit, [*degrees], effective),
             _errors(forward, fit, held_out),
             bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
