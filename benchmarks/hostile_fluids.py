@@ -10,8 +10,9 @@ data folder and a study file and no more. The rules, written before the first ru
 3. **Names**: under such a verdict of the loop every effect with a probability of one half or more
    is there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others
-   but such whose interval holds zero, or which are told to be another declared constant (these two
-   exceptions came later, with the words that the page has for them).
+   but such whose interval holds zero, or which are told to be another declared constant where that
+   is what is there (these two exceptions came later, with the words that the page has for them; for
+   a day the second held whether or not the constant was told wrong).
 5. **Intervals**: a constant that is known lies within three half-widths of its 95 % interval.
 6. **N1, N2, σ12** of a comparison that are not said to be open are off, in every run, by no more
    than two half-bands (rms); 1 % where there is no band.
@@ -31,9 +32,9 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import answer
-from hostile_fluids_exports_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
+from hostile_fluids_sessions_cases import CASES
 from independent.folders import write_study, write_table
 
 TASKS = ("compare", "close-loop")
@@ -46,7 +47,9 @@ def make(case: Case, seed: int) -> tuple[Records, Records]:
         lot = np.random.default_rng([seed, number])
         changed = {run.observed: case.noise(run.columns[run.observed], lot)}
         noisy[name] = replace(run, columns={**run.columns, **changed})
-    return clean, noisy
+    if case.export is None:
+        return clean, noisy
+    return case.export(clean), case.export(noisy)
 
 
 def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path]:

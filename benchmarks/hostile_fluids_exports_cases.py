@@ -1,4 +1,4 @@
-"""What exports, transducers and sessions do, and what is true of it; and every case together."""
+"""What exports and transducers do, and what is true of it."""
 
 from dataclasses import replace
 
@@ -142,6 +142,6 @@ NONE_HELD_OUT = {
     for name, case in {**LITTLE, **{n: EXPORTS[n] for n in ("averaged_little", "cooled")}}.items()
 }
 
-CASES: dict[str, Case] = {
+EXPORTS_AND_BEFORE: dict[str, Case] = {
     **LABORATORY_AND_BEFORE, **EXPORTS, **LITTLE, **WITHIN, **NONE_HELD_OUT,
 }  # fmt: skip

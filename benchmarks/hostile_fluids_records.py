@@ -94,6 +94,8 @@ class Case:
         Section of the study, for both commands.
     told
         Further entries of the study's section of data.
+    export
+        What becomes of the runs once they have their noise.
     """
 
     truth: str
@@ -108,6 +110,7 @@ class Case:
     model: Mapping[str, Any] = field(default_factory=lambda: dict(KNOWN))
     held_out: tuple[str, ...] = ("held.csv",)
     told: Mapping[str, Any] = field(default_factory=dict)
+    export: Callable[[dict[str, Record]], dict[str, Record]] | None = None
 
 
 @dataclass(frozen=True)

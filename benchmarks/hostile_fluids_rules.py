@@ -92,8 +92,12 @@ def of_compare(case: Case, said: dict, rows, clean: Records, found: dict) -> Non
     if case.terms is not None:
         # a term that may be zero, as an interval says, is no claim
         sure = {t["term"] for t in terms if not _holds_zero(t.get("ci95"))}
-        # nor is one of which it is told that it may as well be another declared constant
-        sure -= {term for term, one in CONSTANT.items() if one in said["undetermined"]}
+        # nor is one of which it is told that it may as well be another declared constant, as it is
+        sure -= {
+            term
+            for term, one in CONSTANT.items()
+            if one in said["undetermined"] and {term, one} & {*case.same_as}
+        }
         if sure != set(case.terms):
             text = f"the law is {', '.join(found['terms']) or 'the declared one'}"
             found["falsehoods"].append(f"{text}, not {', '.join(case.terms) or 'the declared one'}")

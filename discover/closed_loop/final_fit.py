@@ -17,6 +17,7 @@ from discover.closed_loop.judging.between_samples import (
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
+from discover.closed_loop.judging.misread_runs import holding_misreading
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.own_noise import weighed_like
 from discover.closed_loop.results.error_pair import ErrorPair
@@ -32,7 +33,9 @@ from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
+from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
+from discover.statistics.misread import Misread, Reading, not_ruled_out
 
 
 @dataclass(frozen=True)
@@ -131,6 +134,20 @@ class FinalFit:
         """What errors of the moduli change of the fitted runs."""
         return modulus_shifts(self.model, self.fit.theta, self.batch)
 
+    @cached_property
+    def fitted_readings(self) -> list[Reading]:
+        """The fitted runs for the question how they were read."""
+        return fitted_readings(self.model, self.batch, self.fitted, self.fit)
+
+    @cached_property
+    def unseen_readings(self) -> list[Reading]:
+        """The runs held out for the same question."""
+        if self.held_batch is None:
+            return []
+        return unseen_readings(
+            self.model, self.held_batch, self.held_out, self.fit, self.search.path[-1]
+        )
+
     def unseen(self) -> HeldOut | None:
         """Return what the final model leaves of the runs held out, if there are any."""
         if self.held_batch is None:
@@ -163,6 +180,8 @@ class FinalConstants:
         Constants that may differ from mode to mode, by name.
     possible
         Constants far from the fit that these data do not exclude; see `profiled`.
+    misread
+        How else the fitted runs may have been read, with which the intervals hold too; None if not.
     """
 
     bounds: Bounds
@@ -170,6 +189,12 @@ class FinalConstants:
     coarse: CoarseRates | None
     by_mode: Mapping[str, ConstantByMode]
     possible: Sequence[Float[np.ndarray, " p"]] = ()
+    misread: Misread | None = None
+
+    @property
+    def misread_said(self) -> str:
+        """How else the fitted runs may have been read, in a sentence; empty if not."""
+        return "" if self.misread is None else not_ruled_out(self.misread)
 
     @property
     def rates_known(self) -> bool:
@@ -211,13 +236,15 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     search, model, batch, fit = final.search, final.model, final.batch, final.fit
     bounds = intervals(model, batch, fit, final.shifts)
     profile = profiled(search.problem, fit, bounds, _constants(final))
-    bounds = profile.bounds
+    bounds, otherwise = holding_misreading(profile.bounds, fit, final.fitted_readings, model)
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
     freer = freer_fits(model, batch, fit, search.degrees, search.prior)
     by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer)
-    return FinalConstants(bounds, unknown, coarse, {**by_mode, **apart}, profile.possible)
+    return FinalConstants(
+        bounds, unknown, coarse, {**by_mode, **apart}, profile.possible, otherwise
+    )
 
 
 def _constants(final: FinalFit) -> list[int]:

@@ -8,7 +8,7 @@ from discover.closed_loop.judging.before_after import cut_to_strain
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
-from discover.dataset.run import same_samples
+from discover.dataset.copies import require_no_copies
 from discover.dataset.spikes import without_spikes
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
@@ -61,13 +61,7 @@ def split_runs(
     )
     if len(fitted) == 0:
         raise InputError("No run is left to fit. Take some out of held_out.")
-    for run in held.runs:
-        copied = next((other.name for other in fitted.runs if same_samples(run, other)), None)
-        if copied is not None:
-            raise InputError(
-                f"The held-out run {run.name!r} holds the same samples as the fitted run "
-                f"{copied!r}, so it proves nothing. Hold out another, or none."
-            )
+    require_no_copies(fitted.runs, held.runs)
     if most < FEWEST_LINEAR_SAMPLES:
         raise InputError(
             f"most_samples must be {FEWEST_LINEAR_SAMPLES} or more; got {most}. A law cannot be "

@@ -13,7 +13,7 @@ from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
 from discover.comparison.judging.beside_other_constants import with_other_coefficients
-from discover.comparison.judging.constants_in_bands import with_fitted_constants
+from discover.comparison.judging.constants_in_bands import constants_of, with_fitted_constants
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
     other_constants,
@@ -31,12 +31,14 @@ from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.filters_for_terms import holding_filters
 from discover.comparison.judging.identifiability import Rival, find_rivals, structure_of
 from discover.comparison.judging.late_answers import hold_against_late_answers
+from discover.comparison.judging.misread_runs import hold_against_misreading, holding_misreading
 from discover.comparison.judging.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
     with_intervals_of_modes,
 )
 from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import (
     NextMeasurement,
@@ -153,9 +155,13 @@ def judge(
         tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
     of_filters: tuple[str, ...] = ()
+    of_readings: tuple[str, ...] = ()
     if chosen is not None and explanation.in_library and not (normal or frame.made):
         seen = outcomes, tested.bands, chosen, frame.model, frame.flows
         outcomes, bands, of_filters = holding_filters(*seen)
+        law = MovedLaw.of(chosen.terms, frame.model, constants_of(known.fitted, frame.model))
+        seen = outcomes, bands, chosen, law, frame.flows, expectation
+        outcomes, bands, of_readings = holding_misreading(*seen)
         tested = replace(tested, bands=bands)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
@@ -174,6 +180,7 @@ def judge(
         *_of_modes(outcomes, explanation, expectation),
         *((of_modes.said,) if of_modes.said else ()),
         *of_filters,
+        *of_readings,
         *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
         *refuted,
         *disagreements(outcomes, _judged(flows), bands),
@@ -263,6 +270,9 @@ def _tested(
     explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
     if not frame.made:  # what a known instrument does is in the predictions already
         explanation = hold_against_late_answers(explanation, outcomes, flows, seen)
+        fitted = constants_of(known.fitted, frame.model)
+        law = None if chosen is None else MovedLaw.of(chosen.terms, frame.model, fitted)
+        explanation = hold_against_misreading(explanation, outcomes, flows, seen, law)
     if chosen is None or not explanation.in_library:
         return _Tested(explanation)
     left = at_first.lack_of_fit["tensor_sindy"]

@@ -324,11 +324,6 @@ class Run:
         )
 
 
-def same_samples(one: Run, other: Run) -> bool:
-    """Return whether two runs hold the same times and values, under whatever names."""
-    return np.array_equal(one.time, other.time) and np.array_equal(one.recorded, other.recorded)
-
-
 def require_signal(runs: Sequence[Run]) -> None:
     """Refuse runs of which none can teach a law."""
     names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")

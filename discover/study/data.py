@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from discover.dataset import Dataset
+from discover.dataset.copies import require_no_copies
 from discover.dataset.load import load_dataset
 from discover.dataset.material_functions import TABLES
 from discover.dataset.run import require_signal
@@ -48,7 +49,8 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     Raises
     ------
     InputError
-        If a file is wrong, a named run does not exist, or the runs to fit hold no signal.
+        If a file is wrong, a named run does not exist, a run held out is a copy of one to fit, or
+        those to fit hold no signal.
     """
     data = study.data
     if data.synthetic is not None:
@@ -95,6 +97,7 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
         )
     fit = dataset.select(fit_names)
     require_signal(fit.runs)
+    require_no_copies(fit.runs, held_out.runs)
     return StudyData(dataset, fit, held_out, each)
 
 

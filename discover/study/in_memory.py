@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discover.dataset import Dataset, Run
+from discover.dataset.copies import require_no_copies
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
@@ -40,8 +41,8 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     Raises
     ------
     InputError
-        If no data set is given, a run is both fitted and held out, none is left to fit, or those
-        to fit hold no signal.
+        If no data set is given, a run is both fitted and held out, by name or by its samples, none
+        is left to fit, or those to fit hold no signal.
     """
     if not isinstance(data, Dataset):
         raise InputError(
@@ -69,6 +70,7 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     else:
         divided = StudyData(data, data, data.select([]))
     require_signal(divided.fit.runs)
+    require_no_copies(divided.fit.runs, divided.held_out.runs)
     return divided
 
 

@@ -33,6 +33,7 @@ def fake_study(**compare_options):
                     "parameters": {"alpha": 0.2},
                     "noise": 0.01,
                     "samples": 21,
+                    "seed": 1,
                 }
             },
             "compare": {"high_deborah": [1.5], "library": {"degree": 0}, **compare_options},

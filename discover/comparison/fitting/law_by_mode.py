@@ -19,9 +19,11 @@ from discover.inference.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
+from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
+from discover.statistics.misread import Misread, clear_misreading
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 
@@ -40,6 +42,9 @@ _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 _MOST_TERMS = 3
 
 _DRAWS = 40
+
+_ARITHMETIC = 1e-4
+"""Relative misfit that finite steps of the fit may leave."""
 
 _STARTS = (1.0, 10.0)
 """Multiples of an effect's first trial, which is the size from which it shows."""
@@ -84,6 +89,8 @@ class LawByMode:
         alone spoke for, leave it open.
     refuted
         Whether it explains the fitted runs, and runs held out speak against it.
+    misread
+        How else the runs were read, if it describes them clearly better so.
     """
 
     constants: Mapping[str, ConstantByMode]
@@ -92,6 +99,7 @@ class LawByMode:
     errors: Mapping[str, float | None]
     bands: Mapping[str, PredictionBand] = field(default_factory=dict)
     refuted: bool = False
+    misread: Misread | None = None
 
     @property
     def explains(self) -> bool:
@@ -191,12 +199,14 @@ def fit_laws_by_mode(
     worth = _worth_of(sparse, problem, fitted, effective)
     while fit.usable:
         constants, bands = _told(problem, fit, degrees, model, flows)
+        left = problem.lack_of_fit(fit, fitted, expectation)
         yield LawByMode(
             constants,
-            problem.lack_of_fit(fit, fitted, expectation),
+            left,
             worth - problem.worth(fit, [*degrees], effective),
             _errors(forward, fit, held_out),
             bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
+            misread=_misread(problem, fit, left, fitted, held_out, expectation),
         )
         least = one_degree_more(forward, degrees)
         before = degrees
@@ -240,6 +250,27 @@ def coefficients_in_modes(
     if set(constants) != set(names):
         return None
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
+
+
+def _misread(
+    problem: FitProblem,
+    fit: Fit,
+    left: LackOfFit,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    expectation: Expectation,
+) -> Misread | None:
+    """Return how else the runs were read, if a law by mode describes them clearly better so."""
+    known = expectation.noise is not None and left.misfit <= left.expected
+    if left.verdict != "explained" or known:
+        return None
+    model = problem.model
+    seen = fitted_readings(model, problem.batch, fitted, fit)
+    sets = [seen]
+    if held_out:
+        unseen = unseen_readings(model, make_batch(held_out), held_out, fit, fit.theta)
+        sets.append([*seen, *unseen])
+    return clear_misreading(sets, expectation, _ARITHMETIC)
 
 
 def _told(

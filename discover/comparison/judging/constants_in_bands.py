@@ -45,7 +45,7 @@ def with_fitted_constants(
     flows
         The flows in which the law is simulated, those fitted among them.
     """
-    kept = tuple(n for n in names if n in MODE_CONSTANTS or n in declared.parameters)
+    kept = constants_of(names, declared)
     training = [flow for flow in flows if flow.kind == "training"]
     if not kept or not bands or not training:
         return dict(bands)
@@ -61,6 +61,11 @@ def with_fitted_constants(
         if slopes is not None:
             found[key] = _wider(band, np.einsum("qr,qnc->rnc", root, slopes[1]))
     return found
+
+
+def constants_of(names: Sequence[str], declared: DeclaredModel) -> tuple[str, ...]:
+    """Return those of the constants that were fitted that are of the modes or of the law."""
+    return tuple(n for n in names if n in MODE_CONSTANTS or n in declared.parameters)
 
 
 def _root(training: Sequence[Flow], told: Mapping[str, tuple | None]) -> np.ndarray | None:

@@ -7,15 +7,16 @@ to hold with either, as it has where a term amounts to another declared constant
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
+from discover.comparison.judging.either_law import bands_of_either, intervals_of_either
 from discover.comparison.judging.late_answers import ADVICE, does, tells
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.evidence import WINDOW
@@ -141,43 +142,8 @@ def holding_filters(
     found = filter_for_terms(chosen, model, flows)
     if found is None:
         return dict(outcomes), dict(bands), ()
-    return _with_intervals(outcomes, found), _with_bands(bands, found), (found.said,)
-
-
-def _with_intervals(
-    outcomes: Mapping[str, LearnerOutcome], found: FilterForTerms
-) -> dict[str, LearnerOutcome]:
-    """Return the outcomes, intervals of the sparse law holding its coefficients with the filter."""
-    sparse = outcomes.get("tensor_sindy")
-    if sparse is None:
-        return dict(outcomes)
-    terms = []
-    for term, value in zip(sparse.terms, found.coefficients, strict=True):
-        one = term
-        if term.ci95 is not None:
-            half = 0.0 if term.term in found.terms else 0.5 * (term.ci95[1] - term.ci95[0])
-            low, high = min(term.ci95[0], value - half), max(term.ci95[1], value + half)
-            one = replace(term, ci95=(float(low), float(high)))
-        terms.append(one)
-    return {**outcomes, "tensor_sindy": replace(sparse, terms=tuple(terms))}
-
-
-def _with_bands(
-    bands: Mapping[str, PredictionBand], found: FilterForTerms
-) -> dict[str, PredictionBand]:
-    """Return bands of the sparse law that hold the fluid behind the filter, as widely, too."""
-    wider = {}
-    for key, band in bands.items():
-        predicted = found.predictions.get(key)
-        wider[key] = band
-        if predicted is not None:
-            moved = np.stack([predicted[q] for q in QUANTITIES], axis=-1) - band.chosen
-            wider[key] = replace(
-                band,
-                rivals_low=np.minimum(band.rivals_low, band.rivals_low + moved),
-                rivals_high=np.maximum(band.rivals_high, band.rivals_high + moved),
-            )
-    return wider
+    wider = intervals_of_either(outcomes, found.coefficients, found.terms)
+    return wider, bands_of_either(bands, found.predictions), (found.said,)
 
 
 def _weak(term: RecoveredTerm) -> bool:

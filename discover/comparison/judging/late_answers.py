@@ -10,19 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.comparison.judging.as_predicted import SPARSE, runs_as_predicted
 from discover.comparison.judging.explanation import ARITHMETIC, Explanation
-from discover.comparison.judging.unseen_runs import changes_along, outliers_of
 from discover.comparison.outcomes.flows import MEASURED, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.late_answers import AGREED, Late, Response, late_answer
 from discover.statistics.residual import STRUCTURE
-
-_SPARSE = "tensor_sindy"
-
-_SAME = 3e-2
-"""Of the largest change that constants make: below it lies what is not linear in them."""
 
 _DOES: Mapping[Late, str] = {
     "delay": "told each stress {time} late",
@@ -62,14 +57,14 @@ def hold_against_late_answers(
     flows = [flow for flow in flows if tells(flow)]
     found = dict(explanation.lack_of_fit)
     refuted = ""
-    for name in sorted(explanation.by, key=lambda one: one != _SPARSE):
+    for name in sorted(explanation.by, key=lambda one: one != SPARSE):
         left = found[name]
         if expectation.noise is not None and left.misfit <= left.expected:
             continue  # of a noise that is given only who gives it knows what is in it
         said = refuted or _described_better(explanation, name, outcomes[name], flows, bands)
         if said:
             found[name] = replace(left.refuted(said), likeness=ADVICE)
-        if name == _SPARSE:
+        if name == SPARSE:
             refuted = said
     return replace(explanation, lack_of_fit=found)
 
@@ -82,7 +77,8 @@ def _described_better(
     bands: Mapping[str, PredictionBand],
 ) -> str:
     """Return by which filter a law describes the records better, in words; empty if by none."""
-    runs = _responses(explanation, name, outcome, flows, bands)
+    told = runs_as_predicted(explanation, name, outcome, flows, bands)
+    runs = [Response(run.times, run.predicted, run.residual, run.columns) for run in told]
     late = late_answer(runs) if runs else None
     if late is None or late.probability > AGREED:
         return ""
@@ -98,49 +94,6 @@ def tells(flow: Flow) -> bool:
     if flow.kind not in MEASURED or (flow.kind == "held_out" and flow.is_truth):
         return False
     return bool(np.isfinite(sampling_interval(flow.times, flow.protocol)))
-
-
-def _responses(
-    explanation: Explanation,
-    name: str,
-    outcome: LearnerOutcome,
-    flows: Sequence[Flow],
-    bands: Mapping[str, PredictionBand],
-) -> list[Response]:
-    """Return the runs as a law predicts them; none where it does not follow them all."""
-    training = [flow for flow in flows if flow.kind == "training"]
-    knocks = outliers_of(outcome, training, explanation.expectation)
-    knocks |= explanation.outliers.get(name, {})
-    rows, changes = [], []
-    for flow in flows:
-        prediction = outcome.predictions.get(flow.key)
-        record = flow.measured if flow.kind == "training" else flow.reference.get("sigma12")
-        if prediction is None or record is None or not np.all(np.isfinite(prediction["sigma12"])):
-            return []
-        columns = changes_along(outcome, flow, bands if name == _SPARSE else None)
-        kept = np.delete(np.arange(len(flow.times)), list(knocks.get(flow.key, ())))
-        stress = np.asarray(prediction["sigma12"], dtype=float)
-        rows.append((flow.times[kept], stress[kept], (stress - np.asarray(record))[kept]))
-        changes.append(columns[:, kept])
-    if outcome.terms and not all(len(change) for change in changes):
-        return []  # how uncertain the constants are is not known
-    return [
-        Response(*row, columns=change)
-        for row, change in zip(rows, _independent(changes), strict=True)
-    ]
-
-
-def _independent(changes: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return as many combinations of the changes as differ, those of all runs together."""
-    if len({len(change) for change in changes}) != 1 or not all(map(len, changes)):
-        return [np.zeros((0, change.shape[1])) for change in changes]
-    every = np.concatenate(changes, axis=1)
-    if not np.all(np.isfinite(every)):
-        return [np.zeros((0, change.shape[1])) for change in changes]
-    _, size, rows = np.linalg.svd(every, full_matrices=False)
-    kept = rows[size > _SAME * size[0]] if size[0] > 0.0 else rows[:0]
-    ends = np.cumsum([change.shape[1] for change in changes])[:-1]
-    return list(np.split(kept, ends, axis=1))
 
 
 def does(kind: Late, time: float) -> str:

@@ -18,6 +18,8 @@ _STEP = 1e-3
 
 _SMALL = 1e-2
 
+_OF_MODULUS = 1e-2  # of a modulus; the stress at a given rate is linear in it
+
 
 @dataclass(frozen=True)
 class MovedLaw:
@@ -91,3 +93,17 @@ class MovedLaw:
             return None
         up, down = np.array(columns[1::2]), np.array(columns[2::2])
         return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
+
+    def of_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
+        """Return the change of the record in a flow per relative change of each mode's modulus."""
+        fluid = self.fluid(self.start)
+        modulus = np.asarray(fluid.modulus, dtype=float)
+        others = [modulus, *(modulus * (1.0 + _OF_MODULUS * one) for one in np.eye(len(modulus)))]
+        found = [
+            predict(Fluid(fluid.law, one, fluid.relaxation_time, fluid.solvent_viscosity), flow)
+            for one in others
+        ]
+        rows = [one["sigma12"] for one in found if one is not None]
+        if len(rows) < len(found) or not np.all(np.isfinite(rows)):
+            return None
+        return (np.array(rows[1:]) - rows[0]) / _OF_MODULUS

@@ -19,6 +19,8 @@ def how_sure(result: LoopResult) -> str:
         sentences.append(ONLY_STATES)
     if (coarse := coarse_rates(result)) is not None:
         sentences.append(coarse.sentence)
+    if said := result.remaining.get("read_otherwise"):
+        sentences.append(said)
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
         sentences.append(

@@ -274,6 +274,7 @@ _REMAINING = {
     "not judging": "runs held out that cannot judge",
     "worst run": "run missed most",
     "worst run error": "its error",
+    "read otherwise": "how else the runs may have been read",
     "description": "in words",
 }
 """What is said of the residual, for those who do not read the JSON."""

@@ -1,0 +1,68 @@
+"""Intervals and bands that hold for the law found and for the same law with other coefficients."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.comparison.judging.as_predicted import SPARSE
+from discover.comparison.outcomes.flows import QUANTITIES
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+
+
+def intervals_of_either(
+    outcomes: Mapping[str, LearnerOutcome],
+    coefficients: Float[np.ndarray, " terms"],
+    without: Collection[str] = (),
+) -> dict[str, LearnerOutcome]:
+    """Return the outcomes, intervals of the sparse law holding other coefficients, as widely, too.
+
+    Parameters
+    ----------
+    outcomes
+        By learner.
+    coefficients
+        In the order of its terms.
+    without
+        Terms, by their spelling, that are zero in the other law and not uncertain.
+    """
+    sparse = outcomes.get(SPARSE)
+    if sparse is None:
+        return dict(outcomes)
+    terms = []
+    for term, value in zip(sparse.terms, coefficients, strict=True):
+        one = term
+        if term.ci95 is not None:
+            half = 0.0 if term.term in without else 0.5 * (term.ci95[1] - term.ci95[0])
+            low, high = min(term.ci95[0], value - half), max(term.ci95[1], value + half)
+            one = replace(term, ci95=(float(low), float(high)))
+        terms.append(one)
+    return {**outcomes, SPARSE: replace(sparse, terms=tuple(terms))}
+
+
+def bands_of_either(
+    bands: Mapping[str, PredictionBand], predictions: Mapping[str, Mapping[str, np.ndarray] | None]
+) -> dict[str, PredictionBand]:
+    """Return bands of the sparse law that hold another one, as widely, too.
+
+    Parameters
+    ----------
+    bands
+        By the key of the flow.
+    predictions
+        Of the other law, by the same key; None where it runs away.
+    """
+    wider = {}
+    for key, band in bands.items():
+        predicted = predictions.get(key)
+        wider[key] = band
+        if predicted is not None:
+            moved = np.stack([predicted[q] for q in QUANTITIES], axis=-1) - band.chosen
+            wider[key] = replace(
+                band,
+                rivals_low=np.minimum(band.rivals_low, band.rivals_low + moved),
+                rivals_high=np.maximum(band.rivals_high, band.rivals_high + moved),
+            )
+    return wider

@@ -1,0 +1,201 @@
+"""A law that explains records only up to how each was read explains nothing yet.
+
+Other fillings, temperatures, zeros and rates from run to run, a sample that dries, a range of the
+transducer that reads otherwise than the next: constants of a law take up most of what they do, and
+noise hides the rest from a test that asks for any pattern. So it is asked whether the records
+follow the law better as if they had been read so (`discover.statistics.misread`).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discover.comparison.judging.as_predicted import SPARSE, AsPredicted, runs_as_predicted
+from discover.comparison.judging.either_law import bands_of_either, intervals_of_either
+from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.judging.moved_law import MovedLaw
+from discover.comparison.outcomes.flows import MEASURED, Flow, predict
+from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+from discover.protocols.kinematics import STATES
+from discover.statistics import LackOfFit, root_of
+from discover.statistics.misread import (
+    POSSIBLE,
+    Misread,
+    Reading,
+    advice,
+    clear_misreading,
+    misread,
+    not_ruled_out,
+    reads,
+)
+from discover.statistics.outliers import stray
+from discover.statistics.residual import STRUCTURE, Expectation
+
+
+def hold_against_misreading(
+    explanation: Explanation,
+    outcomes: Mapping[str, LearnerOutcome],
+    flows: Iterable[Flow],
+    bands: Mapping[str, PredictionBand],
+    law: MovedLaw | None = None,
+) -> Explanation:
+    """Return what explains the runs as well as if none of them had been read otherwise.
+
+    Where the sparse law does not, nothing else does, as in `hold_against_late_answers`.
+
+    Parameters
+    ----------
+    explanation
+        What explains the runs, those held out among them.
+    outcomes
+        By learner, with predictions of the records.
+    flows
+        Of which those that were measured say something.
+    bands
+        Of the sparse law, by the key of the flow.
+    law
+        The sparse law, of whose modes it is asked whether their moduli are right; None for none.
+    """
+    expectation = explanation.expectation
+    flows = [flow for flow in flows if is_record(flow)]
+    found = dict(explanation.lack_of_fit)
+    refuted: Misread | None = None
+    for name in sorted(explanation.by, key=lambda one: one != SPARSE):
+        left = found[name]
+        if expectation.noise is not None and left.misfit <= left.expected:
+            continue  # of a noise that is given only who gives it knows what is in it
+        own = law if name == SPARSE else None
+        one = refuted or _described_better(explanation, name, outcomes[name], flows, bands, own)
+        if one is not None:
+            found[name] = described_as_misread(left, one)
+        if name == SPARSE:
+            refuted = one
+    return replace(explanation, lack_of_fit=found)
+
+
+def described_as_misread(left: LackOfFit, found: Misread) -> LackOfFit:
+    """Return what a law leaves that describes the records clearly better as read otherwise."""
+    said = f"the records follow the law clearly better {reads(found)}"
+    return replace(left.refuted(said), likeness=advice(found))
+
+
+def _described_better(
+    explanation: Explanation,
+    name: str,
+    outcome: LearnerOutcome,
+    flows: Sequence[Flow],
+    bands: Mapping[str, PredictionBand],
+    law: MovedLaw | None,
+) -> Misread | None:
+    """Return how else the records were read if a law describes them clearly better so."""
+    fitted = [flow for flow in flows if flow.kind == "training"]
+    sets = [fitted, list(flows)] if len(fitted) < len(flows) else [fitted]
+
+    def told(some: Sequence[Flow]) -> list[Reading]:
+        # directions of a band hold errors of the moduli too, which here are no free constants
+        runs = [] if law is None or law.inner else _of_flows(law, some)
+        if runs:
+            return runs
+        runs = runs_as_predicted(explanation, name, outcome, some, bands)
+        return [_reading(run, law) for run in runs]
+
+    least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
+    return clear_misreading([*map(told, sets)], explanation.expectation, least)
+
+
+def holding_misreading(
+    outcomes: Mapping[str, LearnerOutcome],
+    bands: Mapping[str, PredictionBand],
+    chosen: LearnerOutcome,
+    law: MovedLaw,
+    flows: Sequence[Flow],
+    expectation: Expectation,
+) -> tuple[dict[str, LearnerOutcome], dict[str, PredictionBand], tuple[str, ...]]:
+    """Return outcomes and bands that hold another reading of the runs too, and what is to be known.
+
+    Of the fitted runs, to first order; where they leave no such reading possible, as it is.
+
+    Parameters
+    ----------
+    outcomes
+        By learner, of which the sparse law's intervals may get wider.
+    bands
+        Of its law, by the key of the flow.
+    chosen
+        What the sparse learner found, which explains the runs.
+    law
+        The same law, with the constants that were fitted along.
+    flows
+        In which it is simulated.
+    expectation
+        What a complete law may leave.
+    """
+    as_it_is = dict(outcomes), dict(bands), ()
+    if expectation.noise is not None:
+        return as_it_is
+    found = misread(_of_flows(law, [flow for flow in flows if flow.kind == "training"]))
+    if found is None or found.probability > POSSIBLE or not len(found.steps):
+        return as_it_is
+    if found.size <= max(ARITHMETIC, STRUCTURE * chosen.resolution):
+        return as_it_is
+    if expectation.excuses(found.size) or not np.all(np.isfinite(found.steps)):
+        return as_it_is
+    values = law.start + found.steps
+    fluid = law.fluid(values)
+    predictions = {flow.key: predict(fluid, flow) for flow in flows if flow.key in bands}
+    wider = intervals_of_either(outcomes, values[len(law.names) :])
+    return wider, bands_of_either(bands, predictions), (not_ruled_out(found),)
+
+
+def _of_flows(law: MovedLaw, flows: Sequence[Flow]) -> list[Reading]:
+    """Return runs as a law predicts them; none where it does not follow them all."""
+    told = [_of_law(law, flow) for flow in flows]
+    runs = [run for run in told if run is not None]
+    return runs if len(runs) == len(told) else []
+
+
+def _of_law(law: MovedLaw, flow: Flow) -> Reading | None:
+    """Return a run as a law predicts it, one column for each constant; None if not."""
+    told = law.derivatives(flow)
+    measured = flow.measured if flow.kind == "training" else flow.reference.get("sigma12")
+    if told is None or measured is None:
+        return None
+    predicted, slopes = told
+    record = np.asarray(measured, dtype=float)
+    residual, even = predicted[:, 0] - record, flow.even(record)
+    kept = ~stray(even * residual, even * record)
+    times = np.asarray(flow.times, dtype=float)
+    rows = (times[kept], predicted[kept, 0], residual[kept], slopes[:, kept, 0], even[kept])
+    return _reading(AsPredicted(flow, *rows, np.flatnonzero(kept)), law)
+
+
+def is_record(flow: Flow) -> bool:
+    """Return whether a flow is a run that was measured."""
+    return flow.kind in MEASURED and not (flow.kind == "held_out" and flow.is_truth)
+
+
+def _reading(run: AsPredicted, law: MovedLaw | None) -> Reading:
+    """Return a run for the question how it was read."""
+    protocol, even = run.flow.protocol, run.even
+    at_rate = protocol.control == "rate"
+    modes, shared = None, None
+    if law is not None and len(law.declared.modulus) > 1:
+        modes = law.of_moduli(run.flow)
+        modes = None if modes is None else modes[:, run.kept]
+        errors = law.declared.modulus_covariance
+        if modes is not None and errors is not None:
+            root = root_of(errors) / np.asarray(law.declared.modulus, dtype=float)[:, None]
+            shared = root.T @ modes
+    return Reading(
+        np.asarray(run.times, dtype=float),
+        run.predicted,
+        run.residual,
+        run.columns,
+        even,
+        has_zero=at_rate and protocol.control not in STATES,
+        has_level=protocol.control in ("rate", "steady"),
+        modes=modes,
+        shared=shared,
+    )

@@ -1,0 +1,89 @@
+"""Runs as a fit has them, for the question how they were read (`discover.statistics.misread`)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+from discover.forward import AugmentedModel, Batch, even
+from discover.forward.least_squares import Fit, jacobians
+from discover.forward.modulus_errors import modulus_shifts
+from discover.protocols.kinematics import STATES
+from discover.statistics.misread import Reading
+from discover.statistics.outliers import stray
+
+_STEP = 1e-2  # relative, of a modulus
+
+
+def fitted_readings(
+    model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit
+) -> list[Reading]:
+    """Return the fitted runs for the question how they were read."""
+    changes = _of_moduli(model, batch, fit.theta)
+    return _readings(batch, runs, fit.residual, fit.jacobian, *changes)
+
+
+def unseen_readings(
+    model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit, theta: np.ndarray
+) -> list[Reading]:
+    """Return runs that no fit saw for the same question, as these parameters predict them."""
+    residual = model.residuals([theta], batch)
+    columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
+    return _readings(batch, runs, residual[0], columns, *_of_moduli(model, batch, theta))
+
+
+def _readings(
+    batch: Batch,
+    runs: Sequence[Run],
+    residual: Float[np.ndarray, "runs n"],
+    jacobian: Float[np.ndarray, "free runs n"],
+    moduli: Float[np.ndarray, "k runs n"],
+    errors: Float[np.ndarray, "k runs n"],
+) -> list[Reading]:
+    weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
+    found = []
+    for i, run in enumerate(runs):
+        seen = weight[i] > 0
+        own, record = weight[i, seen], recorded[i, seen]
+        if not len(record):
+            continue
+        off = residual[i, seen] / own
+        kept = ~stray(off / even(own), record / even(own))
+        control = run.protocol.control
+        found.append(
+            Reading(
+                _times(run, int(np.count_nonzero(seen)))[kept],
+                (record + off)[kept],
+                off[kept],
+                (jacobian[:, i, seen] / own)[:, kept],
+                1.0 / even(own)[kept],
+                has_zero=control == "rate" and control not in STATES,
+                has_level=control in ("rate", "steady"),
+                modes=(moduli[:, i, seen] / own)[:, kept],
+                shared=(errors[:, i, seen] / own)[:, kept],
+            )
+        )
+    return found
+
+
+def _of_moduli(
+    model: AugmentedModel, batch: Batch, theta: np.ndarray
+) -> tuple[Float[np.ndarray, "k runs n"], Float[np.ndarray, "k runs n"]]:
+    """Return what relative changes of each modulus change, and errors that a sweep leaves."""
+    modulus = np.asarray(model.declared.modulus, dtype=float)
+    found = np.zeros((0, *np.shape(batch.weight)))
+    if len(modulus) > 1:
+        moved = [
+            [
+                model.at_moduli(modulus * (1 + sign * _STEP * one)).residuals([theta], batch)[0]
+                for sign in (1, -1)
+            ]
+            for one in np.eye(len(modulus))
+        ]
+        found = np.nan_to_num(np.array([(up - down) / (2 * _STEP) for up, down in moved]))
+    return found, modulus_shifts(model, theta, batch)
+
+
+def _times(run: Run, count: int) -> Float[np.ndarray, " n"]:
+    return np.asarray(run.time, dtype=float)[:count]
