@@ -154,7 +154,7 @@ def fit_batch(
             known = prior.rows(theta[i], free[i])
             moved = theta[i, at] + gauss_newton_step(jacobian[i], residual[i], damping[i], known)
             trial[row, at] = np.clip(moved, model.low[at], model.high[at])
-        trial_residual = model.residuals(trial, batch)
+        trial_residual = model.residuals(trial, batch, cost[going])
         trial_cost = priced(_costs(trial_residual), trial, going)
         for row, i in enumerate(going):
             if trial_cost[row] < cost[i]:

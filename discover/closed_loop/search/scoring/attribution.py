@@ -193,7 +193,8 @@ def _try_amplitudes(model, batch, fit, candidates, bases, at, yields):
     if not trials:
         return
     with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
-        costs = np.sum(model.residuals(trials, batch) ** 2, axis=(1, 2))
+        useful = np.full(len(trials), fit.cost)
+        costs = np.sum(model.residuals(trials, batch, useful) ** 2, axis=(1, 2))
     for theta, i, cost in zip(trials, owner, costs, strict=True):
         reduction = 1.0 - cost / fit.cost if np.isfinite(cost) else 0.0
         if reduction > candidates[i].reduction:

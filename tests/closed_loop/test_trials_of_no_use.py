@@ -1,0 +1,102 @@
+"""Trials that quick tests already refute are not followed through slow ones: no answer changes."""
+
+import numpy as np
+import pytest
+from independent.homogeneous import GiesekusFluid
+from independent.sweeps import giesekus_modulus
+
+from discover.closed_loop.search.scoring.attribution import attribute
+from discover.dataset.run import Run
+from discover.effects import named_effects
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.batches import OscillationBatch
+from discover.forward.least_squares import fit_batch
+from discover.protocols import oscillations
+from discover.protocols.control import steady_rates
+
+MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3
+RATES = np.array([0.3, 1.0, 3.0])
+STRAINS = np.array([0.5, 4.0])
+NAMES = ("giesekus_mobility", "stress_gain", "wall_slip")
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """A flow curve and a sweep by scipy, the sweep first, and Maxwell with three candidates."""
+    fluid = GiesekusFluid((MODULUS,), (TIME,), MOBILITY)
+    steady = [fluid.recorded("shear", lambda _, r=r: r, np.array([40.0]))[0] for r in RATES]
+    curve = Run("curve", np.arange(1.0, 4.0), steady_rates(RATES), RATES, np.array(steady))
+    complex_ = [giesekus_modulus(MOBILITY, MODULUS, TIME, strain, 1.0) for strain in STRAINS]
+    protocol = oscillations(STRAINS, np.ones(2))
+    sweep = Run(
+        "sweep", np.arange(1.0, 3.0), protocol, STRAINS, np.ones(2), strain=STRAINS,
+        storage_modulus=np.real(complex_), loss_modulus=np.imag(complex_),
+    )  # fmt: skip
+    model = AugmentedModel(
+        DeclaredModel.maxwell(MODULUS, TIME), [named_effects()[name] for name in NAMES]
+    )
+    return model, make_batch([*sweep.records, curve])
+
+
+def trials(model):
+    """Return vectors with a mobility that is right, and with stresses far too small and large."""
+    found = [model.zero() for _ in range(3)]
+    found[0][model.positions("giesekus_mobility")[0]] = MOBILITY
+    found[1][model.positions("stress_gain")[0]] = -0.5
+    found[2][model.positions("stress_gain")[0]] = 1.0
+    return found
+
+
+def followed(monkeypatch, model):
+    """Return a list to which the number of vectors is added whenever a sweep is followed."""
+    counts, of_part = [], model._of_part
+
+    def counting(thetas, part):
+        if isinstance(part, OscillationBatch):
+            counts.append(len(thetas))
+        return of_part(thetas, part)
+
+    monkeypatch.setattr(model, "_of_part", counting)
+    return counts
+
+
+def test_residuals_below_the_limit_are_those_without_one(problem, monkeypatch):
+    model, batch = problem
+    whole = model.residuals(trials(model), batch)
+    costs = np.sum(whole**2, axis=(1, 2))
+    counts = followed(monkeypatch, model)
+    some = model.residuals(trials(model), batch, np.full(3, 1.1 * costs[0] + 1e-6))
+    np.testing.assert_array_equal(some[0], whole[0])
+    assert np.all(np.isinf(some[1:]))
+    assert counts == [1]  # the flow curve alone refutes the others
+    # negative control: with no limit in reach all are followed
+    np.testing.assert_array_equal(model.residuals(trials(model), batch, 2.0 * costs + 1.0), whole)
+    assert counts == [1, 3]
+
+
+def test_ranks_and_fits_are_those_of_trials_followed_to_the_end(problem, monkeypatch):
+    model, batch = problem
+    nearly = model.zero()
+    nearly[model.positions("giesekus_mobility")[0]] = 0.9 * MOBILITY
+    start = fit_batch(model, batch, [nearly], [[]])[0]
+    counts = followed(monkeypatch, model)
+
+    def answers():
+        counts.clear()
+        ranks = attribute(model, batch, start, ("giesekus_mobility",), 3)
+        free = [model.positions(one.effect) for one in ranks.leading]
+        fits = fit_batch(model, batch, [one.start for one in ranks.leading], free)
+        scores = [(one.effect, one.reduction) for one in (*ranks.leading, *ranks.rest)]
+        return scores, [fit.cost for fit in fits], sum(counts)
+
+    pruned = answers()
+    residuals = model.residuals
+    monkeypatch.setattr(
+        model, "residuals", lambda thetas, batch, limits=None: residuals(thetas, batch)
+    )
+    plain = answers()
+    assert [name for name, _ in pruned[0]] == [name for name, _ in plain[0]]
+    # the same sums, added up part by part
+    np.testing.assert_allclose([r for _, r in pruned[0]], [r for _, r in plain[0]], rtol=1e-9)
+    np.testing.assert_allclose(pruned[1], plain[1], rtol=1e-6)
+    assert pruned[2] < plain[2]
