@@ -57,6 +57,8 @@ SESSIONS = {
                     model={**KNOWN, "modulus_Pa": 60.0, "relaxation_time_s": 3.0}, **_OTHER_MODES),
     "two_own_fitted": Case("Giesekus, two modes of 0.1 and 0.5, one fitted", recorded(_TWO),
                            model=FITTED, **_OTHER_MODES),
+    "spectrum_right": Case("Giesekus in three modes, rightly told",
+                           recorded(_THREE, OF_THREE_MODES), **_sweep(1.0, 1.0, 1.0), **_RIGHT),
     "spectrum_slow": Case("Giesekus in three modes, the slowest told 10 % high",
                           recorded(_THREE, OF_THREE_MODES), **_sweep(1.1, 1.0, 1.0), **_FLAWED),
     "spectrum_middle": Case("Giesekus in three modes, the middle one told 10 % high",

@@ -140,7 +140,7 @@ def holding_misreading(
         return as_it_is
     if found.size <= max(ARITHMETIC, STRUCTURE * chosen.resolution):
         return as_it_is
-    if expectation.excuses(found.size) or not np.all(np.isfinite(found.steps)):
+    if found.excused(expectation) or not np.all(np.isfinite(found.steps)):
         return as_it_is
     values = law.start + found.steps
     fluid = law.fluid(values)
