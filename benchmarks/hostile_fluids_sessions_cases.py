@@ -83,7 +83,7 @@ SESSIONS = {
                                  "held.csv": 1.03}), **_FLAWED),
     "rolie_noisy": Case("stretching Rolie–Poly, 6 % noise",
                         recorded(RoliePoly(1.0, 0.1, **SCALE)), white(0.06), outside=True,
-                        same_as=("convective_constraint_release", "tr(sigma)*I")),
+                        same_as=("convective_constraint_release", "ptt_linear", "tr(sigma)*I")),
     "rate_of_one": Case("Giesekus, one rate 2 % higher than told",
                         on_instruments({"fast.csv": {"rate_gain": 0.02}}), **_FLAWED),
     "rate_of_slow": Case("Giesekus, the slow rate 2 % higher than told",
