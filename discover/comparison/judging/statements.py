@@ -218,7 +218,7 @@ def make_statements(
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
     untested = no_flow_left(flows, n_terms)
-    as_many = 0 < n_terms and _flows_measured(flows) <= n_terms
+    as_many = n_terms > 0 and _flows_measured(flows) <= n_terms
     if (untested or as_many) and not states:
         text = _UNTESTED if untested else _AS_MANY_TERMS.replace("{}", str(n_terms), 1)
         found = [Statement("sigma12", "no", text.format("σ12 in them"), in_others=True)]
