@@ -102,6 +102,8 @@ class MovedLaw:
         ]
         if len(columns) < len(rows) or not np.all(np.isfinite(columns)):
             return None
+        if not steps:
+            return columns[0], np.zeros((0, *columns[0].shape))
         up, down = np.array(columns[1::2]), np.array(columns[2::2])
         return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
 
