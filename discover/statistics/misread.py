@@ -7,7 +7,7 @@ known, but for one number a run, what it does to a record; and a law is one for 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal, get_args
 
@@ -117,6 +117,8 @@ class Misread:
         What it adds to each run, in its unit.
     size
         Root-mean-square of that over the prediction's, mean over runs.
+    beside_sweep
+        Whether the probability allows for what a sweep leaves open of the moduli.
     """
 
     kind: Misreading
@@ -127,6 +129,13 @@ class Misread:
     steps: Float[np.ndarray, " constants"]
     changes: Sequence[np.ndarray]
     size: float
+    beside_sweep: bool = False
+
+    def excused(self, expectation: Expectation) -> bool:
+        """Return whether linear data, or loadings, err by as much."""
+        if self.beside_sweep:  # what the sweep may err by is in the probability
+            expectation = replace(expectation, linear_error=0.0)
+        return expectation.excuses(self.size)
 
 
 def misread(runs: Sequence[Reading]) -> Misread | None:
@@ -167,7 +176,7 @@ def clear_misreading(
     sets = [runs for runs in sets if runs]
     found = [one for runs in sets if (one := misread(runs)) is not None]
     clear = [one for one in found if len(sets) * one.probability <= CLEAR and one.size > least]
-    seen = [one for one in clear if not expectation.excuses(one.size)]
+    seen = [one for one in clear if not one.excused(expectation)]
     return min(seen, key=lambda one: one.probability, default=None)
 
 
@@ -311,6 +320,7 @@ class _Problem:
             steps[: len(self._columns)],
             changes,
             float(np.mean(relative)),
+            self._shared is not None and len(self._shared) > 0,
         )
 
 

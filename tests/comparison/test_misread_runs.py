@@ -122,6 +122,27 @@ def model():
     )
 
 
+@pytest.mark.parametrize("step", [0.0, 0.02])
+def test_a_law_without_terms_is_asked_too(model, step):
+    # a Maxwell fluid as it was told, and one whose runs were filled differently
+    lot, flows, predictions = np.random.default_rng(0), [], {}
+    for name, (flow, own, times) in list(RUNS.items())[:2]:
+        exact = 100.0 * flow.rate(0.0) * -np.expm1(-times)
+        factor = 1.0 + (step if name == "fast" else -step)
+        record = factor * exact + 0.01 * np.std(exact) * lot.standard_normal(len(times))
+        rates = np.full(len(times), float(flow.rate(0.0)))
+        flows.append(Flow(name, "training", own, times, rates, {"sigma12": record}, record))
+        predictions[flows[-1].key] = {"sigma12": exact}
+    outcome = LearnerOutcome("tensor_sindy", (), 1.0, EMPTY, predictions=predictions)
+    left = what_is_left(
+        [predictions[f.key]["sigma12"] - f.measured for f in flows], [f.measured for f in flows]
+    )
+    said = Explanation({"tensor_sindy": replace(left, verdict="explained")})
+    law = MovedLaw.of((), model)
+    found = hold_against_misreading(said, {"tensor_sindy": outcome}, flows, {}, law)
+    assert found.verdict == ("unexplained" if step else "explained")
+
+
 def held(drawn, model, change, seed):
     """Return the interval of σ·σ before and after, and what is said of it."""
     flows, step = told(drawn, change, seed)

@@ -90,19 +90,16 @@ def _described_better(
     law: MovedLaw | None,
 ) -> Misread | None:
     """Return how else the records were read if a law describes them clearly better so."""
-    fitted = [flow for flow in flows if flow.kind == "training"]
-    sets = [fitted, list(flows)] if len(fitted) < len(flows) else [fitted]
-
-    def told(some: Sequence[Flow]) -> list[Reading]:
-        # directions of a band hold errors of the moduli too, which here are no free constants
-        runs = [] if law is None or law.inner else _of_flows(law, some)
-        if runs:
-            return runs
-        runs = runs_as_predicted(explanation, name, outcome, some, bands)
-        return [_reading(run, law) for run in runs]
-
+    flows = sorted(flows, key=lambda flow: flow.kind != "training")
+    # directions of a band hold errors of the moduli too, which here are no free constants
+    runs = [] if law is None or law.inner else _of_flows(law, flows)
+    if not runs:
+        told = runs_as_predicted(explanation, name, outcome, flows, bands)
+        runs = [_reading(run, law) for run in told]
+    fitted = sum(flow.kind == "training" for flow in flows)
+    sets = [runs[:fitted], runs] if fitted < len(runs) else [runs]
     least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
-    return clear_misreading([*map(told, sets)], explanation.expectation, least)
+    return clear_misreading(sets, explanation.expectation, least)
 
 
 def holding_misreading(
@@ -140,7 +137,7 @@ def holding_misreading(
         return as_it_is
     if found.size <= max(ARITHMETIC, STRUCTURE * chosen.resolution):
         return as_it_is
-    if expectation.excuses(found.size) or not np.all(np.isfinite(found.steps)):
+    if found.excused(expectation) or not np.all(np.isfinite(found.steps)):
         return as_it_is
     values = law.start + found.steps
     fluid = law.fluid(values)

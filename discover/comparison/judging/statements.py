@@ -218,8 +218,10 @@ def make_statements(
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
     untested = no_flow_left(flows, n_terms)
-    if untested and not states:
-        found = [Statement("sigma12", "no", _UNTESTED.format("σ12 in them"), in_others=True)]
+    as_many = n_terms > 0 and _flows_measured(flows) <= n_terms
+    if (untested or as_many) and not states:
+        text = _UNTESTED if untested else _AS_MANY_TERMS.replace("{}", str(n_terms), 1)
+        found = [Statement("sigma12", "no", text.format("σ12 in them"), in_others=True)]
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
@@ -229,7 +231,7 @@ def make_statements(
             text = ONLY_STATES
         elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
-        elif not quantity.open and _flows_measured(flows) <= n_terms:
+        elif not quantity.open and as_many:
             text = _AS_MANY_TERMS.format(n_terms, quantity.quantity)
         elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
