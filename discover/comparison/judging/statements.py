@@ -220,8 +220,9 @@ def make_statements(
     untested = no_flow_left(flows, n_terms)
     as_many = n_terms > 0 and _flows_measured(flows) <= n_terms
     if (untested or as_many) and not states:
-        text = _UNTESTED if untested else _AS_MANY_TERMS.replace("{}", str(n_terms), 1)
-        found = [Statement("sigma12", "no", text.format("σ12 in them"), in_others=True)]
+        what = "σ12 in them"
+        text = _UNTESTED.format(what) if untested else _AS_MANY_TERMS.format(n_terms, what)
+        found = [Statement("sigma12", "no", text, in_others=True)]
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue
