@@ -13,7 +13,7 @@ from discover.comparison.instrument import Frame, classical_along
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
 from discover.comparison.judging.beside_other_constants import with_other_coefficients
-from discover.comparison.judging.constants_in_bands import constants_of, with_fitted_constants
+from discover.comparison.judging.constants_in_bands import law_with_fitted, with_fitted_constants
 from discover.comparison.judging.declared_constants import (
     OtherConstant,
     other_constants,
@@ -28,17 +28,15 @@ from discover.comparison.judging.dense_library import (
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
-from discover.comparison.judging.filters_for_terms import holding_filters
 from discover.comparison.judging.identifiability import Rival, find_rivals, structure_of
 from discover.comparison.judging.late_answers import hold_against_late_answers
-from discover.comparison.judging.misread_runs import hold_against_misreading, holding_misreading
+from discover.comparison.judging.misread_runs import hold_against_misreading
 from discover.comparison.judging.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
     with_intervals_of_modes,
 )
 from discover.comparison.judging.modes_error import left_open_by_modes
-from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import (
     NextMeasurement,
@@ -46,6 +44,7 @@ from discover.comparison.judging.next_measurement import (
     next_measurement,
 )
 from discover.comparison.judging.one_term_in_bands import holding_one_term_more
+from discover.comparison.judging.other_records import holding_other_records
 from discover.comparison.judging.second_normal_stress import with_any_second_normal_stress
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
@@ -154,14 +153,10 @@ def judge(
         wider = holding_one_term_more(tested.bands, beside.structure, left, frame.flows)
         tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
-    of_filters: tuple[str, ...] = ()
-    of_readings: tuple[str, ...] = ()
+    of_records: tuple[str, ...] = ()
     if chosen is not None and explanation.in_library and not (normal or frame.made):
-        seen = outcomes, tested.bands, chosen, frame.model, frame.flows
-        outcomes, bands, of_filters = holding_filters(*seen)
-        law = MovedLaw.of(chosen.terms, frame.model, constants_of(known.fitted, frame.model))
-        seen = outcomes, bands, chosen, law, frame.flows, expectation
-        outcomes, bands, of_readings = holding_misreading(*seen)
+        seen = outcomes, tested.bands, chosen, frame.model, known.fitted, frame.flows
+        outcomes, bands, of_records = holding_other_records(*seen, expectation)
         tested = replace(tested, bands=bands)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
@@ -179,8 +174,7 @@ def judge(
     warnings = [
         *_of_modes(outcomes, explanation, expectation),
         *((of_modes.said,) if of_modes.said else ()),
-        *of_filters,
-        *of_readings,
+        *of_records,
         *((ONLY_STATES,) if explanation.by and only_states(flows) else ()),
         *refuted,
         *disagreements(outcomes, _judged(flows), bands),
@@ -270,8 +264,7 @@ def _tested(
     explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
     if not frame.made:  # what a known instrument does is in the predictions already
         explanation = hold_against_late_answers(explanation, outcomes, flows, seen)
-        fitted = constants_of(known.fitted, frame.model)
-        law = None if chosen is None else MovedLaw.of(chosen.terms, frame.model, fitted)
+        law = chosen and law_with_fitted(chosen, frame.model, known.fitted)
         explanation = hold_against_misreading(explanation, outcomes, flows, seen, law)
     if chosen is None or not explanation.in_library:
         return _Tested(explanation)

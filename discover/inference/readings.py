@@ -43,6 +43,8 @@ def _readings(
 ) -> list[Reading]:
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     found = []
+    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+        return found  # the law runs away in one of them
     for i, run in enumerate(runs):
         seen = weight[i] > 0
         own, record = weight[i, seen], recorded[i, seen]

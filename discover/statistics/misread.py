@@ -48,6 +48,8 @@ _ADVICE: dict[Misreading, str] = {
     "modes": "measure the linear moduli again, on the same sample",
 }
 
+_ROUNDING = 1e-12
+
 _SEEN = 1e-2
 """Of what a fault does, that constants of the law leave of it at least where they do not do it."""
 
@@ -152,7 +154,8 @@ def misread(runs: Sequence[Reading]) -> Misread | None:
         Fitted, or not; of one of fewer than eight samples nothing is asked.
     """
     runs = [run for run in runs if len(run.times) >= _FEWEST and np.any(run.predicted)]
-    if not runs:
+    rows = [row for run in runs for row in (run.predicted, run.residual, run.columns)]
+    if not runs or not all(np.all(np.isfinite(row)) for row in rows):
         return None
     problem = _Problem(runs)
     found = [one for kind in get_args(Misreading) if (one := problem.best(kind)) is not None]
@@ -294,9 +297,11 @@ class _Problem:
             free, after, self._rows, None if self._shared is None else self._shared.T
         )
         count = len(values)
-        covariance = covariance + np.finfo(float).tiny * np.eye(count)  # of data without noise
         freedom = max(noise.effective_samples - count - len(beside), 1.0)
-        wald = float(values @ np.linalg.solve(covariance, values)) / count
+        variance, axes = np.linalg.eigh(covariance)
+        # of data without noise there is none
+        variance = np.maximum(variance, max(_ROUNDING * float(variance[-1]), 1e-300))
+        wald = float(np.sum((axes.T @ values) ** 2 / variance)) / count
         chance = float(fisher.sf(wald, count, freedom))
         worth = 0.5 * noise.effective_samples
         gain = worth * np.log(float(before @ before) / max(float(after @ after), 1e-300))

@@ -63,6 +63,13 @@ def with_fitted_constants(
     return found
 
 
+def law_with_fitted(
+    chosen: LearnerOutcome, declared: DeclaredModel, names: Sequence[str]
+) -> MovedLaw:
+    """Return the law that a learner found, with those of the constants that were fitted along."""
+    return MovedLaw.of(chosen.terms, declared, constants_of(names, declared))
+
+
 def constants_of(names: Sequence[str], declared: DeclaredModel) -> tuple[str, ...]:
     """Return those of the constants that were fitted that are of the modes or of the law."""
     return tuple(n for n in names if n in MODE_CONSTANTS or n in declared.parameters)
