@@ -28,7 +28,7 @@ fault of 1e-3, in noise correlated to 0.95 from sample to sample one in a hundre
 
 POSSIBLE = 0.1
 """Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
-right laws in white noise one in thirty, in noise correlated to 0.9 one in four."""
+right laws in white noise one in twenty-five, in noise correlated to 0.9 one in five."""
 
 _LEVELS = 24
 _LOWEST, _HIGHEST = 0.05, 0.95
