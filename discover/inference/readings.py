@@ -9,7 +9,6 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts
-from discover.protocols.kinematics import STATES
 from discover.statistics.misread import Reading
 from discover.statistics.outliers import stray
 
@@ -52,7 +51,6 @@ def _readings(
             continue
         off = residual[i, seen] / own
         kept = ~stray(off / even(own), record / even(own))
-        control = run.protocol.control
         found.append(
             Reading(
                 _times(run, int(np.count_nonzero(seen)))[kept],
@@ -60,8 +58,7 @@ def _readings(
                 off[kept],
                 (jacobian[:, i, seen] / own)[:, kept],
                 1.0 / even(own)[kept],
-                has_zero=control == "rate" and control not in STATES,
-                has_level=control in ("rate", "steady"),
+                control=run.protocol.control,
                 modes=(moduli[:, i, seen] / own)[:, kept],
                 shared=(errors[:, i, seen] / own)[:, kept],
             )

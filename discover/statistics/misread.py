@@ -68,10 +68,8 @@ class Reading:
         Changes of the prediction along constants that were fitted, shape (constants, n).
     even
         By what they are multiplied so that noise has one size, shape (n,); by nothing by default.
-    has_zero
-        Whether it has a zero that may be set wrong, and a course in time.
-    has_level
-        Whether it is a stress that a transducer read sample by sample.
+    control
+        What was controlled, as a protocol says it.
     modes
         Change of the prediction per relative change of each modulus; None where they are not asked.
     shared
@@ -84,10 +82,19 @@ class Reading:
     residual: Float[np.ndarray, " n"]
     columns: Float[np.ndarray, "constants n"]
     even: Float[np.ndarray, " n"] | None = None
-    has_zero: bool = True
-    has_level: bool = True
+    control: str = "rate"
     modes: Float[np.ndarray, "modes n"] | None = None
     shared: Float[np.ndarray, "errors n"] | None = None
+
+    @property
+    def has_zero(self) -> bool:
+        """Whether it has a zero that may be set wrong, and a course in time."""
+        return self.control == "rate"
+
+    @property
+    def has_level(self) -> bool:
+        """Whether it is a stress that a transducer read sample by sample."""
+        return self.control in ("rate", "steady")
 
     @property
     def weight(self) -> Float[np.ndarray, " n"]:

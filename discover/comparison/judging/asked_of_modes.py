@@ -14,7 +14,7 @@ from discover.comparison.fitting.law_by_mode import (
 )
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.misread_runs import described_as_misread
+from discover.comparison.judging.misread_runs import as_misread
 from discover.comparison.judging.modes_apart import said_of_each_mode
 from discover.comparison.judging.unseen_runs import hold_against_unseen, misses
 from discover.comparison.outcomes.flows import Flow, columns_of
@@ -160,5 +160,5 @@ def _held_against_unseen(
     left = both.lack_of_fit[_LAW]
     refuted = law.explains and left.verdict != "explained"
     if left.verdict == "explained" and law.misread is not None:
-        left = described_as_misread(left, law.misread)
+        left = as_misread(law.misread).of(left)
     return replace(law, left=left, refuted=refuted)

@@ -168,8 +168,7 @@ def what_it_leaves(
     # moduli that are constant are those of a linear fluid, and of no dead sensor
     imposed = rates if all(flow.protocol.control in FOLLOWED for flow in training) else None
     found = lack_of_fit(residuals, records, expectation, imposed, even, intervals)
-    limit = max(ARITHMETIC, STRUCTURE * outcome.resolution)
-    if found.verdict == "unexplained" and found.misfit <= limit:
+    if found.verdict == "unexplained" and found.misfit <= least_seen(outcome):
         reason = f"what is left ({100 * found.misfit:.1g} %) is arithmetic"
         return replace(found, verdict="explained", reason=reason, rest="is arithmetic")
     coarse = coarse_rates_of(outcome)
@@ -179,6 +178,11 @@ def what_it_leaves(
     if found.verdict == "explained" and not _rests(outcome) and any(map(_from_rest, training)):
         return found.refuted(_RESTLESS)
     return found
+
+
+def least_seen(outcome: LearnerOutcome) -> float:
+    """Return the relative size up to which a misfit is arithmetic."""
+    return max(ARITHMETIC, STRUCTURE * outcome.resolution)
 
 
 def _rests(outcome: LearnerOutcome) -> bool:

@@ -6,18 +6,17 @@ instrument that answers late, or averages (`discover.statistics.late_answers`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.judging.as_predicted import SPARSE, runs_as_predicted
-from discover.comparison.judging.explanation import ARITHMETIC, Explanation
-from discover.comparison.outcomes.flows import MEASURED, Flow
+from discover.comparison.judging.as_predicted import runs_as_predicted
+from discover.comparison.judging.explanation import Explanation, least_seen
+from discover.comparison.judging.refutation import Refutation, hold_against
+from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.late_answers import AGREED, Late, Response, late_answer
-from discover.statistics.residual import STRUCTURE
 
 _DOES: Mapping[Late, str] = {
     "delay": "told each stress {time} late",
@@ -39,9 +38,6 @@ def hold_against_late_answers(
 ) -> Explanation:
     """Return what explains the runs as well without a filter of the instrument as with one.
 
-    Where the sparse law does not, nothing else does: what it needs the filter for is in the
-    records, which another law has taken for the fluid's.
-
     Parameters
     ----------
     explanation
@@ -53,20 +49,11 @@ def hold_against_late_answers(
     bands
         Of the sparse law, by the key of the flow.
     """
-    expectation = explanation.expectation
     flows = [flow for flow in flows if tells(flow)]
-    found = dict(explanation.lack_of_fit)
-    refuted = ""
-    for name in sorted(explanation.by, key=lambda one: one != SPARSE):
-        left = found[name]
-        if expectation.noise is not None and left.misfit <= left.expected:
-            continue  # of a noise that is given only who gives it knows what is in it
-        said = refuted or _described_better(explanation, name, outcomes[name], flows, bands)
-        if said:
-            found[name] = replace(left.refuted(said), likeness=ADVICE)
-        if name == SPARSE:
-            refuted = said
-    return replace(explanation, lack_of_fit=found)
+    return hold_against(
+        explanation,
+        lambda name: _described_better(explanation, name, outcomes[name], flows, bands),
+    )
 
 
 def _described_better(
@@ -75,25 +62,23 @@ def _described_better(
     outcome: LearnerOutcome,
     flows: Sequence[Flow],
     bands: Mapping[str, PredictionBand],
-) -> str:
-    """Return by which filter a law describes the records better, in words; empty if by none."""
+) -> Refutation | None:
+    """Return by which filter a law describes the records better; None if by none."""
     told = runs_as_predicted(explanation, name, outcome, flows, bands)
     runs = [Response(run.times, run.predicted, run.residual, run.columns) for run in told]
     late = late_answer(runs) if runs else None
     if late is None or late.probability > AGREED:
-        return ""
-    least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
-    if late.size <= least or explanation.expectation.excuses(late.size):
-        return ""
+        return None
+    if late.size <= least_seen(outcome) or explanation.expectation.excuses(late.size):
+        return None
     as_if = does(late.kind, late.time)
-    return f"the records follow the law clearly better as if the instrument {as_if}"
+    said = f"the records follow the law clearly better as if the instrument {as_if}"
+    return Refutation(said, ADVICE)
 
 
 def tells(flow: Flow) -> bool:
     """Return whether a run shows what an instrument does where the stress changes."""
-    if flow.kind not in MEASURED or (flow.kind == "held_out" and flow.is_truth):
-        return False
-    return bool(np.isfinite(sampling_interval(flow.times, flow.protocol)))
+    return flow.is_record and bool(np.isfinite(sampling_interval(flow.times, flow.protocol)))
 
 
 def does(kind: Late, time: float) -> str:

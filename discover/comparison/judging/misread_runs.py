@@ -7,19 +7,18 @@ follow the law better as if they had been read so (`discover.statistics.misread`
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from discover.comparison.judging.as_predicted import SPARSE, AsPredicted, runs_as_predicted
 from discover.comparison.judging.either_law import bands_of_either, intervals_of_either
-from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.judging.explanation import Explanation, least_seen
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.outcomes.flows import MEASURED, Flow, predict
+from discover.comparison.judging.refutation import Refutation, hold_against
+from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.protocols.kinematics import STATES
-from discover.statistics import LackOfFit, root_of
+from discover.statistics import root_of
 from discover.statistics.misread import (
     POSSIBLE,
     Misread,
@@ -31,7 +30,7 @@ from discover.statistics.misread import (
     reads,
 )
 from discover.statistics.outliers import stray
-from discover.statistics.residual import STRUCTURE, Expectation
+from discover.statistics.residual import Expectation
 
 
 def hold_against_misreading(
@@ -42,8 +41,6 @@ def hold_against_misreading(
     law: MovedLaw | None = None,
 ) -> Explanation:
     """Return what explains the runs as well as if none of them had been read otherwise.
-
-    Where the sparse law does not, nothing else does, as in `hold_against_late_answers`.
 
     Parameters
     ----------
@@ -58,27 +55,19 @@ def hold_against_misreading(
     law
         The sparse law, of whose modes it is asked whether their moduli are right; None for none.
     """
-    expectation = explanation.expectation
-    flows = [flow for flow in flows if is_record(flow)]
-    found = dict(explanation.lack_of_fit)
-    refuted: Misread | None = None
-    for name in sorted(explanation.by, key=lambda one: one != SPARSE):
-        left = found[name]
-        if expectation.noise is not None and left.misfit <= left.expected:
-            continue  # of a noise that is given only who gives it knows what is in it
+    flows = [flow for flow in flows if flow.is_record]
+
+    def refutation_of(name: str) -> Refutation | None:
         own = law if name == SPARSE else None
-        one = refuted or _described_better(explanation, name, outcomes[name], flows, bands, own)
-        if one is not None:
-            found[name] = described_as_misread(left, one)
-        if name == SPARSE:
-            refuted = one
-    return replace(explanation, lack_of_fit=found)
+        found = _described_better(explanation, name, outcomes[name], flows, bands, own)
+        return None if found is None else as_misread(found)
+
+    return hold_against(explanation, refutation_of)
 
 
-def described_as_misread(left: LackOfFit, found: Misread) -> LackOfFit:
-    """Return what a law leaves that describes the records clearly better as read otherwise."""
-    said = f"the records follow the law clearly better {reads(found)}"
-    return replace(left.refuted(said), likeness=advice(found))
+def as_misread(found: Misread) -> Refutation:
+    """Return what refutes a law that describes the records clearly better as read otherwise."""
+    return Refutation(f"the records follow the law clearly better {reads(found)}", advice(found))
 
 
 def _described_better(
@@ -98,8 +87,7 @@ def _described_better(
         runs = [_reading(run, law) for run in told]
     fitted = sum(flow.kind == "training" for flow in flows)
     sets = [runs[:fitted], runs] if fitted < len(runs) else [runs]
-    least = max(ARITHMETIC, STRUCTURE * outcome.resolution)
-    return clear_misreading(sets, explanation.expectation, least)
+    return clear_misreading(sets, explanation.expectation, least_seen(outcome))
 
 
 def holding_misreading(
@@ -135,7 +123,7 @@ def holding_misreading(
     found = misread(_of_flows(law, [flow for flow in flows if flow.kind == "training"]))
     if found is None or found.probability > POSSIBLE or not len(found.steps):
         return as_it_is
-    if found.size <= max(ARITHMETIC, STRUCTURE * chosen.resolution):
+    if found.size <= least_seen(chosen):
         return as_it_is
     if found.excused(expectation) or not np.all(np.isfinite(found.steps)):
         return as_it_is
@@ -168,15 +156,8 @@ def _of_law(law: MovedLaw, flow: Flow) -> Reading | None:
     return _reading(AsPredicted(flow, *rows, np.flatnonzero(kept)), law)
 
 
-def is_record(flow: Flow) -> bool:
-    """Return whether a flow is a run that was measured."""
-    return flow.kind in MEASURED and not (flow.kind == "held_out" and flow.is_truth)
-
-
 def _reading(run: AsPredicted, law: MovedLaw | None) -> Reading:
     """Return a run for the question how it was read."""
-    protocol, even = run.flow.protocol, run.even
-    at_rate = protocol.control == "rate"
     modes, shared = None, None
     if law is not None and len(law.declared.modulus) > 1:
         modes = law.of_moduli(run.flow)
@@ -190,9 +171,8 @@ def _reading(run: AsPredicted, law: MovedLaw | None) -> Reading:
         run.predicted,
         run.residual,
         run.columns,
-        even,
-        has_zero=at_rate and protocol.control not in STATES,
-        has_level=protocol.control in ("rate", "steady"),
+        run.even,
+        control=run.flow.protocol.control,
         modes=modes,
         shared=shared,
     )

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.judging.explanation import ARITHMETIC, Explanation
+from discover.comparison.judging.explanation import ARITHMETIC, Explanation, least_seen
 from discover.comparison.judging.statements import IN_NOISE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import LackOfFit, noise_model
 from discover.statistics.lack_of_fit import what_is_left
-from discover.statistics.residual import STRUCTURE, Expectation
+from discover.statistics.residual import Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.words import percent_of
 
@@ -150,7 +150,7 @@ def _refuted(
     )
     pairs = zip(residuals, records, strict=True)
     missed = float(np.mean([_size(row) / (_size(record) or 1.0) for row, record in pairs]))
-    if missed <= max(ARITHMETIC, STRUCTURE * outcome.resolution):
+    if missed <= least_seen(outcome):
         return ""
     fitted = [row for flow in training if (row := _residual(outcome, flow)) is not None]
     known = [_record(flow) for flow in training]

@@ -98,6 +98,11 @@ class Flow:
         return self.name if self.kind == "test" else f"{self.kind}/{self.name}"
 
     @property
+    def is_record(self) -> bool:
+        """Whether it is a run that was measured."""
+        return self.kind in MEASURED and not (self.kind == "held_out" and self.is_truth)
+
+    @property
     def records_shear_stress(self) -> bool:
         """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
 
