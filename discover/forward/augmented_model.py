@@ -22,6 +22,7 @@ from discover.forward.batches import (
     MixedBatch,
     OscillationBatch,
     Part,
+    Places,
     RunBatch,
     SteadyBatch,
     StressBatch,
@@ -194,8 +195,7 @@ class AugmentedModel:
         """Return the records that a part of a batch holds, in the order of its rows."""
         found = self._of_part(thetas, part)
         if isinstance(batch, MixedBatch) and isinstance(part, OscillationBatch):
-            sweeps, moduli = np.array(batch.moduli).T
-            return found[:, sweeps, moduli]
+            return _of_sweeps(found, batch.moduli)
         return found
 
     def _of_part(
@@ -256,3 +256,13 @@ class AugmentedModel:
                 sums[asked] += np.sum(off**2, axis=(1, 2))
         out[~(sums < limits)] = np.inf  # what is not a number among them
         return out
+
+
+def _of_sweeps(
+    found: Float[np.ndarray, "trials states 2"], runs: Sequence[Places]
+) -> Float[np.ndarray, "trials rows n"]:
+    """Return the moduli of each run, of those of all states; zero behind a shorter run's last."""
+    out = np.zeros((len(found), len(runs), max(len(places) for _, places in runs)))
+    for row, (modulus, places) in enumerate(runs):
+        out[:, row, : len(places)] = found[:, list(places), modulus]
+    return out

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Complex, Float
+import numpy as np
+from jaxtyping import Array, Complex, Float, Int
 
 from discover.forward.dynamics import Dynamics
 from discover.simulate.exponential_runge_kutta import relax
@@ -19,11 +20,11 @@ from discover.simulate.modified_newton import (
     relative_change,
 )
 
-# Most iterations in all, and the relative step below which the next one would change nothing that
-# is seen: Newton's error goes as its square
+# Most iterations in all, and the relative change of what is followed by iteration below which the
+# next one would change nothing that is seen
 _MOST, _TOLERANCE = 60, 1e-8
 
-# The same of modes alone, where one more step follows, whose derivative errs by as much
+# The same of the modes' steps: Newton's error goes as their square
 _STEP = 1e-6
 
 # Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
@@ -33,18 +34,35 @@ _SHARE, _SECANT = 10.0, (0.2, 5.0)
 _MIRROR = (1.0, 1.0, 1.0, -1.0)
 
 
-class _Half(NamedTuple):
-    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 at step ends.
+# ωt at which what needs no steps is looked at: a stress beside the modes, a signal
+PHASE = np.linspace(0.0, np.pi, 161)
 
-    The last once more for each mode where that is asked for, without the factor of the states,
-    shape (s, k).
+
+class _Half(NamedTuple):
+    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 on the way.
+
+    Attributes
+    ----------
+    recorded
+        Its first harmonic where steps are counted, shape (), else its values at step ends, (s,).
+    of_modes
+        These of each mode, where they are asked for, without the factor of the states, shape
+        (s, k).
     """
 
     stress: Float[Array, "s k"]
     levels: tuple[Float[Array, "..."], ...]
     left: tuple[Float[Array, "..."], ...]
-    wave: Float[Array, " s"]
+    recorded: Complex[Array, ""] | Float[Array, " s"]
     of_modes: Float[Array, "s k"]
+
+
+class _Carry(NamedTuple):
+    """What a step changes: the modes, the levels, and what is left of each of these so far."""
+
+    stress: Float[Array, "s k"]
+    levels: list[Float[Array, "..."]]
+    left: list[Float[Array, "..."]]
 
 
 class _Iterate(NamedTuple):
@@ -63,7 +81,7 @@ def complex_modulus(
     dynamics: Dynamics,
     strain: Float[Array, ""],
     frequency: Float[Array, ""],
-    phase: Float[Array, " m"],
+    steps: Int[Array, ""],
     beside: Callable[[Float[Array, " s"]], Float[Array, " s"]],
 ) -> Complex[Array, ""]:
     """Return G′ + iG″ in Pa of the first harmonic at a strain γ₀ sin ωt of the tool.
@@ -85,18 +103,16 @@ def complex_modulus(
         The fluid, with what gives way in series with it.
     strain, frequency
         Amplitude γ₀ and ω in rad/s.
-    phase
-        ωt at step ends and middles in turn over half a cycle, 0 to π, evenly spaced.
+    steps
+        Over half a cycle.
     beside
         Recorded stress beside the modes in Pa, of rates in 1/s.
     """
-    wave = frequency * jnp.cos(phase)
-    width = (phase[2] - phase[0]) / frequency
-    half = _half_cycle(dynamics, wave, width)
+    half = _counted_half_cycle(dynamics, frequency, steps)
 
     def modulus(found: _Half, felt):
-        stress = found.wave + beside(felt * wave[::2])
-        return first_harmonic(stress, phase[::2]) / felt
+        rate = felt * frequency * jnp.cos(PHASE)
+        return (found.recorded + first_harmonic(beside(rate), PHASE)) / felt
 
     def taken(whole):
         """Return by how much the tool turns further than the fluid."""
@@ -126,7 +142,7 @@ def complex_modulus(
         felt, lacking = next_felt(now, found)
         slowness = frequency * dynamics.modes.relaxation_time
         changes = [
-            relative_change(now.modes, modes, slowness, _TOLERANCE),
+            _TOLERANCE / _STEP * relative_change(now.modes, modes, slowness, _STEP),
             jnp.abs(felt / now.felt - 1.0),
             *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
         ]
@@ -276,13 +292,15 @@ def periodic_state(
     # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
     matrix = jnp.eye(size) - jnp.swapaxes(end.jacobian, 1, 2)
     step = jnp.linalg.solve(matrix, (found.stress - end.modes.stress).T[:, :, None])[:, :, 0].T
-    recorded = found.wave + dynamics.viscosity * strain * wave[::2]
+    recorded = found.recorded + dynamics.viscosity * strain * wave[::2]
     whole = first_harmonic(recorded, phase[::2]) + jnp.sum(end.harmonics * step)
     whole = jnp.where(end.change < _STEP, whole / strain, jnp.nan)
     return PeriodicState(end.modes.stress + step, whole)
 
 
-def first_harmonic(stress: Float[Array, " s"], phase: Float[Array, " s"]) -> Complex[Array, ""]:
+def first_harmonic(
+    stress: Float[Array, " s"], phase: Float[Array | np.ndarray, " s"]
+) -> Complex[Array, ""]:
     """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
 
     Parameters
@@ -310,7 +328,86 @@ def _end_with_derivative(half, stress, levels, felt) -> tuple[_Half, Float[Array
 
 
 def _half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
-    """Return the function from state and strain amplitude to what half a cycle makes of them."""
+    """Return the function from state and strain amplitude to what half a cycle makes of them.
+
+    Parameters
+    ----------
+    dynamics
+        The fluid.
+    wave
+        Rate over strain amplitude at step ends and middles in turn.
+    width
+        Of a step in s.
+    by_mode
+        Whether stresses of each mode are asked for too.
+    """
+    step, begun = _step(dynamics, width, 1 if by_mode else 4)
+
+    def of_modes(stress):
+        return stress[3] * dynamics.modes.modulus if by_mode else jnp.zeros(0)
+
+    def half(stress, levels, amplitude) -> _Half:
+        rate = amplitude * wave
+
+        def taken(carry: _Carry, rates):
+            carry, recorded = step(carry, rates)
+            return carry, (recorded, of_modes(carry.stress))
+
+        start, first = begun(stress, levels, rate[0])
+        end, (recorded, each) = jax.lax.scan(taken, start, (rate[:-2:2], rate[1::2], rate[2::2]))
+        recorded = jnp.concatenate([first[None], recorded])
+        each = jnp.concatenate([of_modes(stress)[None], each])
+        return _Half(_mirrored(dynamics, end), tuple(end.levels), tuple(end.left), recorded, each)
+
+    return half
+
+
+def _counted_half_cycle(dynamics: Dynamics, frequency, steps):
+    """Return the function from state and strain amplitude to what half a cycle makes of them.
+
+    In as many steps as are asked for when it runs: no derivative goes backwards through it.
+    """
+    turn = jnp.pi / steps
+    step, begun = _step(dynamics, turn / frequency, 4)
+
+    def half(stress, levels, amplitude) -> _Half:
+        def rate(number):
+            return amplitude * frequency * jnp.cos(turn * number)
+
+        def taken(number, state):
+            carry, harmonic = state
+            carry, recorded = step(carry, (rate(number), rate(number + 0.5), rate(number + 1.0)))
+            share = jnp.where(number + 1 == steps, 0.5, 1.0) / steps
+            return carry, harmonic + _of_harmonic(recorded, turn * (number + 1.0), share)
+
+        start, first = begun(stress, levels, rate(0.0))
+        harmonic = _of_harmonic(first, 0.0, 0.5 / steps)
+        end, harmonic = jax.lax.fori_loop(0, steps, taken, (start, harmonic))
+        whole = jax.lax.complex(*harmonic)
+        return _Half(
+            _mirrored(dynamics, end), tuple(end.levels), tuple(end.left), whole, jnp.zeros(0)
+        )
+
+    return half
+
+
+def _of_harmonic(stress, phase, share) -> Float[Array, "2"]:
+    """Return what a stress at ωt adds to the two parts of the first harmonic."""
+    return 2.0 * share * stress * jnp.stack([jnp.sin(phase), jnp.cos(phase)])
+
+
+def _mirrored(dynamics: Dynamics, end: _Carry) -> Float[Array, "s k"]:
+    """Return the modes at the end of half a cycle as its mirror image begins with them."""
+    tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
+    mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
+    return mirror * end.stress
+
+
+def _step(dynamics: Dynamics, width, unroll: int):
+    """Return the functions that take one step, and that begin with the first.
+
+    A step is of rates at its beginning, middle and end, and comes with σ12 at its end.
+    """
     combined = dynamics.combined
     weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
 
@@ -325,46 +422,31 @@ def _half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
     def sheared(stress, rate):
         return dynamics.sheared(stress, rate, None)[0]
 
-    tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
-    mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
+    def begun(stress, levels, rate) -> tuple[_Carry, Float[Array, ""]]:
+        recorded = combined("modulus_factor", levels) * sheared(stress, rate)
+        return _Carry(stress, list(levels), [jnp.ones_like(level) for level in levels]), recorded
 
-    def of_modes(stress):
-        return stress[3] * dynamics.modes.modulus if by_mode else jnp.zeros(0)
+    def step(carry: _Carry, rates) -> tuple[_Carry, Float[Array, ""]]:
+        stress, levels, left = carry
+        first, middle, last = rates
+        before = combined("modulus_factor", levels) * sheared(stress, middle)
+        halfway, _ = relaxed(levels, middle, before, 0.5)
+        at_end, _ = relaxed(levels, middle, before, 1.0)
+        slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
+        w = dynamics.weights_of_step(weights, width, slow[1])
 
-    def half(stress, levels, amplitude) -> _Half:
-        rate = amplitude * wave
+        def stage(stress, given):
+            rate, now = given
+            change = slow[1] * dynamics.change(stress, rate, now, None)
+            return w.remainder(stress, change, dynamics.decay), ()
 
-        def step(carry, rates):
-            stress, levels, left = carry
-            first, middle, last = rates
-            before = combined("modulus_factor", levels) * sheared(stress, middle)
-            halfway, _ = relaxed(levels, middle, before, 0.5)
-            at_end, _ = relaxed(levels, middle, before, 1.0)
-            slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
-            w = dynamics.weights_of_step(weights, width, slow[1])
+        felt = jnp.stack([first, middle, middle, last])
+        factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
+        stress, _ = w.step(stress, stage, (felt, factors), unroll)
+        after = combined("modulus_factor", at_end) * sheared(stress, middle)
+        levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
+        left = [a * b for a, b in zip(left, kept, strict=True)]
+        recorded = combined("modulus_factor", levels) * sheared(stress, last)
+        return _Carry(stress, levels, left), recorded
 
-            def stage(stress, given):
-                rate, now = given
-                change = slow[1] * dynamics.change(stress, rate, now, None)
-                return w.remainder(stress, change, dynamics.decay), ()
-
-            felt = jnp.stack([first, middle, middle, last])
-            factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
-            stress, _ = w.step(stress, stage, (felt, factors), 1 if by_mode else 4)
-            after = combined("modulus_factor", at_end) * sheared(stress, middle)
-            levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
-            left = [a * b for a, b in zip(left, kept, strict=True)]
-            recorded = combined("modulus_factor", levels) * sheared(stress, last)
-            return (stress, levels, left), (recorded, of_modes(stress))
-
-        begun = combined("modulus_factor", levels) * sheared(stress, rate[0])
-        begun_by_mode = of_modes(stress)
-        start = (stress, list(levels), [jnp.ones_like(level) for level in levels])
-        (stress, levels, left), (recorded, each) = jax.lax.scan(
-            step, start, (rate[:-2:2], rate[1::2], rate[2::2])
-        )
-        recorded = jnp.concatenate([begun[None], recorded])
-        each = jnp.concatenate([begun_by_mode[None], each])
-        return _Half(mirror * stress, tuple(levels), tuple(left), recorded, each)
-
-    return half
+    return step, begun

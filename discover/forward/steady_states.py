@@ -1,12 +1,35 @@
 """Steady states of a fluid, one for each rate of a flow curve."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
-from discover.forward.dynamics import Dynamics
+from discover.forward.dynamics import Dynamics, Levels
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.steady_states import STEPS, approach, approach_step, arrived
+from discover.simulate.steady_states import (
+    STEPS,
+    Approach,
+    approach,
+    approach_step,
+    arrived,
+    pseudo_time_step,
+)
+
+# Width in relaxation times from which on a step is Newton's to a thousandth, and what it moves by
+# rounding
+_LONG, _ROUNDING = 1e3, 1e-13
+
+
+class _Way(NamedTuple):
+    """A way towards a steady state, with the states of the fluid and the rate that it feels."""
+
+    index: Float[Array, ""]
+    way: Approach
+    levels: Levels
+    felt: Float[Array, ""]
+    moving: Bool[Array, ""]
 
 
 def steady_states(
@@ -45,8 +68,8 @@ def _approach(dynamics: Dynamics, rate, flow):
         slow = dynamics.combined("time_factor", levels)
         return lambda state: dynamics.change(state, felt, slow, flow)
 
-    def step(carry, index):
-        way, levels, felt = carry
+    def step(now: _Way) -> _Way:
+        index, way, levels, felt = now.index, now.way, now.levels, now.felt
         change = changes(levels, felt)
         way = approach_step(change, way, index, weissenberg)
         sheared, sheared_rate = dynamics.sheared(way.stress, felt, flow)
@@ -59,13 +82,37 @@ def _approach(dynamics: Dynamics, rate, flow):
             # σ/γ̇ changes more slowly than σ: the iteration converges however strong the slip
             viscosity = dynamics.viscosity + sheared / jnp.where(felt == 0.0, 1.0, felt)
             felt = rate / (1.0 + dynamics.series.slip * viscosity)
-        return (way, levels, felt), None
+        following = _Way(index + 1.0, way, levels, felt, now.moving)
+        return following._replace(moving=_moves(now, following, weissenberg))
 
-    start = (approach(stress), levels, jnp.asarray(rate, dtype=stress.dtype))
-    (way, levels, felt), _ = jax.lax.scan(step, start, jnp.arange(STEPS, dtype=float))
+    start = _Way(
+        jnp.zeros(()),
+        approach(stress),
+        levels,
+        jnp.asarray(rate, dtype=stress.dtype),
+        jnp.asarray(True),
+    )
+    end = jax.lax.while_loop(lambda now: now.moving & (now.index < STEPS), step, start)
+    way, levels, felt = end.way, end.levels, end.felt
     stress = arrived(changes(levels, felt), way, weissenberg)
     scale = dynamics.combined("modulus_factor", levels)
     return scale * dynamics.recorded(stress, flow), felt
+
+
+def _moves(before: _Way, after: _Way, weissenberg) -> Bool[Array, ""]:
+    """Return whether another step may change anything: one of Newton's from here did, or none was.
+
+    A step that is taken again moves nothing either.
+    """
+    width = pseudo_time_step(before.way.number, weissenberg)
+    newton = jnp.all((after.way.number > before.way.number) & (width > _LONG))
+    pairs = [
+        (before.way.stress, after.way.stress),
+        (before.felt, after.felt),
+        *zip(before.levels, after.levels, strict=True),
+    ]
+    still = [jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a))) for a, b in pairs]
+    return ~(newton & jnp.all(jnp.stack(still)))
 
 
 def _steady_level(effect, values, rate, stress):

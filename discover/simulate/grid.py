@@ -336,6 +336,11 @@ def make_grids(
 
 def half_cycle(strain: float, strain_step: float) -> Float[np.ndarray, " m"]:
     """Return ωt at step ends and middles in turn over half a cycle of an oscillation."""
+    steps = steps_of_half_cycle(max(strain, 0.5 * _FEWEST_OF_HALF), strain_step)
+    return np.linspace(0.0, np.pi, 2 * steps + 1)
+
+
+def steps_of_half_cycle(strain: float, strain_step: float) -> int:
+    """Return how many steps half a cycle takes of an oscillation of this amplitude of strain."""
     # half a cycle goes through twice the amplitude
-    steps = np.ceil(max(2.0 * strain, _FEWEST_OF_HALF) / strain_step)
-    return np.linspace(0.0, np.pi, 2 * int(min(steps, _MOST_OF_HALF)) + 1)
+    return int(min(np.ceil(2.0 * strain / strain_step), _MOST_OF_HALF))

@@ -2,7 +2,7 @@
 
 from discover.forward.batches.imposed_stress import StressBatch
 from discover.forward.batches.mixed import Batch, MixedBatch, Part, make_batch
-from discover.forward.batches.oscillation import OscillationBatch
+from discover.forward.batches.oscillation import OscillationBatch, Places
 from discover.forward.batches.samples import even
 from discover.forward.batches.scales import data_scales
 from discover.forward.batches.steady import SteadyBatch
@@ -13,6 +13,7 @@ __all__ = [
     "MixedBatch",
     "OscillationBatch",
     "Part",
+    "Places",
     "RunBatch",
     "SteadyBatch",
     "StressBatch",

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.batches.imposed_stress import StressBatch, at_given_stress
-from discover.forward.batches.oscillation import OscillationBatch, oscillations
+from discover.forward.batches.oscillation import OscillationBatch, Places, oscillations
 from discover.forward.batches.samples import measured
 from discover.forward.batches.steady import SteadyBatch, steady_states
 from discover.forward.batches.transient import RunBatch, transients
@@ -23,14 +23,14 @@ class MixedBatch(eqx.Module):
     Attributes
     ----------
     moduli
-        Of each run that is a modulus, which sweep of its part, and whether G′ (0) or G″ (1).
+        Of each run that is a modulus, which one, and where its states stand in their part.
     weight, recorded
         Of all runs in their order, as in `RunBatch`.
     """
 
     parts: tuple[Part | OscillationBatch, ...]
     rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
-    moduli: tuple[tuple[int, int], ...] = eqx.field(static=True)
+    moduli: tuple[Places, ...] = eqx.field(static=True)
     weight: Float[np.ndarray, "runs n"]
     recorded: Float[np.ndarray, "runs n"]
 
@@ -53,7 +53,7 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
     controls = list(dict.fromkeys(run.protocol.control for run in runs))
     if len(controls) == 1 and controls[0] in make:
         return make[controls[0]](runs)
-    moduli: tuple[tuple[int, int], ...] = ()
+    moduli: tuple[Places, ...] = ()
     rows = tuple(
         tuple(i for i, run in enumerate(runs) if run.protocol.control == control)
         for control in controls

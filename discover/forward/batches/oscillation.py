@@ -1,31 +1,37 @@
-"""Periodic states, padded: a sample is a modulus of a sweep of frequency or amplitude."""
+"""Periodic states: a sample is a modulus of a sweep of frequency or amplitude."""
 
 from collections.abc import Sequence
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI
-from discover.simulate.grid import half_cycle
+from discover.simulate.grid import steps_of_half_cycle
+
+# Half a cycle in the loop: as many steps as one of so much strain at least, whatever the strain
+_FEWEST = 8.0
+
+Places = tuple[int, tuple[int, ...]]
+"""Of a run that is a modulus whether it is G′ (0) or G″ (1), and which states its samples are."""
 
 
 class OscillationBatch(eqx.Module):
-    """Periodic states, padded, with a leading axis of sweeps: both moduli of each are computed.
+    """Periodic states, each of which is solved for by itself; both moduli of each are computed.
 
     Attributes
     ----------
     strain, frequency
-        Amplitude and rad/s, shape (sweeps, n).
-    phase
-        ωt at step ends and middles in turn over half a cycle, shape (sweeps, m).
+        Amplitude and rad/s.
+    steps
+        Of half a cycle: more at large strain.
     """
 
-    strain: Float[Array, "sweeps n"]
-    frequency: Float[Array, "sweeps n"]
-    phase: Float[Array, "sweeps m"]
+    strain: Float[Array, " states"]
+    frequency: Float[Array, " states"]
+    steps: Int[Array, " states"]
 
     @property
     def longest(self) -> float:
@@ -35,29 +41,19 @@ class OscillationBatch(eqx.Module):
 
 def oscillations(
     runs: Sequence[Run], strain_step: float
-) -> tuple[OscillationBatch, tuple[tuple[int, int], ...]]:
-    """Return the sweeps, and of each run which of them it is and which modulus of it."""
-    sweeps: list[tuple[np.ndarray, np.ndarray]] = []
-    moduli = []
-    for run in runs:
-        strain, frequency = np.asarray(run.strain), run.angular_frequency
-        # G′ and G″ of one sweep are computed together
-        at = next(
-            (
-                i
-                for i, (other, beside) in enumerate(sweeps)
-                if np.array_equal(other, strain) and np.array_equal(beside, frequency)
-            ),
-            len(sweeps),
-        )
-        if at == len(sweeps):
-            sweeps.append((strain, frequency))
-        moduli.append((at, MODULI.index(run.quantity)))
-    n = max(len(strain) for strain, _ in sweeps)
-    strains, frequencies = (
-        on_device(np.stack([np.pad(v, (0, n - len(v)), mode="edge") for v in column]))
-        for column in zip(*sweeps, strict=True)
+) -> tuple[OscillationBatch, tuple[Places, ...]]:
+    """Return the states of sweeps, and of each run which of them are its own."""
+    # G′ and G″ of one sweep are computed together
+    of_runs = [
+        np.stack([np.asarray(run.strain), np.asarray(run.angular_frequency)], axis=1)
+        for run in runs
+    ]
+    states, number = np.unique(np.concatenate(of_runs), axis=0, return_inverse=True)
+    ends = np.cumsum([len(own) for own in of_runs])[:-1]
+    places = tuple(
+        (MODULI.index(run.quantity), tuple(own.tolist()))
+        for run, own in zip(runs, np.split(number.ravel(), ends), strict=True)
     )
-    phase = half_cycle(max(float(np.max(strain)) for strain, _ in sweeps), strain_step)
-    phases = on_device(np.tile(phase, (len(sweeps), 1)))
-    return OscillationBatch(strains, frequencies, phases), tuple(moduli)
+    strain, frequency = states.T
+    steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), strain_step) for one in strain]
+    return OscillationBatch(*map(on_device, (strain, frequency, np.array(steps)))), places
