@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from discover._version import __version__
+from discover.accelerators import use_the_processor_from_the_start
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export
@@ -70,5 +71,6 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     warnings.formatwarning = _one_line
     use_one_thread_from_the_start()
+    use_the_processor_from_the_start()
     with obeying_interrupts():
         app(prog_name="discover")
