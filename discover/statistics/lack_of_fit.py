@@ -65,6 +65,8 @@ class LackOfFit:
     likeness
         Of one that does not: what of the instrument's what is left looks like, as a clause; empty
         where it looks like nothing that has a word.
+    advice
+        Of one that something else refutes: what to do about that, as a clause.
     """
 
     verdict: FitVerdict
@@ -80,6 +82,7 @@ class LackOfFit:
     changing: float | None = None
     rest: str = "is noise"
     likeness: str = ""
+    advice: str = ""
 
     @property
     def noise_unsure(self) -> bool:
@@ -92,14 +95,14 @@ class LackOfFit:
         seen = self.probability is not None and self.probability <= SIGNIFICANCE
         return self.verdict == "explained" and not seen
 
-    def refuted(self, reason: str) -> "LackOfFit":
+    def refuted(self, reason: str, advice: str = "") -> "LackOfFit":
         """Return the same of a model that other runs refute.
 
         What looked like correlated noise may be its misfit, so only what changes from sample to
         sample is still called noise.
         """
         noise = self.noise if self.changing is None else min(self.noise, self.changing)
-        return replace(self, verdict="unexplained", reason=reason, noise=noise)
+        return replace(self, verdict="unexplained", reason=reason, noise=noise, advice=advice)
 
 
 def lack_of_fit(

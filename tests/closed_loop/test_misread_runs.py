@@ -8,6 +8,8 @@ import discover as dc
 from discover.dataset import Dataset, Run
 from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as protocol
+from discover.report.loop.found import what_was_found
+from discover.report.loop.next_step import what_to_measure_next
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {
@@ -41,6 +43,9 @@ def test_a_range_of_the_transducer_that_reads_more_is_no_explanation(exact):
     loop = found(exact, lambda name, stress: stress * (1 + 0.012 * (np.abs(stress) > 50.0)))
     assert loop.verdict == "unexplained"
     assert "times the stress above" in loop.remaining["description"]
+    # both are said where one reads first
+    assert "times the stress above" in what_was_found(loop)
+    assert what_to_measure_next(loop) == "Measure one flow in both ranges of the transducer."
 
 
 def test_runs_that_were_filled_differently_are_none(exact):
@@ -52,6 +57,7 @@ def test_runs_that_were_filled_differently_are_none(exact):
 def test_runs_as_the_model_has_them_are_explained(exact):
     loop = found(exact, lambda name, stress: stress)
     assert loop.verdict == "effects_added"
+    assert loop.remaining["read_as"] == loop.remaining["advice"] == ""
     low, high = loop.stages[0].parameters["alpha"].ci95
     assert low < 0.3 < high
     assert high - low < 0.006  # no wider than noise alone makes it

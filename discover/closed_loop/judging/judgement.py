@@ -33,6 +33,8 @@ class Judgement:
         whether the held-out runs are predicted as well as can be asked.
     not_judging
         Runs with too few samples to judge by, where others have more.
+    read_as
+        Where records follow the model clearly better if they were read otherwise: how, as a clause.
     missed, unseen
         How many times what can be asked the runs held out are missed, and how many there are.
     worst
@@ -52,6 +54,7 @@ class Judgement:
     description: str
     missed: float = 0.0
     unseen: int = 0
+    read_as: str = ""
 
 
 def judge(

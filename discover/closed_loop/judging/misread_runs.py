@@ -68,8 +68,9 @@ def judged_as_read(
         judgement,
         verdict="unexplained",
         structured=True,
-        left=left.refuted(left.reason),
+        left=left.refuted(left.reason, advice(best)),
         description=text,
+        read_as=reads(best),
     )
 
 

@@ -9,6 +9,7 @@ from discover.report.wording import (
     A_TRANSIENT,
     SYMBOLS,
     percent,
+    sentence,
     significant,
 )
 
@@ -29,6 +30,9 @@ def what_to_measure_next(comparison: Comparison) -> str:
             "Have discover close-loop fit these constants too: [model] by_mode = "
             f"[{names}] gives their intervals, what else the runs show, and an export."
         )
+    advised = [left.advice for left in explanation.lack_of_fit.values() if left.advice]
+    if explanation.verdict == "unexplained" and advised:
+        return sentence(advised[:1])
     lacking = "tensor_sindy" in comparison.outcomes and not explanation.in_library
     if lacking or explanation.verdict == "unexplained":
         return (

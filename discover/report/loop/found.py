@@ -92,6 +92,10 @@ def _how_it_stands(result: LoopResult) -> str:
             return _UNKNOWN_NOISE
         if not result.remaining.get("carries_over", True):
             return _NOT_CARRIED
+        if read_as := result.remaining.get("read_as"):
+            return (
+                f"Nothing is explained, for the records follow this model clearly better {read_as}"
+            )
     return _LOOP[result.verdict]
 
 

@@ -14,6 +14,7 @@ from discover.report.wording import (
     effect_title,
     effects_title,
     percent,
+    sentence,
     significant,
 )
 from discover.statistics.residual import FEWEST_TESTED
@@ -31,6 +32,8 @@ def what_to_measure_next(result: LoopResult) -> str:
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
+    if advised := result.remaining.get("advice"):
+        return sentence([advised])
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT
