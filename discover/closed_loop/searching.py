@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from discover.closed_loop.added_mode_apart import LawByMode, law_by_mode_instead, start_from
 from discover.closed_loop.candidates import admission
 from discover.closed_loop.explanations import Carried, search_and_carry
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
@@ -88,7 +89,8 @@ class SearchTask:
         once more beside what was found, and another is searched beside and taken if that is
         likelier. Where what was found does not explain the runs, its constants may differ from mode
         to mode: that is searched once more too, and taken on strong evidence. Where it does, what
-        it leaves open of each mode's constant is looked at beside it.
+        it leaves open of each mode's constant is looked at beside it. Where it found the second
+        mode of a fluid, laws by mode are asked in the place of what it found beside.
 
         Parameters
         ----------
@@ -102,7 +104,10 @@ class SearchTask:
         """
         if self.silent:
             return self._from(declared, (), self.name)
-        return self._with_modes_apart(self._with_law(declared, laws))
+        first = self._with_law(declared, laws)
+        if len(declared.modulus) > 1:
+            return self._with_modes_apart(first)
+        return self._with_added_mode_apart(first)
 
     def _with_law(self, declared: DeclaredModel, laws: Sequence[str]) -> SearchResult:
         if not laws:
@@ -126,8 +131,7 @@ class SearchTask:
         names += [
             name for name in search.active if may_differ_by_mode(effect_of(search.model, name))
         ]
-        alike = len(declared.modulus) < 2 or declared.by_mode
-        if alike or not names:
+        if declared.by_mode or not names:
             return first
         if search.explained:
             self.say(f"what the runs say of {', '.join(names)} in each mode")
@@ -139,6 +143,18 @@ class SearchTask:
         again = self._from(apart, first.laws, f"{self.name}_by_mode")
         differ = any(one.degree for one in again.search.degrees.values())
         return again if differ and _is_likelier(again.search, search, INDISTINGUISHABLE) else first
+
+    def _with_added_mode_apart(self, first: SearchResult) -> SearchResult:
+        search = first.search
+        if not search.explained:
+            return first
+        found = law_by_mode_instead(search, self.max_effects, data_scales(self.fitted))
+        if found is None:
+            return first
+        self.say(f"{found.name} may differ from mode to mode, beside {', '.join(found.effects)}")
+        name = f"{self.name}_by_mode"
+        again = self._from(found.declared, first.laws, name, instead=(search, found))
+        return first if _is_likelier(search, again.search, INDISTINGUISHABLE) else again
 
     def one_degree_more(self, before: SearchResult) -> SearchResult | None:
         """Search once more with constants by mode of one degree more; None where there is none.
@@ -170,6 +186,7 @@ class SearchTask:
         laws: tuple[LawFit, ...],
         name: str,
         least: Mapping[str, int] | None = None,
+        instead: tuple[Search, LawByMode] | None = None,
     ) -> SearchResult:
         # of one mode nothing can differ from another's
         asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
@@ -195,8 +212,11 @@ class SearchTask:
             self.say(f"going on from what was kept: {', '.join(search.active)}")
         else:
             self.say(f"declared model on {len(self.fitted)} runs")
-            search.start()
-            find_instrument_effects(search, self.fitted, self.max_effects, self.say)
+            search.start(by_mode=instead is None)
+            if instead is None:
+                find_instrument_effects(search, self.fitted, self.max_effects, self.say)
+            else:
+                start_from(search, *instead)
         carried = search_and_carry(search, self.max_effects, self.width, self.say)
         return SearchResult(declared, laws, search, carried)
 

@@ -1,0 +1,111 @@
+"""Two modes with constants of their own, one of them declared: a law by mode and no structure."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from independent import Giesekus, Modes, Thixotropic, oscillation, start_up
+from independent.noise import rms
+
+import discover as dc
+from discover.closed_loop import DeclaredModel
+from discover.dataset import Dataset, Run
+from discover.effects import make_effect
+from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
+from discover.protocols import oscillation as oscillating
+from discover.protocols import start_up as starting
+
+MODULI, TIMES = (60.0, 80.0), (3.0, 0.4)
+EFFECTS = ["relaxation_mode", "giesekus_mobility", "thixotropy"]
+
+
+def fluid(mobilities):
+    return Modes(*(Giesekus(*of) for of in zip(mobilities, MODULI, TIMES, strict=True)))
+
+
+def record(material, name, seed, noise=0.01):
+    lot = np.random.default_rng([seed, len(name)])
+    if name == "wave":
+        times = np.linspace(0.1, 12.0, 120)
+        flow, protocol = oscillation(2.0, 1.0), oscillating(2.0, 1.0)
+    else:
+        times, rate = np.linspace(0.1, 8.0, 80), float(name)
+        flow, protocol = start_up(rate), starting(rate)
+    stress = material.respond(flow, times).sigma12
+    stress = stress + noise * rms(stress) * lot.standard_normal(len(times))
+    return Run(name, times, protocol, np.asarray(flow.rate(times)) + 0.0 * times, stress)
+
+
+def found_in(material, seed=0):
+    runs = tuple(record(material, name, seed) for name in ("0.5", "2.00", "wave", "3.0000"))
+    base = dc.Fluid(dc.make_law("ucm"), (100.0,), (1.0,))
+    return dc.close_loop(
+        Dataset("two modes", runs), base, free=["modulus_Pa", "relaxation_time_s"],
+        held_out=["3.0000"], effects=EFFECTS,
+    )  # fmt: skip
+
+
+@cache
+def loop(mobilities):
+    return found_in(fluid(mobilities))
+
+
+@pytest.mark.parametrize("mobilities", [(0.1, 0.5), (0.4, 0.05)])
+def test_mobilities_of_their_own_are_no_structure(mobilities):
+    # a structure at 89 % stood in the place of the second mobility before
+    result = loop(mobilities)
+    assert result.verdict == "effects_added"
+    assert {stage.effect for stage in result.stages} == {"relaxation_mode", "giesekus_mobility"}
+    assert result.explanations.inclusion.get("thixotropy", 0.0) < 0.5
+    alpha = result.by_mode["giesekus_mobility"]
+    assert alpha.degree == 1
+    for mode, mobility, time in zip(alpha.modes, mobilities, TIMES, strict=True):
+        low, high = mode.ci95
+        # twice the interval: of four of 95 % one may miss
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+        assert mode.relaxation_time_s == pytest.approx(time, rel=0.15)
+
+
+def test_one_mobility_of_both_modes_stays_one():
+    result = loop((0.3, 0.3))
+    assert {stage.effect for stage in result.stages} == {"relaxation_mode", "giesekus_mobility"}
+    assert not result.differing_by_mode
+    mobility = next(s for s in result.stages if s.effect == "giesekus_mobility")
+    assert mobility.parameters["alpha"].value == pytest.approx(0.3, rel=0.05)
+
+
+def test_a_structure_that_is_there_is_named_beside_two_modes():
+    result = found_in(Thixotropic(fluid((0.3, 0.3)), 0.1, 4.0))
+    assert "thixotropy" in {stage.effect for stage in result.stages}
+    assert result.explanations.inclusion["thixotropy"] > 0.5
+    assert not result.differing_by_mode
+
+
+def test_an_added_mode_has_the_constant_of_its_own_time():
+    # stresses by scipy, each mode with its mobility
+    declared = DeclaredModel.maxwell(
+        MODULI[:1], TIMES[:1], by_mode=("giesekus_mobility",), added_modes=1
+    )
+    model = AugmentedModel(
+        declared, [make_effect("relaxation_mode"), make_effect("giesekus_mobility")]
+    )
+    theta = model.zero()
+    theta[model.positions("relaxation_mode")] = MODULI[1], TIMES[1]
+    theta[model.positions("giesekus_mobility")] = 0.1
+    logits = np.log(0.5 / 0.5) - np.log(0.1 / 0.9)
+    theta[model.varying("giesekus_mobility")[0]] = logits / np.log10(TIMES[1] / TIMES[0])
+    run = record(fluid((0.1, 0.5)), "2.0", 0, noise=0.0)
+    predicted = model.predict(theta, make_batch([run], strain_step=0.05))[0]
+    # the integrator's error on such steps
+    np.testing.assert_allclose(predicted, run.stress, atol=1e-3 * np.max(run.stress))
+    # and without the mode the constant is that of the one declared, whatever the coefficient
+    theta[model.positions("relaxation_mode")[0]] = 0.0
+    alone = model.predict(theta, make_batch([run], strain_step=0.05))[0]
+    single = record(Giesekus(0.1, MODULI[0], TIMES[0]), "2.0", 0, noise=0.0)
+    np.testing.assert_allclose(alone, single.stress, atol=1e-3 * np.max(single.stress))
+
+
+def test_constants_of_one_mode_differ_from_nothing():
+    with pytest.raises(InputError, match="one mode"):
+        DeclaredModel.maxwell(MODULI[:1], TIMES[:1], by_mode=("giesekus_mobility",))
