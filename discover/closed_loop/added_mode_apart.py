@@ -57,7 +57,8 @@ def law_by_mode_instead(
     """Return the likeliest law by mode beside the mode that a search found, if it is a rival.
 
     It is one if it explains the runs with fewer effects and is not much less likely
-    (`INDISTINGUISHABLE`), or with the same ones and is as much likelier.
+    (`INDISTINGUISHABLE`), or with the same ones and is as much likelier. Where what was found does
+    not explain the runs, it has to be as much likelier, and to explain them.
 
     Parameters
     ----------
@@ -98,21 +99,27 @@ def law_by_mode_instead(
             starts.append(start)
             free.append((*positions, first))
     fits = problem.fits(starts, free, rivals=True)
-    effective = search.problem.independent_samples(search.fit)
+    # counted on what the best fit leaves: a misfit passes for noise that is correlated
+    closest = min([search.fit, *(fit for fit in fits if fit.usable)], key=lambda fit: fit.cost)
+    effective = search.problem.independent_samples(closest)
     own = search.problem.worth(search.fit, search.active, effective)
-    best, least = None, np.inf
+    best, least, left = None, np.inf, search.fit.residual
+    explained = search.explained
     for (name, effects), fit in zip(owners, fits, strict=True):
         if not fit.usable or at_an_end(model, fit.theta, effects):
             continue
         worth = problem.worth(fit, effects, effective)
         # of what was found alone, one constant for all modes is the simpler
-        limit = own + (-1.0 if set(effects) >= set(search.active) else 1.0) * INDISTINGUISHABLE
+        simpler = explained and not set(effects) >= set(search.active)
+        limit = own + (INDISTINGUISHABLE if simpler else -INDISTINGUISHABLE)
         if worth < min(limit, least):
             values = {one: fit.theta[model.positions(one)] for one in (*effects, *known)}
             of_declared = fit.theta[: 2 + len(declared.free_parameters)]
             values |= {"": of_declared, "coefficient": fit.theta[model.varying(name)[:1]]}
             best, least = LawByMode(apart, name, tuple(effects), values, worth < own), worth
-    return best
+            left = fit.residual
+    explains = explained or search.tolerated.left(left).verdict == "explained"
+    return best if explains else None
 
 
 def start_from(search: Search, before: Search, found: LawByMode) -> None:

@@ -146,8 +146,6 @@ class SearchTask:
 
     def _with_added_mode_apart(self, first: SearchResult) -> SearchResult:
         search = first.search
-        if not search.explained:
-            return first
         found = law_by_mode_instead(search, self.max_effects, data_scales(self.fitted))
         if found is None:
             return first

@@ -13,7 +13,7 @@ from discover.dataset import Dataset, Run
 from discover.effects import make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
-from discover.protocols import oscillation as oscillating
+from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as starting
 
 MODULI, TIMES = (60.0, 80.0), (3.0, 0.4)
@@ -24,11 +24,14 @@ def fluid(mobilities):
     return Modes(*(Giesekus(*of) for of in zip(mobilities, MODULI, TIMES, strict=True)))
 
 
+NAMES = ("0.5", "2.0", "wave", "3.0")
+
+
 def record(material, name, seed, noise=0.01):
-    lot = np.random.default_rng([seed, len(name)])
+    lot = np.random.default_rng([seed, NAMES.index(name)])
     if name == "wave":
         times = np.linspace(0.1, 12.0, 120)
-        flow, protocol = oscillation(2.0, 1.0), oscillating(2.0, 1.0)
+        flow, protocol = oscillation(2.0, 1.0), oscillatory_shear(2.0, 1.0)
     else:
         times, rate = np.linspace(0.1, 8.0, 80), float(name)
         flow, protocol = start_up(rate), starting(rate)
@@ -38,11 +41,11 @@ def record(material, name, seed, noise=0.01):
 
 
 def found_in(material, seed=0):
-    runs = tuple(record(material, name, seed) for name in ("0.5", "2.00", "wave", "3.0000"))
+    runs = tuple(record(material, name, seed) for name in NAMES)
     base = dc.Fluid(dc.make_law("ucm"), (100.0,), (1.0,))
     return dc.close_loop(
         Dataset("two modes", runs), base, free=["modulus_Pa", "relaxation_time_s"],
-        held_out=["3.0000"], effects=EFFECTS,
+        held_out=["3.0"], effects=EFFECTS,
     )  # fmt: skip
 
 
@@ -51,9 +54,11 @@ def loop(mobilities):
     return found_in(fluid(mobilities))
 
 
-@pytest.mark.parametrize("mobilities", [(0.1, 0.5), (0.4, 0.05)])
+@pytest.mark.parametrize(
+    "mobilities", [(0.1, 0.5), pytest.param((0.15, 0.6), marks=pytest.mark.slow)]
+)
 def test_mobilities_of_their_own_are_no_structure(mobilities):
-    # a structure at 89 % stood in the place of the second mobility before
+    # with all candidates a structure at 89 % stood in the place of the second mobility
     result = loop(mobilities)
     assert result.verdict == "effects_added"
     assert {stage.effect for stage in result.stages} == {"relaxation_mode", "giesekus_mobility"}
