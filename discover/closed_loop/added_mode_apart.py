@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float
 
 from discover.closed_loop.modes_apart import places_in, prior_in
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.effects import AbstractEffect, LibraryTerm, ModeEffect
-from discover.forward import AugmentedModel, DeclaredModel
+from discover.forward import AugmentedModel
 from discover.forward.declared import may_differ_by_mode
+from discover.forward.least_squares import Fit
 from discover.inference.degrees import Degree
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
@@ -32,22 +32,22 @@ class LawByMode:
 
     Attributes
     ----------
-    declared
-        The declared model, in which constants may differ from mode to mode.
+    model
+        The declared model, in which constants may differ from mode to mode, with what was asked.
     name
-        Of the constant that does: a parameter of the law, or an effect.
+        Of the constant that differs: a parameter of the law, or an effect.
     effects
         Beside the declared model, that of the law among them.
-    values
-        Of all that is fitted, by name: of the declared model under no name, and of each effect.
+    fit
+        Of these, linear in log λ.
     is_likelier
         Whether it is likelier than what was found.
     """
 
-    declared: DeclaredModel
+    model: AugmentedModel
     name: str
     effects: tuple[str, ...]
-    values: Mapping[str, Float[np.ndarray, " p"]]
+    fit: Fit
     is_likelier: bool
 
 
@@ -69,17 +69,52 @@ def law_by_mode_instead(
     scales
         Of the data, as the model of the search has them.
     """
+    problem, rivals = _rivals(search, max_effects, scales)
+    if not rivals:
+        return None
+    # counted on what the best fit leaves: a misfit passes for noise that is correlated
+    closest = min([search.fit, *(fit for *_, fit in rivals)], key=lambda fit: fit.cost)
+    effective = search.problem.independent_samples(closest)
+    own = search.problem.worth(search.fit, search.active, effective)
+    explained, best, least = search.explained, None, np.inf
+    for name, effects, fit in rivals:
+        worth = problem.worth(fit, effects, effective)
+        # of what was found alone, one constant for all modes is the simpler
+        simpler = explained and not set(effects) >= set(search.active)
+        limit = own + (INDISTINGUISHABLE if simpler else -INDISTINGUISHABLE)
+        if worth < min(limit, least):
+            best = LawByMode(problem.model, name, tuple(effects), fit, worth < own)
+            least = worth
+    if best is None or explained:
+        return best
+    return best if search.tolerated.left(best.fit.residual).verdict == "explained" else None
+
+
+def has_second_mode(search: Search) -> bool:
+    """Return whether a search in a fluid of one declared mode has another, found or known.
+
+    Of several kinds of effects that add modes nobody knows which is whose, so there may be but one.
+    """
     before, declared = search.model, search.model.declared
-    known = {one.name: one.effect for one in declared.effects}
+    present = {*search.active, *(one.name for one in declared.effects)}
+    modes = {e.name for e in before.effects if isinstance(e, ModeEffect)}
+    single = len(declared.modulus) == 1 and not declared.by_mode and len(modes) == 1
+    return single and bool(present & modes)
+
+
+def _rivals(
+    search: Search, max_effects: int, scales: Mapping[str, float]
+) -> tuple[FitProblem, list[tuple[str, list[str], Fit]]]:
+    """Return constants by mode, each with the effects beside it, and their fits; and of what.
+
+    Beside what is asked there are no other effects in the model: its program compiles fast.
+    """
+    before, declared = search.model, search.model.declared
     modes = [e.name for e in before.effects if isinstance(e, ModeEffect)]
-    if len(declared.modulus) > 1 or declared.by_mode or len(modes) != 1:
-        return None
-    if modes[0] not in search.active and modes[0] not in known:
-        return None
     laws = _laws(search)
     names = [*(p.name for p in declared.free_parameters), *laws]
-    if not names:
-        return None
+    if not names or not has_second_mode(search):
+        return search.problem, []
     apart = replace(declared, by_mode=tuple(names), added_modes=1)
     asked = dict.fromkeys([*search.active, *laws])
     model = AugmentedModel(apart, [effect_of(before, name) for name in asked], scales)
@@ -99,27 +134,11 @@ def law_by_mode_instead(
             starts.append(start)
             free.append((*positions, first))
     fits = problem.fits(starts, free, rivals=True)
-    # counted on what the best fit leaves: a misfit passes for noise that is correlated
-    closest = min([search.fit, *(fit for fit in fits if fit.usable)], key=lambda fit: fit.cost)
-    effective = search.problem.independent_samples(closest)
-    own = search.problem.worth(search.fit, search.active, effective)
-    best, least, left = None, np.inf, search.fit.residual
-    explained = search.explained
-    for (name, effects), fit in zip(owners, fits, strict=True):
-        if not fit.usable or at_an_end(model, fit.theta, effects):
-            continue
-        worth = problem.worth(fit, effects, effective)
-        # of what was found alone, one constant for all modes is the simpler
-        simpler = explained and not set(effects) >= set(search.active)
-        limit = own + (INDISTINGUISHABLE if simpler else -INDISTINGUISHABLE)
-        if worth < min(limit, least):
-            values = {one: fit.theta[model.positions(one)] for one in (*effects, *known)}
-            of_declared = fit.theta[: 2 + len(declared.free_parameters)]
-            values |= {"": of_declared, "coefficient": fit.theta[model.varying(name)[:1]]}
-            best, least = LawByMode(apart, name, tuple(effects), values, worth < own), worth
-            left = fit.residual
-    explains = explained or search.tolerated.left(left).verdict == "explained"
-    return best if explains else None
+    return problem, [
+        (name, effects, fit)
+        for (name, effects), fit in zip(owners, fits, strict=True)
+        if fit.usable and not at_an_end(model, fit.theta, effects)
+    ]
 
 
 def start_from(search: Search, before: Search, found: LawByMode) -> None:
@@ -130,7 +149,7 @@ def start_from(search: Search, before: Search, found: LawByMode) -> None:
     Parameters
     ----------
     search
-        A search from `found.declared`, which has started.
+        A search from the declared model of `found`, which has started.
     before
         The one before.
     """
@@ -145,29 +164,26 @@ def start_from(search: Search, before: Search, found: LawByMode) -> None:
     search.not_named = {n: text for n, text in before.not_named.items() if n not in own}
     search.seen.take_over(before.seen, places)
     search.degrees = {name: Degree() for name in search.degrees}
-    of_before = before.fit.theta, list(before.active)
-    moved = model.zero()
-    moved[[*places.values()]] = of_before[0][[*places]]
-    search.take(search.fitted(of_before[1], moved), of_before[1])
-    _support(search)
     theta = model.zero()
-    theta[: len(found.values[""])] = found.values[""]
-    for name in (*found.effects, *(known.name for known in model.declared.effects)):
-        theta[model.positions(name)] = found.values[name]
-    theta[model.varying(found.name)[:1]] = found.values["coefficient"]
+    theta[[*places.values()]] = before.fit.theta[[*places]]
+    search.take(search.fitted(before.active, theta), before.active)
+    _support(search)
+    theta, size = model.zero(), model.declared.size
+    places = places_in(found.model, model, found.effects)
+    theta[[*places.values()]] = found.fit.theta[[*places]]
+    theta[:size] = found.fit.theta[:size]
     search.degrees[found.name] = Degree(1)
     fit = search.fitted(found.effects, theta)
-    if not fit.usable or not search.predicts_held_out(fit.theta):
+    possible = fit.usable and search.predicts_held_out(fit.theta)
+    if possible:
+        search.seen.note(found.effects, fit, search.problem.weight)
+    if not (possible and found.is_likelier):
         search.degrees[found.name] = Degree()
         return
-    search.seen.note(found.effects, fit, search.problem.weight)
-    if found.is_likelier:
-        search.take(fit, found.effects)
-        search.choose_degrees()
-        search.take(search.fit, found.effects)
-        _support(search)
-    else:
-        search.degrees[found.name] = Degree()
+    search.take(fit, found.effects)
+    search.choose_degrees()
+    search.take(search.fit, found.effects)
+    _support(search)
 
 
 def _support(search: Search) -> None:

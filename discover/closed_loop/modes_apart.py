@@ -38,7 +38,9 @@ def modes_apart(
         Of the data, as the model of the search has them.
     """
     before = search.model
-    declared = replace(before.declared, by_mode=tuple(names))
+    # one declared mode has another beside it that was found, or known
+    added = 1 if len(before.declared.modulus) == 1 else 0
+    declared = replace(before.declared, by_mode=tuple(names), added_modes=added)
     active = [effect_of(before, name) for name in search.active]
     model = AugmentedModel(declared, active, scales)
     places = places_in(before, model, search.active)

@@ -77,7 +77,27 @@ def test_one_mobility_of_both_modes_stays_one():
     assert {stage.effect for stage in result.stages} == {"relaxation_mode", "giesekus_mobility"}
     assert not result.differing_by_mode
     mobility = next(s for s in result.stages if s.effect == "giesekus_mobility")
-    assert mobility.parameters["alpha"].value == pytest.approx(0.3, rel=0.05)
+    alpha = mobility.parameters["alpha"]
+    assert alpha.value == pytest.approx(0.3, rel=0.05)
+    # what the runs say of each mode is told beside it
+    for mode in alpha.modes:
+        low, high = mode.ci95
+        assert low - 0.5 * (high - low) <= 0.3 <= high + 0.5 * (high - low)
+
+
+@pytest.mark.slow
+def test_mobilities_that_differ_by_less_than_evidence_tells_are_in_the_intervals():
+    # one mobility leaves noise, and that of the fast mode is outside of its interval
+    first, second = 0.3, 0.37
+    result = loop((first, second))
+    assert result.verdict == "effects_added"
+    alpha = result.by_mode["giesekus_mobility"]
+    for mode, mobility in zip(alpha.modes, (first, second), strict=True):
+        low, high = mode.ci95
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+    if not alpha.degree:
+        low, high = alpha.ci95_given_effects
+        assert not low < second < high
 
 
 def test_a_structure_that_is_there_is_named_beside_two_modes():
