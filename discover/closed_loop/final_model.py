@@ -191,6 +191,8 @@ def declared_law(
         Constants of the law that differ from mode to mode.
     """
     law = declared.law_with(fit.theta[2 : 2 + len(declared.free_parameters)])
+    if by_mode and declared.added_modes:
+        return None  # one of the modes is that of an effect
     try:
         named, terms = law_parts(law)
         if by_mode:

@@ -38,17 +38,13 @@ def modes_apart(
         Of the data, as the model of the search has them.
     """
     before = search.model
-    declared = replace(before.declared, by_mode=tuple(names))
+    # one declared mode has another beside it that was found, or known
+    added = 1 if len(before.declared.modulus) == 1 else 0
+    declared = replace(before.declared, by_mode=tuple(names), added_modes=added)
     active = [effect_of(before, name) for name in search.active]
     model = AugmentedModel(declared, active, scales)
-    places = _places(before, model, search.active)
-    prior = search.prior
-    kept = [i for i, at in enumerate(prior.positions) if at in places]
-    known = Prior(
-        tuple(places[prior.positions[i]] for i in kept),
-        tuple(prior.mean[i] for i in kept),
-        tuple(prior.weight[i] for i in kept),
-    )
+    places = places_in(before, model, search.active)
+    known = prior_in(search.prior, places)
     problem = FitProblem(model, search.batch, 1, known)
     start = model.zero()
     start[[*places.values()]] = search.fit.theta[[*places]]
@@ -63,8 +59,18 @@ def modes_apart(
     return constants_by_mode(model, search.batch, fit, bounds, alike, freer)
 
 
-def _places(before: AugmentedModel, model: AugmentedModel, active: Sequence[str]) -> dict[int, int]:
-    """Return where each parameter of a model stands in one with constants by mode."""
+def places_in(
+    before: AugmentedModel, model: AugmentedModel, active: Sequence[str]
+) -> dict[int, int]:
+    """Return where each parameter of a model stands in one with constants by mode.
+
+    Parameters
+    ----------
+    before, model
+        The two models.
+    active
+        Effects whose parameters are asked for, beside those of the declared model.
+    """
     first = 2 + len(before.declared.free_parameters)
     places = {at: at for at in range(first)}
     for name in [*(known.name for known in before.declared.effects), *active]:
@@ -72,3 +78,13 @@ def _places(before: AugmentedModel, model: AugmentedModel, active: Sequence[str]
     instants = range(before.instants.start, before.instants.stop)
     places |= dict(zip(instants, range(model.instants.start, model.instants.stop), strict=True))
     return places
+
+
+def prior_in(prior: Prior, places: Mapping[int, int]) -> Prior:
+    """Return what is known of parameters where they stand at other places."""
+    kept = [i for i, at in enumerate(prior.positions) if at in places]
+    return Prior(
+        tuple(places[prior.positions[i]] for i in kept),
+        tuple(prior.mean[i] for i in kept),
+        tuple(prior.weight[i] for i in kept),
+    )

@@ -4,6 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from discover.closed_loop.added_mode_apart import (
+    LawByMode,
+    has_second_mode,
+    law_by_mode_instead,
+    start_from,
+)
 from discover.closed_loop.candidates import admission
 from discover.closed_loop.explanations import Carried, search_and_carry
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
@@ -88,7 +94,8 @@ class SearchTask:
         once more beside what was found, and another is searched beside and taken if that is
         likelier. Where what was found does not explain the runs, its constants may differ from mode
         to mode: that is searched once more too, and taken on strong evidence. Where it does, what
-        it leaves open of each mode's constant is looked at beside it.
+        it leaves open of each mode's constant is looked at beside it. Where it found the second
+        mode of a fluid, laws by mode are asked in the place of what it found beside.
 
         Parameters
         ----------
@@ -102,7 +109,10 @@ class SearchTask:
         """
         if self.silent:
             return self._from(declared, (), self.name)
-        return self._with_modes_apart(self._with_law(declared, laws))
+        first = self._with_law(declared, laws)
+        if len(declared.modulus) > 1:
+            return self._with_modes_apart(first)
+        return self._with_added_mode_apart(first)
 
     def _with_law(self, declared: DeclaredModel, laws: Sequence[str]) -> SearchResult:
         if not laws:
@@ -122,23 +132,36 @@ class SearchTask:
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:
         declared, search = first.declared, first.search
-        names = [p.name for p in declared.free_parameters]
-        names += [
-            name for name in search.active if may_differ_by_mode(effect_of(search.model, name))
-        ]
-        alike = len(declared.modulus) < 2 or declared.by_mode
-        if alike or not names:
+        names = _may_differ(search)
+        if declared.by_mode or not names:
             return first
-        if search.explained:
-            self.say(f"what the runs say of {', '.join(names)} in each mode")
-            found = modes_apart(search, names, data_scales(self.fitted))
-            if all(max(one.evidence) <= INDISTINGUISHABLE for one in found.values()):
-                return replace(first, by_mode=found)
+        if search.explained and (found := self._alike(search, names)) is not None:
+            return replace(first, by_mode=found)
         self.say(f"constants that may differ from mode to mode: {', '.join(names)}")
         apart = replace(declared, by_mode=tuple(names))
         again = self._from(apart, first.laws, f"{self.name}_by_mode")
         differ = any(one.degree for one in again.search.degrees.values())
         return again if differ and _is_likelier(again.search, search, INDISTINGUISHABLE) else first
+
+    def _with_added_mode_apart(self, first: SearchResult) -> SearchResult:
+        search = first.search
+        found = law_by_mode_instead(search, self.max_effects, data_scales(self.fitted))
+        names = _may_differ(search)
+        if found is None:
+            told = search.explained and names and has_second_mode(search)
+            by_mode = self._alike(search, names) if told else None
+            return replace(first, by_mode=by_mode or {})
+        self.say(f"{found.name} may differ from mode to mode, beside {', '.join(found.effects)}")
+        name = f"{self.name}_by_mode"
+        again = self._from(found.model.declared, first.laws, name, instead=(search, found))
+        return first if _is_likelier(search, again.search, INDISTINGUISHABLE) else again
+
+    def _alike(self, search: Search, names: list[str]) -> dict[str, ConstantByMode] | None:
+        """Return what runs say of each mode's constants; None where these differ."""
+        self.say(f"what the runs say of {', '.join(names)} in each mode")
+        found = modes_apart(search, names, data_scales(self.fitted))
+        alike = all(max(one.evidence) <= INDISTINGUISHABLE for one in found.values())
+        return found if alike else None
 
     def one_degree_more(self, before: SearchResult) -> SearchResult | None:
         """Search once more with constants by mode of one degree more; None where there is none.
@@ -170,6 +193,7 @@ class SearchTask:
         laws: tuple[LawFit, ...],
         name: str,
         least: Mapping[str, int] | None = None,
+        instead: tuple[Search, LawByMode] | None = None,
     ) -> SearchResult:
         # of one mode nothing can differ from another's
         asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
@@ -195,10 +219,20 @@ class SearchTask:
             self.say(f"going on from what was kept: {', '.join(search.active)}")
         else:
             self.say(f"declared model on {len(self.fitted)} runs")
-            search.start()
-            find_instrument_effects(search, self.fitted, self.max_effects, self.say)
+            search.start(by_mode=instead is None)
+            if instead is None:
+                find_instrument_effects(search, self.fitted, self.max_effects, self.say)
+            else:
+                start_from(search, *instead)
         carried = search_and_carry(search, self.max_effects, self.width, self.say)
         return SearchResult(declared, laws, search, carried)
+
+
+def _may_differ(search: Search) -> list[str]:
+    """Return the constants of a finished search that may differ from mode to mode."""
+    names = [p.name for p in search.model.declared.free_parameters]
+    found = (name for name in search.active if may_differ_by_mode(effect_of(search.model, name)))
+    return [*names, *found]
 
 
 def _is_likelier(search: Search, other: Search, by: float = BARE_MENTION) -> bool:

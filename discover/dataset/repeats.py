@@ -16,6 +16,15 @@ _SAME = 0.02
 
 _FEWEST_SAMPLES = 10
 
+_SHARED = 0.5
+"""Share of the longer run that both must cover for their difference to tell an error of all of it,
+or for their rates to be held against each other there alone."""
+
+_LARGEST = 0.1
+"""Relative error of one run above which two do not differ by their loading: fillings and trimmings
+of one sample differ by some per cent, and what differs by more, as a run told in minutes does, may
+not excuse what a law leaves of all others."""
+
 # What a source counts or sums up of a record, and no condition of the test
 _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_sequence_s")
 
@@ -27,7 +36,7 @@ class Repeats:
     Attributes
     ----------
     groups
-        Names of the runs of each test that was repeated.
+        Names of the runs of each test that was repeated, of those whose difference counts.
     error
         Relative error of one run: root-mean-square of the difference of two, over √2 and over that
         of the record; of several tests the root-mean-square.
@@ -40,8 +49,33 @@ class Repeats:
 def repeats_among(runs: Sequence[Run]) -> Repeats | None:
     """Return which runs repeat one another and by how much they differ; None where none does.
 
-    Two runs are one test if their rates agree over the time that both cover, and so does every
-    number that the source gives of their conditions.
+    Of runs of one test (`repeated_tests`) those tell their error that cover half of each other, and
+    differ by no more than loadings do.
+
+    Parameters
+    ----------
+    runs
+        As in `repeated_tests`.
+    """
+    named = {run.name: run for run in runs}
+    groups, squares = [], []
+    for group in repeated_tests(runs):
+        pairs = combinations([named[name] for name in group], 2)
+        told = {(one.name, other.name): _difference(one, other) for one, other in pairs}
+        told = {pair: error for pair, error in told.items() if error <= _LARGEST}
+        if told:
+            among = {name for pair in told for name in pair}
+            groups.append(tuple(name for name in group if name in among))
+            squares.append(np.mean(np.square([*told.values()])))
+    return Repeats(tuple(groups), float(np.sqrt(np.mean(squares)))) if groups else None
+
+
+def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
+    """Return the names of the runs of each test that was repeated.
+
+    Two runs are one test if their rates agree, and so does every number that the source gives of
+    their conditions. The rates have to agree over all of the longer run, where the shorter would go
+    on as it was told, or over the time that both cover if that is half of it.
 
     Parameters
     ----------
@@ -60,15 +94,7 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
             groups.append([run])
         else:
             group.append(run)
-    found = [group for group in groups if len(group) > 1]
-    if not found:
-        return None
-    squares = [
-        np.mean([_difference(one, other) ** 2 for one, other in combinations(group, 2)])
-        for group in found
-    ]
-    names = tuple(tuple(run.name for run in group) for group in found)
-    return Repeats(names, float(np.sqrt(np.mean(squares))))
+    return tuple(tuple(run.name for run in group) for group in groups if len(group) > 1)
 
 
 def count_flows(runs: Sequence[Run]) -> int:
@@ -82,8 +108,7 @@ def count_flows(runs: Sequence[Run]) -> int:
         Runs; one that is there several times, with other quantities, counts once.
     """
     named = [*{run.name: run for run in runs}.values()]
-    repeats = repeats_among(named)
-    again = 0 if repeats is None else sum(len(group) - 1 for group in repeats.groups)
+    again = sum(len(group) - 1 for group in repeated_tests(named))
     states = sum(len(run) - 1 for run in named if run.protocol.control in STATES)
     return len(named) - again + states
 
@@ -101,8 +126,17 @@ def _same_test(one: Run, other: Run) -> bool:
     times = _common_times(one, other)
     if times is None:
         return False
+    longer = max((one, other), key=lambda run: run.time[-1])
+    if _share(one, other, times) < _SHARED:
+        times = np.append(times, longer.time[longer.time > times[-1]])
     rates = shear_rates(one.protocol, times), shear_rates(other.protocol, times)
     return bool(np.max(np.abs(rates[0] - rates[1])) <= _SAME * np.max(np.abs(rates[0])))
+
+
+def _share(one: Run, other: Run, times: np.ndarray) -> float:
+    """Return how much of the longer of two runs some times cover."""
+    longest = max(run.time[-1] - run.time[0] for run in (one, other))
+    return float((times[-1] - times[0]) / longest)
 
 
 def _alike(one: object, other: object) -> bool:
@@ -119,9 +153,10 @@ def _common_times(one: Run, other: Run) -> np.ndarray | None:
 
 
 def _difference(one: Run, other: Run) -> float:
+    """Return the relative error of one of two runs; infinite where they share too little."""
     times = _common_times(one, other)
-    if times is None:
-        return 0.0
+    if times is None or _share(one, other, times) < _SHARED:
+        return float("inf")
     records = [PchipInterpolator(run.time, run.recorded)(times) for run in (one, other)]
     size = float(np.sqrt(np.mean(np.square(records)))) or 1.0
     return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import AbstractEffect
+from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.batches import (
     Batch,
     MixedBatch,
@@ -27,7 +27,7 @@ from discover.forward.batches import (
     SteadyBatch,
     StressBatch,
 )
-from discover.forward.by_mode import LARGEST
+from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
 
@@ -78,6 +78,7 @@ class AugmentedModel:
                 declared.fit_modulus,
                 tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
                 declared.step_instants,
+                declared.added_modes,
             )
         )
         self.slices, self.size = self._program.slices, self._program.size
@@ -163,6 +164,33 @@ class AugmentedModel:
         """Return the positions of what varies a constant by mode; none where it is no such one."""
         at = self.declared.by_mode_slices.get(name, slice(0))
         return list(range(at.start or 0, at.stop))
+
+    @property
+    def adding_modes(self) -> list[str]:
+        """Names of the effects whose modes have constants by mode of their own."""
+        if not self.declared.added_modes:
+            return []
+        return [effect.name for effect in self.effects if isinstance(effect, ModeEffect)]
+
+    def mode_times(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " k"]:
+        """Return the times in s of the modes that have constants by mode, added ones last."""
+        return np.append(self.declared.relaxation_time * np.exp(theta[1]), self._added_times(theta))
+
+    def mode_places(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " k"]:
+        """Return log10(λ/λ̄) of these modes; see `decades`."""
+        modulus, times = jnp.asarray(self.declared.modulus), self.declared.relaxation_time
+        places = np.asarray(decades(modulus, jnp.asarray(times)))
+        added = self._added_times(theta)
+        if not added:
+            return places
+        scaled = jnp.asarray(times * np.exp(theta[1]))
+        return np.append(places, decades(modulus, scaled, jnp.asarray(added), beyond=True))
+
+    def _added_times(self, theta: np.ndarray) -> list[float]:
+        adding = [effect for effect in self.effects if effect.name in self.adding_modes]
+        at = {e: jnp.asarray(theta[self.positions(e.name)]) for e in adding}
+        modes = (e.mode(values) for e, values in at.items() if isinstance(e, ModeEffect))
+        return [float(time) for _, time in modes]
 
     def constant(self, name: str) -> tuple[FreeParameter, int]:
         """Return a constant by mode, of the law or the amplitude of an effect, and its position."""

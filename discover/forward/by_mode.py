@@ -15,6 +15,7 @@ def decades(
     modulus: Float[Array, " k"],
     relaxation_time: Float[Array, " k"],
     of: Float[Array, " m"] | None = None,
+    beyond: bool = False,
 ) -> Float[Array, " m"]:
     """Return log10(λ/λ̄), with λ̄ the geometric mean of the times by viscosity.
 
@@ -25,10 +26,15 @@ def decades(
     of
         Times in s; by default the declared ones. Beyond these the end counts, for a polynomial says
         nothing there.
+    beyond
+        Whether times beyond the declared ones count as they are: of modes by which a polynomial is
+        told, too.
     """
     own = jnp.log10(relaxation_time)
     viscosity = modulus * relaxation_time
-    asked = own if of is None else jnp.clip(jnp.log10(of), jnp.min(own), jnp.max(own))
+    asked = own if of is None else jnp.log10(of)
+    if not beyond:
+        asked = jnp.clip(asked, jnp.min(own), jnp.max(own))
     return asked - jnp.sum(viscosity * own) / jnp.sum(viscosity)
 
 

@@ -58,6 +58,9 @@ class DeclaredModel:
     by_mode
         Free parameters of the law, and effects by the amplitude of their term, that may differ from
         mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
+    added_modes
+        How many modes beside the declared ones, which effects add, have constants by mode of their
+        own; without, these have the constants of the declared spectrum at their times.
 
     Raises
     ------
@@ -79,6 +82,7 @@ class DeclaredModel:
     by_mode: tuple[str, ...] = ()
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
     step_instants: int = 0
+    added_modes: int = 0
 
     def __post_init__(self):
         for name in ("modulus", "relaxation_time"):
@@ -93,7 +97,7 @@ class DeclaredModel:
             )
         for name in self.by_mode:
             self._require_by_mode(name)
-        if self.by_mode and len(self.modulus) < 2:
+        if self.by_mode and self.n_modes < 2:
             raise InputError(
                 "by_mode lets constants differ from one relaxation mode to the next, and the "
                 'declared model has one mode. Give several (modes = "lve"), or leave by_mode out.'
@@ -195,12 +199,17 @@ class DeclaredModel:
         return LAWS[self.law_name].build(*known.values())
 
     @property
+    def n_modes(self) -> int:
+        """How many modes have constants of their own, where constants differ by mode."""
+        return len(self.modulus) + self.added_modes
+
+    @property
     def by_mode_slices(self) -> dict[str, slice]:
         """Where, after the law's free parameters, each constant by mode has what varies it.
 
         First the coefficients of a polynomial, then the deviation of each mode from it.
         """
-        start, each = 2 + len(self.free_parameters), DEGREE + len(self.modulus)
+        start, each = 2 + len(self.free_parameters), DEGREE + self.n_modes
         return {
             name: slice(start + i * each, start + (i + 1) * each)
             for i, name in enumerate(self.by_mode)
@@ -209,7 +218,7 @@ class DeclaredModel:
     @property
     def size(self) -> int:
         """How many places of the parameter vector are the declared law's."""
-        return 2 + len(self.free_parameters) + len(self.by_mode) * (DEGREE + len(self.modulus))
+        return 2 + len(self.free_parameters) + len(self.by_mode) * (DEGREE + self.n_modes)
 
     @property
     def free_positions(self) -> list[int]:

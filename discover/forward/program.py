@@ -68,6 +68,8 @@ class Structure(NamedTuple):
     """Constants that may differ from mode to mode, and where what varies them begins and ends."""
     step_instants: int = 0
     """How many instants of steps of the rate are fitted, each as a share of its interval."""
+    added_modes: int = 0
+    """How many modes that effects add have constants by mode of their own."""
 
 
 class Program:
@@ -336,8 +338,10 @@ class Program:
         if self._varying_law or self._varying_effects:
             places = decades(numbers.modulus, numbers.relaxation_time)
             if extra is not None:
-                declared = numbers.modulus, numbers.relaxation_time
-                places = jnp.append(places, decades(*declared, of=extra.relaxation_time))
+                own = self.structure.added_modes > 0
+                times = numbers.relaxation_time * (jnp.exp(theta[1]) if own else 1.0)
+                added_at = decades(numbers.modulus, times, extra.relaxation_time, beyond=own)
+                places = jnp.append(places, added_at)
         law = self._law(theta, numbers, places)
         if extra is not None and not self._varying_law:
             every = jnp.append(numbers.relaxation_time, extra.relaxation_time)

@@ -58,6 +58,6 @@ def told_beyond_a_polynomial(
     told = np.flatnonzero(is_told(half_widths_alone(model, batch, fit, name)))
     if len(told) <= DEGREE + 1:
         return ()
-    order = told[np.argsort(model.declared.relaxation_time[told])]
+    order = told[np.argsort(model.mode_times(fit.theta)[told])]
     held = {int(order[0]), int(order[len(order) // 2]), int(order[-1])}
     return tuple(int(mode) for mode in told if int(mode) not in held)

@@ -45,7 +45,7 @@ def constants_by_mode(
         From `freer_fits`.
     """
     found = {}
-    times = model.declared.relaxation_time * np.exp(fit.theta[1])
+    times = model.mode_times(fit.theta)
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
         low, high, half = constant.band(batch, fit, of)

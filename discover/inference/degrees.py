@@ -77,13 +77,19 @@ def one_degree_more(model: AugmentedModel, degrees: Mapping[str, Degree]) -> dic
         Degree of each constant by mode.
     """
     highest = _highest(model)
-    top = FREE if highest < len(model.declared.modulus) - 1 else highest
+    top = FREE if highest < model.declared.n_modes - 1 else highest
     more = {name: min(found.degree + 1, top) for name, found in degrees.items()}
     return more if any(more[n] > found.degree for n, found in degrees.items()) else {}
 
 
+def has_added_mode(model: AugmentedModel, free: Sequence[int]) -> bool:
+    """Return whether modes with constants by mode of their own are fitted, or known."""
+    known = {one.name for one in model.declared.effects}
+    return any(name in known or model.positions(name)[0] in free for name in model.adding_modes)
+
+
 def _highest(model: AugmentedModel) -> int:
-    return min(DEGREE, len(model.declared.modulus) - 1)
+    return min(DEGREE, model.declared.n_modes - 1)
 
 
 def lowest_not_refuted(
@@ -134,8 +140,9 @@ def choose_degrees(
     least = least or {}
     model, chosen = problem.model, dict(degrees)
     alone = replace(problem, n_candidates=1)  # a degree is not chosen among the candidates
-    # an effect that is not in the model has no amplitude to vary
-    waiting = [name for name in chosen if model.constant(name)[1] not in fit.free]
+    # an effect that is not in the model has no amplitude to vary, and one mode alone no other
+    alone_in_it = len(model.declared.modulus) < 2 and not has_added_mode(model, fit.free)
+    waiting = [n for n in chosen if alone_in_it or model.constant(n)[1] not in fit.free]
     highest = _highest(model)
     for name in chosen:
         if name in waiting:

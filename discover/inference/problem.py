@@ -67,6 +67,8 @@ class FitProblem:
         """Return a fit's parameters with effects at zero, and those still free without them."""
         model = self.model
         own = [p for name in effects for p in (*model.positions(name), *model.varying(name))]
+        if set(effects) & set(model.adding_modes):  # one mode is left, and nothing to vary from
+            own += [p for name in model.declared.by_mode for p in model.varying(name)]
         theta = fit.theta.copy()
         theta[own] = model.zero()[own]
         return theta, tuple(p for p in fit.free if p not in own)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades, link_slope
+from discover.forward.by_mode import DEGREE, constants_of_modes, link_slope
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, uncertainty
 from discover.inference.alone import told_beyond_a_polynomial
 from discover.inference.degrees import FREE, Degree
@@ -111,8 +111,7 @@ def varying_constants(
 ) -> dict[str, VaryingConstant]:
     """Return the constants by mode that a fit has."""
     declared, found = model.declared, {}
-    modulus, time = jnp.asarray(declared.modulus), jnp.asarray(declared.relaxation_time)
-    places = np.asarray(decades(modulus, time))
+    places = model.mode_places(fit.theta)
     for name in degrees:
         law, at = model.constant(name)
         if at in fit.free:

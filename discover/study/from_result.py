@@ -2,13 +2,14 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import KnownEffect, known_effects, make_effect
+from discover.effects import KnownEffect, ModeEffect, known_effects, make_effect
 from discover.equations import Equation
 from discover.equations.json_format import equation_from_json
 from discover.equations.read import COMPARISON, LOOP, read_json
@@ -134,10 +135,37 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
         )
     equation = equation_from_json(declared["law"], f"{file.name}: declared.law")
     rows = [*declared.get("effects", ()), *content["stages"]]
+    equation, rows = _with_added_modes(equation, rows, file)
     effects, of_modes = _effects(rows, file, len(equation.modulus))
     text = _text(file, "the loop's declared law", equation, effects, of_modes)
     doubt = " With them the loop did not explain its data." if unexplained else ""
     return EarlierResult(file, equation, effects, of_modes, text + doubt)
+
+
+def _with_added_modes(
+    equation: Equation, rows: list[Any], file: Path
+) -> tuple[Equation, list[Any]]:
+    """Return a law and its effects, modes among these with the law's where they have constants."""
+    try:
+        counts = {
+            len(p["modes"]) for row in rows for p in row["parameters"].values() if p.get("degree")
+        }
+        adding = [row for row in rows if isinstance(make_effect(row["effect"]), ModeEffect)]
+        if not adding or counts != {len(equation.modulus) + len(adding)}:
+            return equation, rows
+        modes = [[float(p["value"]) for p in row["parameters"].values()] for row in adding]
+    except (TypeError, KeyError, ValueError, AttributeError, InputError):
+        raise _damaged(file) from None
+    pairs = [
+        make_effect(row["effect"]).mode(jnp.asarray(values))  # pyright: ignore
+        for row, values in zip(adding, modes, strict=True)
+    ]
+    whole = replace(
+        equation,
+        modulus=(*equation.modulus, *(float(g) for g, _ in pairs)),
+        relaxation_time=(*equation.relaxation_time, *(float(t) for _, t in pairs)),
+    )
+    return whole, [row for row in rows if row not in adding]
 
 
 def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, start_up
+from independent import Giesekus, oscillation, start_up
 
 import discover as dc
-from discover.dataset.repeats import repeats_among
+from discover.dataset.repeats import count_flows, repeated_tests, repeats_among
 
 TIMES = np.linspace(0.05, 8.0, 60)
 
@@ -57,3 +57,35 @@ def test_another_history_is_no_repeat_and_a_count_of_the_source_is_no_condition(
     assert repeats_among([first, record("b", n_points=400.0)]) is not None
     assert repeats_among([first, replace(record("b"), strain_before=10.0)]) is None
     assert repeats_among([]) is None
+
+
+def waving(name, times):
+    rates = 2.0 * np.cos(times)
+    stress = Giesekus(0.3).respond(oscillation(2.0, 1.0), times).sigma12
+    return dc.Run(name, times, dc.protocols.oscillatory_shear(2.0, 1.0), rates, stress)
+
+
+def test_runs_that_only_begin_alike_are_no_repeat():
+    # a start-up whose times were told in minutes ends before the wave has left its first rate
+    short = replace(record("a"), time=TIMES / 60.0)
+    assert repeated_tests([short, waving("wave", TIMES)]) == ()
+    assert count_flows([short, waving("wave", TIMES)]) == 2
+
+
+def test_what_differs_by_more_than_loadings_do_excuses_nothing():
+    # in minutes, and longer: the same rate, and another time
+    minutes = replace(record("a", times=60.0 * TIMES), time=TIMES)
+    runs = [record("b"), minutes]
+    assert repeats_among(runs) is None
+    # it stays one flow, and other repeats tell their error
+    assert count_flows(runs) == 1
+    found = repeats_among([*runs, record("c", factor=1.03)])
+    assert found is not None
+    assert found.groups == (("b", "c"),)
+    assert found.error == pytest.approx(0.03 / np.sqrt(2.0), rel=0.03)
+
+
+def test_a_run_that_ends_early_is_the_same_flow_and_tells_little():
+    early = record("b", factor=1.03, times=np.linspace(0.05, 1.0, 20))
+    assert repeated_tests([record("a"), early]) == (("a", "b"),)
+    assert repeats_among([record("a"), early]) is None

@@ -15,7 +15,7 @@ import numpy as np
 from discover.closed_loop.judging.held_out import unseen_rows
 from discover.closed_loop.judging.judgement import Judgement
 from discover.dataset import Run
-from discover.dataset.repeats import repeats_among
+from discover.dataset.repeats import repeated_tests
 from discover.forward.least_squares import Fit
 from discover.inference.problem import FitProblem
 from discover.protocols.kinematics import STATES
@@ -119,9 +119,8 @@ def leave_out_in_turn(problem: FitProblem, fit: Fit, runs: Sequence[Run]) -> lis
 
 def _groups(runs: Sequence[Run]) -> list[list[int]]:
     """Return the rows of the runs that are left out together."""
-    repeats = repeats_among(list(runs))
     first = {}
-    for group in () if repeats is None else repeats.groups:
+    for group in repeated_tests(list(runs)):
         first |= dict.fromkeys(group, group[0])
     groups: dict[str, list[int]] = {}
     for i, run in enumerate(runs):

@@ -18,7 +18,7 @@ from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import NO_PRIOR, Fit, Prior
-from discover.inference.degrees import choose_degrees, positions_of
+from discover.inference.degrees import choose_degrees, has_added_mode, positions_of
 from discover.inference.evidence import BARE_MENTION
 from discover.inference.problem import FitProblem
 
@@ -107,6 +107,8 @@ class CurrentModel(SearchState):
         """Return what is fitted with these effects, constants by mode as chosen."""
         own = [position for name in active for position in self.model.positions(name)]
         fitted = [*self.model.free_positions, *own]
+        if self.model.adding_modes and not has_added_mode(self.model, fitted):
+            return fitted
         present = {
             name: found
             for name, found in self.degrees.items()
@@ -218,7 +220,7 @@ class CurrentModel(SearchState):
         self.seen.explored.add(tuple(sorted(others)))
         for choice in choices:
             theta, name = choice.fit.theta, choice.candidate.effect
-            if not self._predictable(theta):
+            if not self.predicts_held_out(theta):
                 continue
             reason = at_an_end(self.model, theta, [name])
             if reason and (choice.candidate.evidence or 0.0) > BARE_MENTION:
@@ -228,7 +230,8 @@ class CurrentModel(SearchState):
                 self.seen.note([*others, name], choice.fit, np.asarray(self.batch.weight))
         return possible
 
-    def _predictable(self, theta: np.ndarray) -> bool:
+    def predicts_held_out(self, theta: np.ndarray) -> bool:
+        """Return whether a law can be integrated through the flows that were held out."""
         # flows are commanded before they are measured: a law that cannot be integrated through a
         # held-out flow is no law of this fluid, and saying so uses none of its stresses
         held = self.held_batch

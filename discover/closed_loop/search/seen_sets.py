@@ -74,6 +74,21 @@ class SeenSets:
         free = tuple(int(at) for at in fit.free)
         self._sets[name] = SeenSet(name, free, values, cost)
 
+    def take_over(self, other: "SeenSets", places: Mapping[int, int]) -> None:
+        """Keep the sets that were fitted in another model, which has parameters at other places.
+
+        Parameters
+        ----------
+        other
+            The sets.
+        places
+            Where each parameter of that model stands in this one.
+        """
+        for one in other:
+            moved = tuple(places[at] for at in one.free)
+            self._sets[one.effects] = SeenSet(one.effects, moved, one.values, one.cost)
+        self.explored |= other.explored
+
     def to_json(self) -> dict[str, Any]:
         """Return the sets as JSON."""
         return {"sets": [vars(one) for one in self], "explored": sorted(self.explored)}
