@@ -119,7 +119,8 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
         raise InputError(
             f"[model] from: in the loop of {file} {', '.join(map(str, declared['by_mode']))} "
             "differs from one relaxation mode to the next, and the file does not have the law of "
-            f"each mode: it was written by an earlier version. {_AGAIN}"
+            "each mode: an earlier version wrote it, or the loop added a mode beside a law with "
+            f"constants of its own. {_AGAIN} If that does not help, declare both modes."
         )
     if declared.get("law") is None:
         raise InputError(
