@@ -167,7 +167,7 @@ def start_from(search: Search, before: Search, found: LawByMode) -> None:
     theta = model.zero()
     theta[[*places.values()]] = before.fit.theta[[*places]]
     search.take(search.fitted(before.active, theta), before.active)
-    _support(search)
+    search.weigh_each_effect()
     theta, size = model.zero(), model.declared.size
     places = places_in(found.model, model, found.effects)
     theta[[*places.values()]] = found.fit.theta[[*places]]
@@ -183,17 +183,7 @@ def start_from(search: Search, before: Search, found: LawByMode) -> None:
     search.take(fit, found.effects)
     search.choose_degrees()
     search.take(search.fit, found.effects)
-    _support(search)
-
-
-def _support(search: Search) -> None:
-    """Tell what speaks for each effect of a search's model, and nothing of what it could be."""
-    effective = search.problem.independent_samples(search.fit)
-    for name in search.active:
-        without = search.without(name)
-        gain = search.problem.evidence(without, search.fit, effective) if without.usable else 0.0
-        search.support[name] = gain
-        search.aliases.setdefault(name, ())
+    search.weigh_each_effect()
 
 
 def _laws(search: Search) -> list[str]:

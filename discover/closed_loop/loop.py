@@ -260,9 +260,9 @@ def _remaining(
         "worst_run": judgement.worst.name,
         "worst_run_error": float(judgement.worst.errors[-1]),
         "description": _with_refusals(judgement, search),
-        # of what explains nothing no interval is claimed
         "read_as": judgement.read_as,
         "advice": left.advice,
+        # of what explains nothing no interval is claimed
         "read_otherwise": "" if judgement.structured else constants.misread_said,
         "step_instants": instants_found(
             final.model, final.fit, constants.bounds, final.fitted, final.held_out

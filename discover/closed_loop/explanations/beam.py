@@ -123,12 +123,7 @@ def turn_to_likelier(search: Search, carried: Sequence[Carried]) -> bool:
     if not part and np.mean(left_out_errors(problem, best.fit)) >= search.left_out:
         return False
     search.take(best.fit, best.effects)
-    effective = problem.independent_samples(best.fit)
-    for name in best.effects:
-        without = search.without(name)
-        gain = problem.evidence(without, best.fit, effective) if without.usable else 0.0
-        search.support[name] = gain
-        search.aliases.setdefault(name, ())
+    search.weigh_each_effect()
     search.rounds = 0
     return True
 

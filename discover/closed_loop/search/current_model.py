@@ -210,6 +210,15 @@ class CurrentModel(SearchState):
         self.fit_path()
         self.leave_out()
 
+    def weigh_each_effect(self) -> None:
+        """Tell the evidence for each effect that was taken; aliases were asked for none of them."""
+        effective = self.problem.independent_samples(self.fit)
+        for name in self.active:
+            without = self.without(name)
+            gain = self.problem.evidence(without, self.fit, effective) if without.usable else 0.0
+            self.support[name] = gain
+            self.aliases.setdefault(name, ())
+
     def possible(self, choices: Sequence[Choice], others: Sequence[str]) -> list[Choice]:
         """Return the choices that a fluid or an instrument can be, and that predict every flow.
 
