@@ -10,7 +10,12 @@ import numpy as np
 from jaxtyping import Array, Complex, Float, Int
 
 from discover.forward.dynamics import Dynamics
-from discover.simulate.exponential_runge_kutta import relax
+from discover.forward.half_cycles import (
+    HalfCycle,
+    counted_half_cycle,
+    first_harmonic,
+    half_cycle,
+)
 from discover.simulate.modified_newton import (
     FROM_REST,
     Approximation,
@@ -30,39 +35,8 @@ _STEP = 1e-6
 # Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
 _SHARE, _SECANT = 10.0, (0.2, 5.0)
 
-# Half a period later the flow is its own mirror image in the plane across it
-_MIRROR = (1.0, 1.0, 1.0, -1.0)
-
-
 # ωt at which what needs no steps is looked at: a stress beside the modes, a signal
 PHASE = np.linspace(0.0, np.pi, 161)
-
-
-class _Half(NamedTuple):
-    """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 on the way.
-
-    Attributes
-    ----------
-    recorded
-        Its first harmonic where steps are counted, shape (), else its values at step ends, (s,).
-    of_modes
-        These of each mode, where they are asked for, without the factor of the states, shape
-        (s, k).
-    """
-
-    stress: Float[Array, "s k"]
-    levels: tuple[Float[Array, "..."], ...]
-    left: tuple[Float[Array, "..."], ...]
-    recorded: Complex[Array, ""] | Float[Array, " s"]
-    of_modes: Float[Array, "s k"]
-
-
-class _Carry(NamedTuple):
-    """What a step changes: the modes, the levels, and what is left of each of these so far."""
-
-    stress: Float[Array, "s k"]
-    levels: list[Float[Array, "..."]]
-    left: list[Float[Array, "..."]]
 
 
 class _Iterate(NamedTuple):
@@ -108,9 +82,9 @@ def complex_modulus(
     beside
         Recorded stress beside the modes in Pa, of rates in 1/s.
     """
-    half = _counted_half_cycle(dynamics, frequency, steps)
+    half = counted_half_cycle(dynamics, frequency, steps)
 
-    def modulus(found: _Half, felt):
+    def modulus(found: HalfCycle, felt):
         rate = felt * frequency * jnp.cos(PHASE)
         return (found.recorded + first_harmonic(beside(rate), PHASE)) / felt
 
@@ -133,7 +107,7 @@ def complex_modulus(
         modes = first_approximation(found.stress, FROM_REST)
         return moved_to(now, found, modes, jnp.asarray(True))
 
-    def moved_to(now: _Iterate, found: _Half, modes: Approximation, better) -> _Iterate:
+    def moved_to(now: _Iterate, found: HalfCycle, modes: Approximation, better) -> _Iterate:
         levels = tuple(
             # what a cycle adds and leaves decides where a level comes to rest
             (after - left * before) / (1.0 - left)
@@ -156,7 +130,7 @@ def complex_modulus(
             change=jnp.where(jnp.all(better), jnp.max(jnp.stack(changes)), jnp.inf),
         )
 
-    def next_felt(now: _Iterate, found: _Half):
+    def next_felt(now: _Iterate, found: HalfCycle):
         """Return the next amplitude that the fluid feels, by the secant, and what it lacked."""
         if dynamics.series is None:
             return now.felt, now.lacking_before
@@ -239,8 +213,8 @@ def periodic_state(
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
-    solve = _half_cycle(fixed, wave, width, by_mode=True)
-    half = _half_cycle(dynamics, wave, width, by_mode=True)
+    solve = half_cycle(fixed, wave, width, by_mode=True)
+    half = half_cycle(dynamics, wave, width, by_mode=True)
     slowness = frequency * fixed.modes.relaxation_time
 
     def turned(now, unit):
@@ -298,24 +272,7 @@ def periodic_state(
     return PeriodicState(end.modes.stress + step, whole)
 
 
-def first_harmonic(
-    stress: Float[Array, " s"], phase: Float[Array | np.ndarray, " s"]
-) -> Complex[Array, ""]:
-    """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
-
-    Parameters
-    ----------
-    stress
-        In Pa over half a cycle, its ends included.
-    phase
-        ωt there, 0 to π, evenly spaced.
-    """
-    # of a periodic function the trapezoidal rule over a period is exact to all orders
-    share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
-    return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
-
-
-def _end_with_derivative(half, stress, levels, felt) -> tuple[_Half, Float[Array, "k s s"]]:
+def _end_with_derivative(half, stress, levels, felt) -> tuple[HalfCycle, Float[Array, "k s s"]]:
     """Return half a cycle, and of each mode the derivative of its end: direction, component."""
 
     def along(unit):
@@ -325,128 +282,3 @@ def _end_with_derivative(half, stress, levels, felt) -> tuple[_Half, Float[Array
 
     found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(stress)))
     return found, jnp.moveaxis(tangents, 2, 0)
-
-
-def _half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
-    """Return the function from state and strain amplitude to what half a cycle makes of them.
-
-    Parameters
-    ----------
-    dynamics
-        The fluid.
-    wave
-        Rate over strain amplitude at step ends and middles in turn.
-    width
-        Of a step in s.
-    by_mode
-        Whether stresses of each mode are asked for too.
-    """
-    step, begun = _step(dynamics, width, 1 if by_mode else 4)
-
-    def of_modes(stress):
-        return stress[3] * dynamics.modes.modulus if by_mode else jnp.zeros(0)
-
-    def half(stress, levels, amplitude) -> _Half:
-        rate = amplitude * wave
-
-        def taken(carry: _Carry, rates):
-            carry, recorded = step(carry, rates)
-            return carry, (recorded, of_modes(carry.stress))
-
-        start, first = begun(stress, levels, rate[0])
-        end, (recorded, each) = jax.lax.scan(taken, start, (rate[:-2:2], rate[1::2], rate[2::2]))
-        recorded = jnp.concatenate([first[None], recorded])
-        each = jnp.concatenate([of_modes(stress)[None], each])
-        return _Half(_mirrored(dynamics, end), tuple(end.levels), tuple(end.left), recorded, each)
-
-    return half
-
-
-def _counted_half_cycle(dynamics: Dynamics, frequency, steps):
-    """Return the function from state and strain amplitude to what half a cycle makes of them.
-
-    In as many steps as are asked for when it runs: no derivative goes backwards through it.
-    """
-    turn = jnp.pi / steps
-    step, begun = _step(dynamics, turn / frequency, 4)
-
-    def half(stress, levels, amplitude) -> _Half:
-        def rate(number):
-            return amplitude * frequency * jnp.cos(turn * number)
-
-        def taken(number, state):
-            carry, harmonic = state
-            carry, recorded = step(carry, (rate(number), rate(number + 0.5), rate(number + 1.0)))
-            share = jnp.where(number + 1 == steps, 0.5, 1.0) / steps
-            return carry, harmonic + _of_harmonic(recorded, turn * (number + 1.0), share)
-
-        start, first = begun(stress, levels, rate(0.0))
-        harmonic = _of_harmonic(first, 0.0, 0.5 / steps)
-        end, harmonic = jax.lax.fori_loop(0, steps, taken, (start, harmonic))
-        whole = jax.lax.complex(*harmonic)
-        return _Half(
-            _mirrored(dynamics, end), tuple(end.levels), tuple(end.left), whole, jnp.zeros(0)
-        )
-
-    return half
-
-
-def _of_harmonic(stress, phase, share) -> Float[Array, "2"]:
-    """Return what a stress at ωt adds to the two parts of the first harmonic."""
-    return 2.0 * share * stress * jnp.stack([jnp.sin(phase), jnp.cos(phase)])
-
-
-def _mirrored(dynamics: Dynamics, end: _Carry) -> Float[Array, "s k"]:
-    """Return the modes at the end of half a cycle as its mirror image begins with them."""
-    tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
-    mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
-    return mirror * end.stress
-
-
-def _step(dynamics: Dynamics, width, unroll: int):
-    """Return the functions that take one step, and that begin with the first.
-
-    A step is of rates at its beginning, middle and end, and comes with σ12 at its end.
-    """
-    combined = dynamics.combined
-    weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
-
-    def relaxed(levels, rate, stress, share):
-        pairs = [e.source_and_decay(v, rate, stress) for e, v in dynamics.states.items()]
-        after = [
-            relax(source, decay, level, share * width)
-            for (source, decay), level in zip(pairs, levels, strict=True)
-        ]
-        return after, [jnp.exp(-decay * share * width) for _, decay in pairs]
-
-    def sheared(stress, rate):
-        return dynamics.sheared(stress, rate, None)[0]
-
-    def begun(stress, levels, rate) -> tuple[_Carry, Float[Array, ""]]:
-        recorded = combined("modulus_factor", levels) * sheared(stress, rate)
-        return _Carry(stress, list(levels), [jnp.ones_like(level) for level in levels]), recorded
-
-    def step(carry: _Carry, rates) -> tuple[_Carry, Float[Array, ""]]:
-        stress, levels, left = carry
-        first, middle, last = rates
-        before = combined("modulus_factor", levels) * sheared(stress, middle)
-        halfway, _ = relaxed(levels, middle, before, 0.5)
-        at_end, _ = relaxed(levels, middle, before, 1.0)
-        slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
-        w = dynamics.weights_of_step(weights, width, slow[1])
-
-        def stage(stress, given):
-            rate, now = given
-            change = slow[1] * dynamics.change(stress, rate, now, None)
-            return w.remainder(stress, change, dynamics.decay), ()
-
-        felt = jnp.stack([first, middle, middle, last])
-        factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
-        stress, _ = w.step(stress, stage, (felt, factors), unroll)
-        after = combined("modulus_factor", at_end) * sheared(stress, middle)
-        levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
-        left = [a * b for a, b in zip(left, kept, strict=True)]
-        recorded = combined("modulus_factor", levels) * sheared(stress, last)
-        return _Carry(stress, levels, left), recorded
-
-    return step, begun
