@@ -16,7 +16,8 @@ from hostile_fluids_records import FLOWS, GIESEKUS, SCALE
 from independent import Giesekus
 from independent.noise import rms
 
-from discover.statistics.misread import CLEAR, POSSIBLE, Misread, Reading, misread
+from discover.statistics.misread import CLEAR, POSSIBLE, Misread, misread
+from discover.statistics.reading_faults import Reading
 
 MOBILITY, STEP = GIESEKUS.mobility, 1e-3
 HELD_OUT = "held.csv"

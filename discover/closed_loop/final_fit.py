@@ -35,7 +35,8 @@ from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
 from discover.inference.readings import fitted_readings, unseen_readings
 from discover.inference.varying_constant import freer_fits
-from discover.statistics.misread import Misread, Reading, not_ruled_out
+from discover.statistics.misread import Misread, not_ruled_out
+from discover.statistics.reading_faults import Reading
 
 
 @dataclass(frozen=True)

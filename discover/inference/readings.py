@@ -9,8 +9,8 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts
-from discover.statistics.misread import Reading
 from discover.statistics.outliers import stray
+from discover.statistics.reading_faults import Reading
 
 _STEP = 1e-2  # relative, of a modulus
 

@@ -8,19 +8,13 @@ known, but for one number a run, what it does to a record; and a law is one for 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import f as fisher
 
-from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.reading_faults import KINDS, Fault, FaultKind, Reading, Session, rms
 from discover.statistics.residual import Expectation
-
-Misreading = Literal["factor", "zero", "growth", "above", "below", "modes"]
-"""A factor, a zero or a factor that grows in time, of each run; a factor above or below a level;
-and a factor on the modulus of each mode, of a spectrum that was told wrong."""
 
 CLEAR = 1e-4
 """Probability up to which a fault is believed: of right laws in white noise one in a thousand has a
@@ -30,14 +24,8 @@ POSSIBLE = 0.1
 """Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
 right laws in white noise one in twenty-five, in noise correlated to 0.9 one in five."""
 
-_LEVELS = 24
-_LOWEST, _HIGHEST = 0.05, 0.95
-"""Share of the samples that has to lie on either side of a level."""
-
-_FEWEST = 8  # samples of a run that has a say
-
 _RANGES = "measure one flow in both ranges of the transducer"
-_ADVICE: dict[Misreading, str] = {
+_ADVICE: dict[FaultKind, str] = {
     "factor": "filling, temperature or rate may have differed from run to run: repeat a run, or "
     "fit those of one loading alone",
     "zero": "read the zero before and after each run",
@@ -47,60 +35,6 @@ _ADVICE: dict[Misreading, str] = {
     "below": _RANGES,
     "modes": "measure the linear moduli again, on the same sample",
 }
-
-_ROUNDING = 1e-12
-
-_SEEN = 1e-2
-"""Of what a fault does, that constants of the law leave of it at least where they do not do it."""
-
-
-@dataclass(frozen=True)
-class Reading:
-    """A run as a law predicts it, in one unit.
-
-    Attributes
-    ----------
-    times
-        Of the samples in s, shape (n,); they only number states.
-    predicted, residual
-        Of the law, and that minus the record, shape (n,).
-    columns
-        Changes of the prediction along constants that were fitted, shape (constants, n).
-    even
-        By what they are multiplied so that noise has one size, shape (n,); by nothing by default.
-    control
-        What was controlled, as a protocol says it.
-    modes
-        Change of the prediction per relative change of each modulus; None where they are not asked.
-    shared
-        Changes of the prediction by errors that all runs share, of unit variance each: those that a
-        sweep leaves of the moduli. None without any.
-    """
-
-    times: Float[np.ndarray, " n"]
-    predicted: Float[np.ndarray, " n"]
-    residual: Float[np.ndarray, " n"]
-    columns: Float[np.ndarray, "constants n"]
-    even: Float[np.ndarray, " n"] | None = None
-    control: str = "rate"
-    modes: Float[np.ndarray, "modes n"] | None = None
-    shared: Float[np.ndarray, "errors n"] | None = None
-
-    @property
-    def has_zero(self) -> bool:
-        """Whether it has a zero that may be set wrong, and a course in time."""
-        return self.control == "rate"
-
-    @property
-    def has_level(self) -> bool:
-        """Whether it is a stress that a transducer read sample by sample."""
-        return self.control in ("rate", "steady")
-
-    @property
-    def weight(self) -> Float[np.ndarray, " n"]:
-        """What makes its noise one of the size of the record."""
-        even = np.ones(len(self.times)) if self.even is None else self.even
-        return even / (_rms(even * (self.predicted - self.residual)) or 1.0)
 
 
 @dataclass(frozen=True)
@@ -130,7 +64,7 @@ class Misread:
         Whether the probability allows for what a sweep leaves open of the moduli.
     """
 
-    kind: Misreading
+    kind: FaultKind
     sizes: tuple[float, ...]
     level: float
     probability: float
@@ -160,12 +94,10 @@ def misread(runs: Sequence[Reading]) -> Misread | None:
     runs
         Fitted, or not; of one of fewer than eight samples nothing is asked.
     """
-    runs = [run for run in runs if len(run.times) >= _FEWEST and np.any(run.predicted)]
-    rows = [row for run in runs for row in (run.predicted, run.residual, run.columns)]
-    if not runs or not all(np.all(np.isfinite(row)) for row in rows):
+    session = Session(runs)
+    if not session.is_told:
         return None
-    problem = _Problem(runs)
-    found = [one for kind in get_args(Misreading) if (one := problem.best(kind)) is not None]
+    found = [one for kind in KINDS if (one := _likeliest(session, kind)) is not None]
     return min(found, key=lambda one: one.probability, default=None)
 
 
@@ -227,123 +159,43 @@ def not_ruled_out(found: Misread) -> str:
     )
 
 
-class _Problem:
-    def __init__(self, runs: Sequence[Reading]):
-        self._runs = runs
-        self._weights = [run.weight for run in runs]
-        ends = np.cumsum([0, *(len(run.times) for run in runs)])
-        self._rows = [np.arange(low, high) for low, high in pairwise(ends)]
-        pairs = list(zip(runs, self._weights, strict=True))
-        self._residual = np.concatenate([weight * run.residual for run, weight in pairs])
-        self._predicted = np.concatenate([weight * run.predicted for run, weight in pairs])
-        self._columns = np.concatenate([weight * run.columns for run, weight in pairs], axis=1)
-        self._modes, self._shared = (
-            None if any(rows is None for rows in every) else self._together(every)
-            for every in ([run.modes for run in runs], [run.shared for run in runs])
-        )
-
-    def _together(self, every) -> Float[np.ndarray, "k m"]:
-        pairs = zip(every, self._weights, strict=True)
-        return np.concatenate([weight * rows for rows, weight in pairs], axis=1)
-
-    def best(self, kind: Misreading) -> Misread | None:
-        """Return the likeliest fault of a kind; None where there is none of it."""
-        if kind in ("above", "below"):
-            return self._of_level(kind)
-        if kind == "modes":  # of one the factor is a modulus
-            if self._modes is None or len(self._modes) < 2:
-                return None
-            return self._told(kind, self._modes, self._columns, 0.0, 1)
-        asked = [i for i, run in enumerate(self._runs) if kind == "factor" or run.has_zero]
-        own = np.zeros((len(asked), len(self._residual)))
-        for column, i in zip(own, asked, strict=True):
-            run, rows = self._runs[i], self._rows[i]
-            shape = {
-                "factor": run.predicted,
-                "zero": np.full(len(run.times), _rms(run.predicted)),
-                "growth": run.predicted * run.times / run.times[-1],
-            }[kind]
-            column[rows] = self._weights[i] * shape
-        beside = self._columns
-        if kind == "factor":  # one that all runs share is a modulus, and no fault of theirs
-            beside = np.vstack([beside, self._predicted])
-        return self._told(kind, own, beside, 0.0, 1) if len(own) else None
-
-    def _of_level(self, kind: Misreading) -> Misread | None:
-        runs = [i for i, run in enumerate(self._runs) if run.has_level]
-        if not runs:
-            return None
-        size = np.full(len(self._residual), np.nan)
-        for i in runs:
-            size[self._rows[i]] = np.abs(self._runs[i].predicted)
-        known = size[np.isfinite(size)]
-        levels = np.unique(np.quantile(known, np.linspace(_LOWEST, _HIGHEST, _LEVELS)))
-        found = []
-        for level in levels:
-            with np.errstate(invalid="ignore"):
-                beyond = size > level if kind == "above" else size <= level
-            own = (self._predicted * beyond)[None]
-            found.append(self._told(kind, own, self._columns, float(level), len(levels)))
-        told = [one for one in found if one is not None]
-        return min(told, key=lambda one: one.probability, default=None)
-
-    def _told(
-        self, kind: Misreading, own: np.ndarray, beside: np.ndarray, level: float, tried: int
-    ) -> Misread | None:
-        # constants of the law may do the same, in part or wholly
-        free = _without(beside.T, own.T)
-        left, seen, turned = np.linalg.svd(free, full_matrices=False)
-        kept = seen > _SEEN * np.max(np.linalg.norm(own, axis=1), initial=0.0)
-        if not np.all(np.isfinite(free)) or not np.any(kept):
-            return None
-        free = left[:, kept]
-        before = _without(beside.T, self._residual)
-        values = -(free.T @ before)
-        after = before + free @ values
-        covariance, _, noise = least_squares_covariance(
-            free, after, self._rows, None if self._shared is None else self._shared.T
-        )
-        count = len(values)
-        freedom = max(noise.effective_samples - count - len(beside), 1.0)
-        variance, axes = np.linalg.eigh(covariance)
-        # of data without noise there is none
-        variance = np.maximum(variance, max(_ROUNDING * float(variance[-1]), 1e-300))
-        wald = float(np.sum((axes.T @ values) ** 2 / variance)) / count
-        chance = float(fisher.sf(wald, count, freedom))
-        worth = 0.5 * noise.effective_samples
-        gain = worth * np.log(float(before @ before) / max(float(after @ after), 1e-300))
-        sizes = (turned[kept].T / seen[kept]) @ values
-        change = own.T @ sizes
-        steps = -np.linalg.lstsq(beside.T, change, rcond=1e-9)[0]
-        changes = [
-            change[rows] / weight for rows, weight in zip(self._rows, self._weights, strict=True)
-        ]
-        if kind == "zero":
-            sizes = sizes * [_rms(run.predicted) for run in self._runs if run.has_zero]
-        relative = [
-            _rms(one) / _rms(run.predicted) for one, run in zip(changes, self._runs, strict=True)
-        ]
-        return Misread(
-            kind,
-            tuple(map(float, sizes)),
-            level,
-            min(1.0, len(get_args(Misreading)) * tried * chance),
-            float(gain),
-            steps[: len(self._columns)],
-            changes,
-            float(np.mean(relative)),
-            self._shared is not None and len(self._shared) > 0,
-        )
+def _likeliest(session: Session, kind: FaultKind) -> Misread | None:
+    """Return the likeliest fault of a kind; None where there is none of it."""
+    found = [_told(session, fault) for fault in session.faults(kind)]
+    told = [one for one in found if one is not None]
+    return min(told, key=lambda one: one.probability, default=None)
 
 
-def _without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
-    """Return what the columns cannot describe."""
-    norms = np.linalg.norm(columns, axis=0)
-    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
-    if not kept.shape[1]:
-        return values
-    return values - kept @ np.linalg.lstsq(kept, values, rcond=1e-9)[0]
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+def _told(session: Session, fault: Fault) -> Misread | None:
+    beside = session.columns
+    if fault.kind == "factor":  # one that all runs share is a modulus, and no fault of theirs
+        beside = np.vstack([beside, session.predicted])
+    one = session.estimate(fault.own, beside)
+    if one is None:
+        return None
+    count = len(one.values)
+    freedom = max(one.effective_samples - count - len(beside), 1.0)
+    wald = float(one.values @ np.linalg.solve(one.covariance, one.values)) / count
+    chance = float(fisher.sf(wald, count, freedom))
+    gain = 0.5 * one.effective_samples * np.log(one.before / max(one.after, 1e-300))
+    sizes = np.linalg.pinv(one.seen) @ one.values
+    change = fault.own.T @ sizes
+    steps = -np.linalg.lstsq(beside.T, change, rcond=1e-9)[0]
+    runs = session.runs
+    changes = [
+        change[rows] / weight for rows, weight in zip(session.rows, session.weights, strict=True)
+    ]
+    relative = [rms(one) / rms(run.predicted) for one, run in zip(changes, runs, strict=True)]
+    if fault.kind == "zero":
+        sizes = sizes * [rms(run.predicted) for run in runs if run.has_zero]
+    return Misread(
+        fault.kind,
+        tuple(map(float, sizes)),
+        fault.level,
+        min(1.0, len(KINDS) * fault.tried * chance),
+        float(gain),
+        steps[: len(session.columns)],
+        changes,
+        float(np.mean(relative)),
+        session.shared is not None and len(session.shared) > 0,
+    )

@@ -60,7 +60,7 @@ def test_runs_as_the_model_has_them_are_explained(exact):
     assert loop.remaining["read_as"] == loop.remaining["advice"] == ""
     low, high = loop.stages[0].parameters["alpha"].ci95
     assert low < 0.3 < high
-    assert high - low < 0.006  # no wider than noise alone makes it
+    assert high - low < 0.012  # noise alone makes it 0.004 wide, and an inexact instrument 0.010
 
 
 def test_noise_that_is_given_may_hold_another_reading(exact):

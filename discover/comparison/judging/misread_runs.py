@@ -22,7 +22,6 @@ from discover.statistics import root_of
 from discover.statistics.misread import (
     POSSIBLE,
     Misread,
-    Reading,
     advice,
     clear_misreading,
     misread,
@@ -30,6 +29,7 @@ from discover.statistics.misread import (
     reads,
 )
 from discover.statistics.outliers import stray
+from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import Expectation
 
 
@@ -81,7 +81,7 @@ def _described_better(
     """Return how else the records were read if a law describes them clearly better so."""
     flows = sorted(flows, key=lambda flow: flow.kind != "training")
     # directions of a band hold errors of the moduli too, which here are no free constants
-    runs = [] if law is None or law.inner else _of_flows(law, flows)
+    runs = [] if law is None or law.inner else readings_of(law, flows)
     if not runs:
         told = runs_as_predicted(explanation, name, outcome, flows, bands)
         runs = [_reading(run, law) for run in told]
@@ -96,6 +96,7 @@ def holding_misreading(
     chosen: LearnerOutcome,
     law: MovedLaw,
     flows: Sequence[Flow],
+    fitted: Sequence[Reading],
     expectation: Expectation,
 ) -> tuple[dict[str, LearnerOutcome], dict[str, PredictionBand], tuple[str, ...]]:
     """Return outcomes and bands that hold another reading of the runs too, and what is to be known.
@@ -114,13 +115,15 @@ def holding_misreading(
         The same law, with the constants that were fitted along.
     flows
         In which it is simulated.
+    fitted
+        The fitted runs as it predicts them.
     expectation
         What a complete law may leave.
     """
     as_it_is = dict(outcomes), dict(bands), ()
     if expectation.noise is not None:
         return as_it_is
-    found = misread(_of_flows(law, [flow for flow in flows if flow.kind == "training"]))
+    found = misread(fitted)
     if found is None or found.probability > POSSIBLE or not len(found.steps):
         return as_it_is
     if found.size <= least_seen(chosen):
@@ -134,8 +137,11 @@ def holding_misreading(
     return wider, bands_of_either(bands, predictions), (not_ruled_out(found),)
 
 
-def _of_flows(law: MovedLaw, flows: Sequence[Flow]) -> list[Reading]:
-    """Return runs as a law predicts them; none where it does not follow them all."""
+def readings_of(law: MovedLaw, flows: Sequence[Flow]) -> list[Reading]:
+    """Return runs as a law predicts them, one column for each of its constants.
+
+    None where it does not follow them all.
+    """
     told = [_of_law(law, flow) for flow in flows]
     runs = [run for run in told if run is not None]
     return runs if len(runs) == len(told) else []

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from discover.comparison.judging.constants_in_bands import law_with_fitted
 from discover.comparison.judging.filters_for_terms import holding_filters
-from discover.comparison.judging.misread_runs import holding_misreading
+from discover.comparison.judging.misread_runs import holding_misreading, readings_of
+from discover.comparison.judging.small_faults import holding_small_faults
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
@@ -23,6 +24,8 @@ def holding_other_records(
 ) -> tuple[dict[str, LearnerOutcome], dict[str, PredictionBand], tuple[str, ...]]:
     """Return outcomes and bands that hold behind a filter, and as read otherwise, and what is said.
 
+    They allow for faults of reading that are too small to be seen, too.
+
     Parameters
     ----------
     outcomes, bands, chosen, flows, expectation
@@ -32,6 +35,8 @@ def holding_other_records(
     """
     wider, bands, of_filters = holding_filters(outcomes, bands, chosen, model, flows)
     law = law_with_fitted(chosen, model, fitted)
-    seen = wider, bands, chosen, law, flows, expectation
-    wider, bands, of_readings = holding_misreading(*seen)
+    runs = readings_of(law, [flow for flow in flows if flow.kind == "training"])
+    seen = wider, bands, chosen, law, flows, runs
+    wider, bands, of_readings = holding_misreading(*seen, expectation)
+    wider, bands = holding_small_faults(wider, bands, law, flows, runs)
     return wider, bands, (*of_filters, *of_readings)
