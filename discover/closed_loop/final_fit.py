@@ -34,9 +34,11 @@ from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
 from discover.inference.readings import fitted_readings, unseen_readings
+from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.statistics.misread import Misread, not_ruled_out
 from discover.statistics.reading_faults import Reading
+from discover.statistics.small_faults import small_faults
 
 
 @dataclass(frozen=True)
@@ -237,12 +239,15 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     search, model, batch, fit = final.search, final.model, final.batch, final.fit
     bounds = intervals(model, batch, fit, final.shifts)
     profile = profiled(search.problem, fit, bounds, _constants(final))
-    bounds, otherwise = holding_misreading(profile.bounds, fit, final.fitted_readings, model)
+    small = small_faults(final.fitted_readings)
+    bounds = with_small_faults(profile.bounds, fit, model, small)
+    bounds, otherwise = holding_misreading(bounds, fit, final.fitted_readings, model)
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
     freer = freer_fits(model, batch, fit, search.degrees, search.prior)
-    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer)
+    beside = None if small is None else small.about_the_fit
+    by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer, beside)
     return FinalConstants(
         bounds, unknown, coarse, {**by_mode, **apart}, profile.possible, otherwise
     )

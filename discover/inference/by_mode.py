@@ -27,6 +27,7 @@ def constants_by_mode(
     bounds: Mapping[int, tuple[float, float]],
     degrees: Mapping[str, Degree],
     freer: Sequence[FreerFit],
+    beside: Float[np.ndarray, "free free"] | None = None,
 ) -> dict[str, ConstantByMode]:
     """Return the constants by mode of a final fit.
 
@@ -43,12 +44,14 @@ def constants_by_mode(
         Degree of each constant by mode.
     freer
         From `freer_fits`.
+    beside
+        Covariance of what was fitted that is no noise; None for none.
     """
     found = {}
     times = model.mode_times(fit.theta)
     for name, constant in varying_constants(model, fit, degrees).items():
         of = degrees[name]
-        low, high, half = constant.band(batch, fit, of)
+        low, high, half = constant.band(batch, fit, of, beside)
         mean = bounds[constant.at]
         for one in (one for one in freer if one.name == name):
             more = constant.band(batch, one.fit, one.degree)

@@ -47,6 +47,7 @@ def draw_constants(
     freer: Sequence[FreerFit],
     n_draws: int,
     seed: int = 0,
+    beside: Float[np.ndarray, "free free"] | None = None,
 ) -> ConstantsDrawn | None:
     """Return constants by mode drawn about a fit, on the scale of their link.
 
@@ -65,14 +66,16 @@ def draw_constants(
         About each fit.
     seed
         Of the draws.
+    beside
+        Covariance of what was fitted that is no noise; None for none. Freer fits are without it.
     """
     constants = varying_constants(problem.model, fit, degrees)
     if not constants:
         return None
-    fits = [(fit, dict(degrees))]
-    fits += [(one.fit, {**degrees, one.name: one.degree}) for one in freer]
+    fits = [(fit, dict(degrees), beside)]
+    fits += [(one.fit, {**degrees, one.name: one.degree}, None) for one in freer]
     rng = np.random.default_rng(seed)
-    groups = [_about(problem.batch, one, constants, of, n_draws, rng) for one, of in fits]
+    groups = [_about(problem.batch, *one, constants, n_draws, rng) for one in fits]
     drawn = [group for group in groups if group is not None]
     if len(drawn) < len(groups):
         return None
@@ -82,12 +85,14 @@ def draw_constants(
 def _about(
     batch: Batch,
     fit: Fit,
-    constants: Mapping[str, VaryingConstant],
     degrees: Mapping[str, Degree],
+    beside: Float[np.ndarray, "free free"] | None,
+    constants: Mapping[str, VaryingConstant],
     n_draws: int,
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "draws constants k"] | None:
     covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+    covariance = covariance if beside is None else covariance + beside
     # evenly along every axis, or the ends of a band of few draws would be a matter of luck
     even = norm.ppf(LatinHypercube(len(covariance), scramble=False, rng=rng).random(n_draws))
     moved = (quantile / _TWO_SIDED) * even @ root_of(covariance).T

@@ -86,7 +86,11 @@ class VaryingConstant:
         return gradient
 
     def band(
-        self, batch: Batch, fit: Fit, degree: Degree
+        self,
+        batch: Batch,
+        fit: Fit,
+        degree: Degree,
+        beside: Float[np.ndarray, "free free"] | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the 95 % interval of each mode, and half its width on the link's scale.
 
@@ -96,8 +100,11 @@ class VaryingConstant:
         ----------
         batch, fit, degree
             The fitted runs, the fit, and what of the constant is free in it.
+        beside
+            Covariance of what was fitted that is no noise; None for none.
         """
         covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
+        covariance = covariance if beside is None else covariance + beside
         gradient = self.gradient(fit, degree)
         half = np.full(len(self.places), np.inf)
         if gradient is not None:

@@ -39,6 +39,11 @@ class Allowance:
     steps: Float[np.ndarray, " q"]
     covariance: Float[np.ndarray, "q q"]
 
+    @property
+    def about_the_fit(self) -> Float[np.ndarray, "q q"]:
+        """Second moment of how far the constants move, where an interval stays about the fit."""
+        return self.covariance + np.outer(self.steps, self.steps)
+
     def holding(self, position: int, value: float, low: float, high: float) -> tuple[float, float]:
         """Return a 95 % interval of a constant that holds small faults too.
 

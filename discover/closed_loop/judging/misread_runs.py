@@ -1,8 +1,7 @@
 """A model that explains records only up to how each was read: in the verdict, and in constants.
 
 See `discover.statistics.misread`. A fault that describes the runs clearly better refutes the model.
-One that is not ruled out by the fitted runs moves the constants, whose intervals hold either, and
-they allow for faults that are too small to be seen.
+One that is not ruled out by the fitted runs moves the constants, whose intervals hold either.
 """
 
 from collections.abc import Sequence
@@ -24,7 +23,6 @@ from discover.statistics.misread import (
 )
 from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import STRUCTURE, Expectation
-from discover.statistics.small_faults import small_faults
 
 Bounds = dict[int, tuple[float, float]]
 
@@ -79,27 +77,17 @@ def judged_as_read(
 def holding_misreading(
     bounds: Bounds, fit: Fit, fitted: Sequence[Reading], model: AugmentedModel
 ) -> tuple[Bounds, Misread | None]:
-    """Return intervals that hold however the runs were read, and a fault that is not ruled out.
-
-    They allow for faults too small to be seen (`discover.statistics.small_faults`), and hold with
-    one that describes the runs better, though not clearly.
-    """
-    small, found = small_faults(fitted), misread(fitted)
-    if found is not None and (found.probability > POSSIBLE or not len(found.steps)):
-        found = None
+    """Return intervals that hold with a fault that is not ruled out too, and the fault."""
+    found = misread(fitted)
+    if found is None or found.probability > POSSIBLE or not len(found.steps):
+        return bounds, None
     wider = dict(bounds)
-    for i, position in enumerate(fit.free):
-        if position not in bounds:
+    for position, step in zip(fit.free, found.steps, strict=True):
+        if position not in bounds or not np.isfinite(step):
             continue
         low, high = bounds[position]
-        value = float(fit.theta[position])
-        if small is not None:
-            low, high = small.holding(i, value, low, high)
-        step = 0.0 if found is None else float(np.nan_to_num(found.steps[i]))
-        low = min(low, bounds[position][0] + step)
-        high = max(high, bounds[position][1] + step)
         wider[position] = (
-            max(low, float(model.low[position])),
-            min(high, float(model.high[position])),
+            max(low + min(float(step), 0.0), float(model.low[position])),
+            min(high + max(float(step), 0.0), float(model.high[position])),
         )
     return wider, found

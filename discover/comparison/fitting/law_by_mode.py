@@ -20,11 +20,13 @@ from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.readings import fitted_readings, unseen_readings
+from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 from discover.statistics.misread import Misread, clear_misreading
 from discover.statistics.residual import Expectation
+from discover.statistics.small_faults import small_faults
 from discover.study.declared_model import DeclaredModel
 
 _WITH_A_NAME = {"sigma.sigma": "giesekus_mobility", "tr(sigma)*sigma": "ptt_linear"}
@@ -198,7 +200,7 @@ def fit_laws_by_mode(
         return
     worth = _worth_of(sparse, problem, fitted, effective)
     while fit.usable:
-        constants, bands = _told(problem, fit, degrees, model, flows)
+        constants, bands = _told(problem, fit, degrees, fitted, model, flows)
         left = problem.lack_of_fit(fit, fitted, expectation)
         yield LawByMode(
             constants,
@@ -246,7 +248,7 @@ def coefficients_in_modes(
     fit, degrees = _fitted(problem, [*names])
     if not fit.usable:
         return None
-    constants, bands = _told(problem, fit, degrees, model, flows)
+    constants, bands = _told(problem, fit, degrees, fitted, model, flows)
     if set(constants) != set(names):
         return None
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
@@ -277,6 +279,7 @@ def _told(
     problem: FitProblem,
     fit: Fit,
     degrees: Mapping[str, Degree],
+    fitted: Sequence[Run],
     model: DeclaredModel,
     flows: Sequence[Flow],
 ) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
@@ -284,8 +287,11 @@ def _told(
     forward = problem.model
     freer = freer_fits(forward, problem.batch, fit, degrees)
     bounds = intervals(forward, problem.batch, fit)
-    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer)
-    drawn = draw_constants(problem, fit, degrees, freer, _DRAWS)
+    small = small_faults(fitted_readings(forward, problem.batch, fitted, fit))
+    beside = None if small is None else small.about_the_fit
+    bounds = with_small_faults(bounds, fit, forward, small)
+    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer, beside)
+    drawn = draw_constants(problem, fit, degrees, freer, _DRAWS, beside=beside)
     if drawn is None:
         return constants, {}
     found = (effect_of(forward, name) for name in drawn.names)
