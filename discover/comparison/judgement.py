@@ -154,9 +154,12 @@ def judge(
         tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
     of_records: tuple[str, ...] = ()
-    if chosen is not None and explanation.in_library and not (normal or frame.made):
-        seen = outcomes, tested.bands, chosen, frame.model, known.fitted, frame.flows
-        outcomes, bands, of_records = holding_other_records(*seen, expectation)
+    if chosen is not None and explanation.in_library and not normal:
+        law = law_with_fitted(chosen, frame.model, known.fitted)
+        seen = outcomes, tested.bands, chosen, law, frame.flows, expectation
+        outcomes, bands, of_records = holding_other_records(
+            *seen, corrected=bool(frame.made), computed=study.data.synthetic is not None
+        )
         tested = replace(tested, bands=bands)
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)

@@ -2,41 +2,45 @@
 
 from collections.abc import Mapping, Sequence
 
-from discover.comparison.judging.constants_in_bands import law_with_fitted
 from discover.comparison.judging.filters_for_terms import holding_filters
 from discover.comparison.judging.misread_runs import holding_misreading, readings_of
+from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.small_faults import holding_small_faults
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics.residual import Expectation
-from discover.study.declared_model import DeclaredModel
 
 
 def holding_other_records(
     outcomes: Mapping[str, LearnerOutcome],
     bands: Mapping[str, PredictionBand],
     chosen: LearnerOutcome,
-    model: DeclaredModel,
-    fitted: Sequence[str],
+    law: MovedLaw,
     flows: Sequence[Flow],
     expectation: Expectation,
+    *,
+    corrected: bool,
+    computed: bool,
 ) -> tuple[dict[str, LearnerOutcome], dict[str, PredictionBand], tuple[str, ...]]:
     """Return outcomes and bands that hold behind a filter, and as read otherwise, and what is said.
 
-    They allow for faults of reading that are too small to be seen, too.
-
     Parameters
     ----------
-    outcomes, bands, chosen, flows, expectation
+    outcomes, bands, chosen, law, flows, expectation
         As in `holding_filters` and `holding_misreading`.
-    model, fitted
-        The known part, and names of its constants that were fitted along.
+    corrected
+        Whether what a known instrument did is taken out of the records: no other one is asked for.
+    computed
+        Whether a law made the records: what no instrument read has no small faults of reading.
     """
-    wider, bands, of_filters = holding_filters(outcomes, bands, chosen, model, flows)
-    law = law_with_fitted(chosen, model, fitted)
-    runs = readings_of(law, [flow for flow in flows if flow.kind == "training"])
-    seen = wider, bands, chosen, law, flows, runs
-    wider, bands, of_readings = holding_misreading(*seen, expectation)
-    wider, bands = holding_small_faults(wider, bands, law, flows, runs)
-    return wider, bands, (*of_filters, *of_readings)
+    wider, held, said = dict(outcomes), dict(bands), ()
+    fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
+    if not corrected:
+        wider, held, of_filters = holding_filters(wider, held, chosen, law.declared, flows)
+        seen = wider, held, chosen, law, flows, fitted
+        wider, held, of_readings = holding_misreading(*seen, expectation)
+        said = (*of_filters, *of_readings)
+    if not computed:
+        wider, held = holding_small_faults(wider, held, law, flows, fitted)
+    return wider, held, said
