@@ -18,6 +18,7 @@ from independent.noise import rms
 
 from discover.statistics.misread import CLEAR, POSSIBLE, Misread, misread
 from discover.statistics.reading_faults import Reading
+from discover.statistics.small_faults import small_faults
 
 MOBILITY, STEP = GIESEKUS.mobility, 1e-3
 HELD_OUT = "held.csv"
@@ -45,8 +46,30 @@ SLOPES = {name: (_MORE[name] - _LESS[name]) / (2 * STEP) for name in FLOWS}
 FITTED = [name for name in FLOWS if name != HELD_OUT]
 
 
-def ask(records: Mapping[str, np.ndarray]) -> tuple[float, float, Misread, Misread]:
-    """Return the error of the mobility, half of its interval, and the faults of fitted and all."""
+FAULTS = {
+    "a range that reads more above 50 Pa": lambda stress, part, lot, size: (
+        stress * (1 + size * (np.abs(stress) > LEVEL))
+    ),
+    "a factor of each run": lambda stress, part, lot, size: (
+        stress * (1 + size * lot.standard_normal())
+    ),
+    "a zero of each run": lambda stress, part, lot, size: (
+        stress + size * rms(stress) * lot.standard_normal()
+    ),
+    "growth of each run": lambda stress, part, lot, size: (
+        stress * (1 + size * lot.standard_normal() * part)
+    ),
+}
+
+
+def ask(
+    records: Mapping[str, np.ndarray],
+) -> tuple[float, float, Misread, Misread, tuple[float, float]]:
+    """Return what is said of the mobility, to first order.
+
+    Its error and half of its interval for noise alone, the faults of the fitted runs and of all,
+    and the ends of the interval that allows for small faults, about the truth.
+    """
     left = np.concatenate([(records[n] - EXACT[n]) / rms(records[n]) for n in FITTED])
     slope = np.concatenate([SLOPES[n] / rms(records[n]) for n in FITTED])
     error = float(slope @ left / (slope @ slope))
@@ -56,11 +79,16 @@ def ask(records: Mapping[str, np.ndarray]) -> tuple[float, float, Misread, Misre
     for name, (_, times) in FLOWS.items():
         predicted = EXACT[name] + error * SLOPES[name]
         runs[name] = Reading(times, predicted, predicted - records[name], SLOPES[name][None])
-    fitted = misread([runs[name] for name in FITTED])
-    every = misread(list(runs.values()))
+    seen = [runs[name] for name in FITTED]
+    fitted, every, small = misread(seen), misread(list(runs.values())), small_faults(seen)
     assert fitted is not None
     assert every is not None
-    return error, half, fitted, every
+    assert small is not None
+    ends = small.holding(0, error, error - half, error + half)
+    if fitted.probability <= POSSIBLE:
+        moved = float(fitted.steps[0])
+        ends = min(ends[0], error - half + moved), max(ends[1], error + half + moved)
+    return error, half, fitted, every, ends
 
 
 def is_refuted(fitted: Misread, every: Misread) -> bool:
@@ -68,27 +96,29 @@ def is_refuted(fitted: Misread, every: Misread) -> bool:
     return 2 * min(fitted.probability, every.probability) <= CLEAR
 
 
-def of_a_range(size: float, draws: int) -> str:
-    """Return what is said where a range reads more by `size`, as a row of a table."""
-    refuted = wider = holds = far = 0
+def of_a_fault(kind: str, size: float, draws: int) -> str:
+    """Return what is said where a fault has a size, as a row of a table."""
+    refuted = by_noise = holds = far = 0
+    halves = []
     for seed in range(draws):
         lot = np.random.default_rng([seed, 9])
-        read = {n: EXACT[n] * (1 + size * (np.abs(EXACT[n]) > LEVEL)) for n in FLOWS}
-        noisy = {n: read[n] + 0.01 * rms(read[n]) * lot.standard_normal(len(read[n])) for n in read}
-        error, half, fitted, every = ask(noisy)
+        noisy = {}
+        for name, (_, times) in FLOWS.items():
+            read = FAULTS[kind](EXACT[name], times / times[-1], lot, size)
+            noisy[name] = read + 0.01 * rms(read) * lot.standard_normal(len(read))
+        error, half, fitted, every, (low, high) = ask(noisy)
         if is_refuted(fitted, every):
             refuted += 1
             continue
-        low, high = error - half, error + half
-        if fitted.probability <= POSSIBLE:
-            wider += 1
-            moved = float(fitted.steps[0])
-            low, high = min(low, low + moved), max(high, high + moved)
+        by_noise += abs(error) <= half
         holds += low <= 0.0 <= high
         far += abs(error) > 1.5 * (high - low)
+        halves.append((half / MOBILITY, 0.5 * (high - low) / MOBILITY))
     left = draws - refuted
+    alone, both = np.median(halves, axis=0) if halves else (np.nan, np.nan)
     return (
-        f"{size:.2%} | {refuted} of {draws} | {wider} | {left - wider} | {holds} of {left} | {far}"
+        f"{kind} | {size:.2%} | {refuted} of {draws} | {by_noise} of {left} | {alone:.2%} | "
+        f"{holds} of {left} | {both:.2%} | {far}"
     )
 
 
@@ -97,7 +127,7 @@ def of_noise(kind: str, draws: int) -> str:
     refuted = wider = 0
     for seed in range(draws):
         lot = np.random.default_rng([seed, 5])
-        _, _, fitted, every = ask({name: NOISES[kind](EXACT[name], lot) for name in FLOWS})
+        _, _, fitted, every, _ = ask({name: NOISES[kind](EXACT[name], lot) for name in FLOWS})
         refuted += is_refuted(fitted, every)
         wider += fitted.probability <= POSSIBLE
     return f"{kind} | {refuted} of {draws} | {wider}"
@@ -108,9 +138,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--draws", type=int, default=100)
     options = parser.parse_args()
-    print("reads more by | unexplained | wider | as before | holds | off by 3 half-widths")
-    for size in SIZES:
-        print(of_a_range(size, options.draws), flush=True)
+    print(
+        "fault | size | unexplained | interval for noise holds | half | interval holds | half | "
+        "off by 3 half-widths"
+    )
+    for kind in FAULTS:
+        for size in SIZES if kind == next(iter(FAULTS)) else SIZES[2::2]:
+            print(of_a_fault(kind, size, options.draws), flush=True)
     print("\nnoise | unexplained | wider")
     for kind in NOISES:
         print(of_noise(kind, options.draws), flush=True)
