@@ -47,7 +47,8 @@ def explanations_of(
     limits_of
         Other names of effects of a set, of which the records show only a limit.
     believed
-        Share of the probability that a set keeps; the rest is that of none of them.
+        Share of the probability that a set keeps, of twins the largest; the rest is that of none of
+        them.
     """
     classes = _classes(carried)
     best = min(unlisted, *(one.criterion for one in carried))
@@ -55,7 +56,7 @@ def explanations_of(
     weights = np.array([np.exp(-0.5 * (carried[c[0]].criterion - best)) for c in classes])
     none = unexplained_probability(judgement, effective_samples)
     shares = (1.0 - none) * weights / (np.sum(weights) + np.exp(-0.5 * (unlisted - best)))
-    shares = shares * [believed(carried[c[0]]) for c in classes]
+    shares = shares * [max(believed(carried[i]) for i in c) for c in classes]
     none = 1.0 - float(np.sum(shares))
     kinds = {effect.name: effect.kind for effect in model.effects}
     found = []

@@ -8,6 +8,7 @@ import numpy as np
 from discover.closed_loop.explanations.bands.mixture import mixed_bands
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.limits import names_of_limits
+from discover.closed_loop.explanations.nameless_terms import share_of_names
 from discover.closed_loop.explanations.probabilities import explanations_of
 from discover.closed_loop.explanations.untested import share_believed
 from discover.closed_loop.judging.before_after import errors_of, record_runs
@@ -60,7 +61,8 @@ def explain(
         return names_of_limits(model, batch, runs[0], one.fit, one.effects)
 
     def believed(one: Carried) -> float:
-        return share_believed(model, one.fit, one.effects, runs)
+        tested = share_believed(model, one.fit, one.effects, runs)
+        return tested * share_of_names(model, one.effects)
 
     return explanations_of(
         model, carried, errors, judgement, effective, unlisted, limits_of, believed
