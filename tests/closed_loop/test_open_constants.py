@@ -38,7 +38,8 @@ def test_with_its_normal_stress_both_are_told(tmp_path):
     found = constants(tmp_path, ["sigma12", "N1"])
     for (low, high), truth in zip(found, (MODULUS, TIME), strict=True):
         assert low < truth < high
-        assert high - low < 0.05 * truth
+        # a factor of 0.5 to 2 % of each of the two records is three times that of the modulus
+        assert high - low < 0.15 * truth
 
 
 @pytest.mark.slow

@@ -49,17 +49,17 @@ def deviation() -> float:
 def test_a_quiet_run_beside_loud_ones_is_explained_and_tells_as_much_as_it_can():
     loop = loop_on(Giesekus(MOBILITY, MODULUS, TIME))
     assert loop.verdict == "effects_added"
-    low, high = loop.stages[0].parameters["alpha"].ci95
-    assert low < MOBILITY < high
-    # 95 % of a normal distribution is 3.9 deviations wide; the noise is estimated, and not exactly
-    assert high - low < 6.0 * deviation()
+    alpha = loop.stages[0].parameters["alpha"]
+    assert alpha.ci95[0] < MOBILITY < alpha.ci95[1]
+    assert abs(alpha.value - MOBILITY) < 3.0 * deviation()
+    # how the one quiet run was read is known to 0.5 to 2 %, which is some 2 % of the mobility
+    assert alpha.ci95[1] - alpha.ci95[0] < 0.1 * MOBILITY
 
 
-def test_with_equal_weights_loud_runs_leave_a_pattern_in_the_quiet_one(monkeypatch):
+def test_with_equal_weights_loud_runs_move_the_constant(monkeypatch):
     monkeypatch.setattr(own_noise, "weights_by_noise", lambda *_: None)
     loop = loop_on(Giesekus(MOBILITY, MODULUS, TIME))
-    low, high = loop.stages[0].parameters["alpha"].ci95
-    assert loop.verdict == "unexplained" or high - low > 6.0 * deviation()
+    assert abs(loop.stages[0].parameters["alpha"].value - MOBILITY) > 0.5 * deviation()
 
 
 @dataclass(frozen=True)

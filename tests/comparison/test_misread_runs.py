@@ -7,8 +7,13 @@ import pytest
 from independent import Giesekus, oscillation, start_up
 
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.misread_runs import hold_against_misreading, holding_misreading
+from discover.comparison.judging.misread_runs import (
+    hold_against_misreading,
+    holding_misreading,
+    readings_of,
+)
 from discover.comparison.judging.moved_law import MovedLaw
+from discover.comparison.judging.small_faults import holding_small_faults
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
@@ -150,8 +155,9 @@ def held(drawn, model, change, seed):
     outcome, bands = predicted(drawn, flows, step)
     law = MovedLaw.of(outcome.terms, model)
     training = [flow for flow in flows if flow.kind == "training"]
+    fitted = readings_of(law, training)
     outcomes, _, said = holding_misreading(
-        {"tensor_sindy": outcome}, bands, outcome, law, training, Expectation()
+        {"tensor_sindy": outcome}, bands, outcome, law, training, fitted, Expectation()
     )
     return outcome.terms[0].ci95, outcomes["tensor_sindy"].terms[0].ci95, said
 
@@ -167,3 +173,25 @@ def test_intervals_of_runs_as_the_law_has_them_stay(drawn, model):
     before, after, said = held(drawn, model, lambda stress: stress, 0)
     assert after == before
     assert said == ()
+
+
+def test_interval_and_bands_allow_for_a_range_that_no_test_sees(drawn, model):
+    flows, step = told(drawn, lambda s: s * (1 + 0.005 * (np.abs(s) > 50.0)), 0)
+    outcome, bands = predicted(drawn, flows, step)
+    law = MovedLaw.of(outcome.terms, model)
+    fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
+    seen = {"tensor_sindy": outcome}, bands, law, flows
+    outcomes, wider = holding_small_faults(*seen, fitted)
+    low, high = outcomes["tensor_sindy"].terms[0].ci95
+    assert outcome.terms[0].ci95[1] < 0.3 < high
+    assert low > 0.28
+    for flow in flows:
+        truth = drawn[flow.name][0]
+        before, after = (
+            np.mean((band.rivals_low <= truth) & (truth <= band.rivals_high), axis=0)
+            for band in (bands[flow.key], wider[flow.key])
+        )
+        # of σ12, N1 and N2; where a wave crosses zero both have no width
+        assert np.all(before < 0.3)
+        assert np.all(after > 0.8)
+        assert max(wider[flow.key].widths().values()) < 0.08
