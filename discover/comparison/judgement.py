@@ -37,6 +37,7 @@ from discover.comparison.judging.modes_apart import (
     with_intervals_of_modes,
 )
 from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import (
     NextMeasurement,
@@ -133,11 +134,12 @@ def judge(
     expectation = expectation_of(study, known.before.model, repeats)
     at_first = explain(outcomes, flows, expectation, normal, repeats)
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
+    law = None if chosen is None else law_with_fitted(chosen, frame.model, known.fitted)
     is_silent = at_first.verdict == "no_signal"
     beside = _Beside((), None, ())
     if not is_silent:
         beside = _beside(study, known, library, chosen, frame, say)
-    tested = _tested(study, known, chosen, frame, outcomes, at_first, beside.rivals, seed)
+    tested = _tested(study, known, chosen, law, frame, outcomes, at_first, beside.rivals, seed)
     explanation = tested.explanation
     of_modes = OfModes()
     # of normal stresses that were fitted too a law by mode says nothing
@@ -154,8 +156,7 @@ def judge(
         tested = replace(tested, bands=wider)
     outcomes = with_other_coefficients(outcomes, tested.others)
     of_records: tuple[str, ...] = ()
-    if chosen is not None and explanation.in_library and not normal:
-        law = law_with_fitted(chosen, frame.model, known.fitted)
+    if chosen is not None and law is not None and explanation.in_library and not normal:
         seen = outcomes, tested.bands, chosen, law, frame.flows, expectation
         outcomes, bands, of_records = holding_other_records(
             *seen, corrected=bool(frame.made), computed=study.data.synthetic is not None
@@ -246,6 +247,7 @@ def _tested(
     study: Study,
     known: Known,
     chosen: LearnerOutcome | None,
+    law: MovedLaw | None,
     frame: Frame,
     outcomes: Mapping[str, LearnerOutcome],
     at_first: Explanation,
@@ -254,20 +256,19 @@ def _tested(
 ) -> _Tested:
     flows, normal = known.flows, study.compare.use_normal_stresses
     fluid, bands, others = frame.model.fluid, {}, []
-    if chosen is not None and at_first.in_library:
+    if chosen is not None and law is not None and at_first.in_library:
         # where a quantity is said to be determined, its band says how well
         keys = {flow.key for flow in flows if flow.kind in DRAWN}
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands take it that the law, or a rival, is the fluid's
         bands = bands_of_law(chosen, rivals, fluid, banded, seed)
-        bands = with_fitted_constants(bands, known.fitted, chosen, frame.model, frame.flows)
+        bands = with_fitted_constants(bands, law, frame.flows)
         others = other_constants(chosen.terms, frame.model)
         bands = bands if normal else with_other_gain(bands, others)
     seen = frame.bands(bands)
     explanation = hold_against_unseen(at_first, outcomes, flows, seen, at_first.expectation)
     if not frame.made:  # what a known instrument does is in the predictions already
         explanation = hold_against_late_answers(explanation, outcomes, flows, seen)
-        law = chosen and law_with_fitted(chosen, frame.model, known.fitted)
         explanation = hold_against_misreading(explanation, outcomes, flows, seen, law)
     if chosen is None or not explanation.in_library:
         return _Tested(explanation)

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 import discover as dc
-from discover.comparison.judging.constants_in_bands import with_fitted_constants
+from discover.comparison.judging.constants_in_bands import law_with_fitted, with_fitted_constants
 from discover.comparison.outcomes.flows import run_flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
@@ -63,7 +63,7 @@ def bands(maxwell, names, terms=()):
         columns = [shear(modulus, time, rate), first_difference(modulus, time, rate)]
         chosen = np.stack([*columns, np.zeros(80)], axis=-1)
         made[flow.key] = PredictionBand(TIMES, *[chosen] * 5, runaways=0.0)
-    return made, with_fitted_constants(made, names, found, declared, flows)
+    return made, with_fitted_constants(made, law_with_fitted(found, declared, names), flows)
 
 
 def test_a_law_without_terms_has_the_band_of_its_fitted_modulus_and_time(maxwell):
@@ -107,5 +107,5 @@ def test_no_band_stays_no_band(maxwell):
     declared = declared_fluid(dc.Fluid(dc.make_law("ucm"), modulus, time), data)
     flows = [run_flow(run, "training", StudyData(data, data, data.select([]))) for run in data]
     found = LearnerOutcome("tensor_sindy", (), 0.0, (np.zeros(0), np.zeros(0)))
-    kept = with_fitted_constants({key: nothing}, BOTH, found, declared, flows)
+    kept = with_fitted_constants({key: nothing}, law_with_fitted(found, declared, BOTH), flows)
     assert not np.any(np.isfinite(kept[key].high))

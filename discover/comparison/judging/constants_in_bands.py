@@ -22,11 +22,7 @@ _HALF_BAND = 1.96
 
 
 def with_fitted_constants(
-    bands: Mapping[str, PredictionBand],
-    names: Sequence[str],
-    chosen: LearnerOutcome,
-    declared: DeclaredModel,
-    flows: Sequence[Flow],
+    bands: Mapping[str, PredictionBand], law: MovedLaw, flows: Sequence[Flow]
 ) -> dict[str, PredictionBand]:
     """Return bands no narrower than what constants and coefficients together leave open.
 
@@ -36,20 +32,14 @@ def with_fitted_constants(
     ----------
     bands
         Of the sparse law, by the key of the flow.
-    names
-        Of the declared constants that were fitted: of the modes, or of the law.
-    chosen
-        The sparse learner's outcome.
-    declared
-        The known part, with the values that the constants ended with.
+    law
+        The same law, with the constants that were fitted along.
     flows
         The flows in which the law is simulated, those fitted among them.
     """
-    kept = constants_of(names, declared)
     training = [flow for flow in flows if flow.kind == "training"]
-    if not kept or not bands or not training:
+    if not law.names or not bands or not training:
         return dict(bands)
-    law = MovedLaw.of(chosen.terms, declared, kept)
     told = {flow.key: law.derivatives(flow) for flow in flows if flow.key in bands}
     told |= {flow.key: law.derivatives(flow) for flow in training if flow.key not in told}
     root = _root(training, told)

@@ -1,7 +1,8 @@
 """A law of terms whose coefficients, and constants of the known part, can be moved."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -23,9 +24,15 @@ _SHORTER = (1.0, 1e-2, 1e-4)
 _OF_MODULUS = 1e-2  # of a modulus; the stress at a given rate is linear in it
 
 
+Slopes = tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]]
+"""Predictions of σ12, N1 and N2 in a flow, and their derivatives in each of the values."""
+
+
 @dataclass(frozen=True)
 class MovedLaw:
     """The law found, with constants of the declared model and coefficients that can be moved.
+
+    What it predicts of a flow is kept, since one question after another is asked of it.
 
     Attributes
     ----------
@@ -43,6 +50,9 @@ class MovedLaw:
     terms: Mapping[str, float]
     inner: Mapping[str, float]
     names: tuple[str, ...]
+    _kept: dict[tuple[str, str], tuple[Flow, Any]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @classmethod
     def of(
@@ -73,19 +83,19 @@ class MovedLaw:
             found, known.modulus * modulus, known.relaxation_time * time, known.solvent_viscosity
         )
 
-    def derivatives(
-        self, flow: Flow
-    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]] | None:
+    def derivatives(self, flow: Flow) -> Slopes | None:
         """Return predictions in a flow and their derivatives; None where one runs away.
 
         With far shorter steps where it does: of a coefficient that is small, for fast flows.
         """
-        found = (self._derivatives(flow, shorter) for shorter in _SHORTER)
-        return next((one for one in found if one is not None), None)
 
-    def _derivatives(
-        self, flow: Flow, shorter: float
-    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "q n 3"]] | None:
+        def derive(flow: Flow) -> Slopes | None:
+            found = (self._derivatives(flow, shorter) for shorter in _SHORTER)
+            return next((one for one in found if one is not None), None)
+
+        return self._once("slopes", flow, derive)
+
+    def _derivatives(self, flow: Flow, shorter: float) -> Slopes | None:
         start = self.start
         rows, steps = [start], []
         for i, value in enumerate(start):
@@ -109,6 +119,17 @@ class MovedLaw:
 
     def of_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
         """Return the change of the record in a flow per relative change of each mode's modulus."""
+        return self._once("moduli", flow, self._moved_moduli)
+
+    def _once(self, what: str, flow: Flow, make: Callable[[Flow], Any]) -> Any:
+        """Return what is made of a flow, made once; another flow may have the same name."""
+        of, found = self._kept.get((what, flow.key), (None, None))
+        if of is not flow:
+            found = make(flow)
+            self._kept[what, flow.key] = flow, found
+        return found
+
+    def _moved_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
         fluid = self.fluid(self.start)
         modulus = np.asarray(fluid.modulus, dtype=float)
         others = [modulus, *(modulus * (1.0 + _OF_MODULUS * one) for one in np.eye(len(modulus)))]
