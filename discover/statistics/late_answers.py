@@ -17,6 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.stats import t as student
 
 from discover.statistics.independent_samples import independent_samples
+from discover.statistics.projection import rms, without
 from discover.statistics.residual import fast_part
 
 Late = Literal["delay", "lag", "mean_since", "mean_about"]
@@ -132,7 +133,7 @@ def late_answer(runs: Sequence[Response]) -> LateAnswer | None:
     if best is None or best.gain < _CLEAR:
         return None
     sizes = [
-        _rms(change) / (_rms(run.predicted) or 1.0)
+        rms(change) / (rms(run.predicted) or 1.0)
         for change, run in zip(best.changes, runs, strict=True)
     ]
     pairs = zip(best.changes, best.noise, strict=True)
@@ -154,7 +155,7 @@ def best_filter(runs: Sequence[Response], noise: Sequence[float] | None = None) 
     if not runs:
         return None
     if noise is None:
-        noise = [fast_part(run.residual) or 1e-3 * _rms(run.residual) or 1.0 for run in runs]
+        noise = [fast_part(run.residual) or 1e-3 * rms(run.residual) or 1.0 for run in runs]
     columns, residual = _stacked(runs, noise)
     shortest = min(float(np.median(np.diff(run.times))) for run in runs)
     longest = min(float(run.times[-1]) for run in runs)
@@ -164,14 +165,14 @@ def best_filter(runs: Sequence[Response], noise: Sequence[float] | None = None) 
         changes = [_changes(run, kind, times) for run in runs]
         for at in range(len(times)):
             own = [change[at] / one for change, one in zip(changes, noise, strict=True)]
-            left = _without(columns, residual + np.concatenate(own))
+            left = without(columns, residual + np.concatenate(own))
             after = float(left @ left)
             if best is None or after < best[0]:
                 best = after, kind, at, [change[at] for change in changes]
     assert best is not None
     after, kind, at, changes = best
     put = np.concatenate([change / one for change, one in zip(changes, noise, strict=True)])
-    free, left = _without(columns, residual), _without(columns, residual + put)
+    free, left = without(columns, residual), without(columns, residual + put)
     freedom = max(len(residual) - columns.shape[1] - 1, 1)
     scale = max(after / freedom, 1.0)
     return Filtered(
@@ -212,7 +213,7 @@ def _agreement(
     if len(told) < 2:
         return 1.0
     # sizes may by chance agree better than each is known
-    spread = max(float(np.std(told, ddof=1)), _rms(deviation[deviation < _SEEN]))
+    spread = max(float(np.std(told, ddof=1)), rms(deviation[deviation < _SEEN]))
     error = spread / np.sqrt(len(told))
     ratio = float(np.mean(told)) / max(error, np.finfo(float).tiny)
     return float(min(1.0, _SHAPES * student.sf(ratio, len(told) - 1)))
@@ -257,14 +258,3 @@ def _lagged(
         decay = np.exp(-step / widths)
         out[i + 1] = (out[i] - values[i] + widths * slope) * decay + values[i + 1] - widths * slope
     return out[::_FINE].T[:, len(known) - len(times) :]
-
-
-def _without(columns: Float[np.ndarray, "m q"], values: Float[np.ndarray, " m"]) -> np.ndarray:
-    """Return what the columns cannot describe."""
-    if not columns.shape[1]:
-        return values
-    return values - columns @ np.linalg.lstsq(columns, values, rcond=1e-8)[0]
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

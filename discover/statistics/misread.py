@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import f as fisher
 
-from discover.statistics.reading_faults import KINDS, Fault, FaultKind, Reading, Session, rms
+from discover.statistics.projection import rms
+from discover.statistics.reading_faults import KINDS, Fault, FaultKind, Reading, Session
 from discover.statistics.residual import Expectation
 
 CLEAR = 1e-4

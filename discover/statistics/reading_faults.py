@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.projection import rms, without
 
 FaultKind = Literal["factor", "zero", "growth", "above", "below", "modes"]
 """A factor, a zero or a factor that grows in time, of each run; a factor above or below a level;
@@ -216,13 +217,13 @@ class Session:
             What else changes the records.
         """
         # constants of the law may do the same, in part or wholly
-        free = _without(beside.T, own.T)
+        free = without(beside.T, own.T)
         left, seen, turned = np.linalg.svd(free, full_matrices=False)
         kept = seen > _SEEN * np.max(np.linalg.norm(own, axis=1), initial=0.0)
         if not np.all(np.isfinite(free)) or not np.any(kept):
             return None
         free = left[:, kept]
-        before = _without(beside.T, self.residual)
+        before = without(beside.T, self.residual)
         values = -(free.T @ before)
         after = before + free @ values
         shared = None if self.shared is None else self.shared.T
@@ -238,17 +239,3 @@ class Session:
             float(after @ after),
             noise.effective_samples,
         )
-
-
-def rms(values: np.ndarray) -> float:
-    """Return the root of the mean of the squares."""
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def _without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
-    """Return what the columns cannot describe."""
-    norms = np.linalg.norm(columns, axis=0)
-    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
-    if not kept.shape[1]:
-        return values
-    return values - kept @ np.linalg.lstsq(kept, values, rcond=1e-9)[0]

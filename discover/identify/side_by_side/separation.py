@@ -11,6 +11,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.simulate.grid import make_grids
 from discover.simulate.runge_kutta import longest_step
+from discover.statistics.projection import rms
 from discover.words import percent_of
 from tensor_library.library import TermLibrary
 
@@ -85,22 +86,18 @@ def separations(
     ]
 
 
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def _relative(a: np.ndarray, b: np.ndarray, scale: float) -> float | None:
     if not np.all(np.isfinite(a)):
         return None
     if not np.all(np.isfinite(b)):
         return np.inf
-    return _rms(a - b) / scale if scale > 0 else None
+    return rms(a - b) / scale if scale > 0 else None
 
 
 def _in_shear(names, reference, other):
     for run, name in enumerate(names):
         for kind, quantity in enumerate(_QUANTITIES):
-            scale = _rms(reference[run, :, 1 if kind == 2 else kind])
+            scale = rms(reference[run, :, 1 if kind == 2 else kind])
             value = _relative(reference[run, :, kind], other[run, :, kind], scale)
             if value is not None:
                 yield Separation(name, quantity, value)
@@ -108,7 +105,7 @@ def _in_shear(names, reference, other):
 
 def _in_extension(starts, reference, other):
     for (kind, rate), a, b in zip(starts, reference, other, strict=True):
-        scale = _rms(a[:, 0] - a[:, 1])
+        scale = rms(a[:, 0] - a[:, 1])
         first, second = (0, 1) if kind == "uniaxial" else (1, 2)
         value = _relative(a[:, first] - a[:, second], b[:, first] - b[:, second], scale)
         if value is not None:

@@ -1,0 +1,20 @@
+"""Sizes of residuals, and what is left of them once other columns have taken what they can."""
+
+import numpy as np
+from jaxtyping import Float
+
+_ROUNDING = 1e-9  # of the largest singular value, columns made of length one
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root of the mean of the squares."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
+    """Return what the columns cannot describe of values, shape (m,) or (m, k)."""
+    norms = np.linalg.norm(columns, axis=0)
+    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
+    if not kept.shape[1]:
+        return values
+    return values - kept @ np.linalg.lstsq(kept, values, rcond=_ROUNDING)[0]
