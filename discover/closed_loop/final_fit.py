@@ -26,6 +26,7 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.searching import SearchResult
 from discover.dataset import Run
 from discover.dataset.coarse_rates import CoarseRates
+from discover.dataset.repeats import repeats_among
 from discover.forward import AugmentedModel, Batch, make_batch
 from discover.forward.least_squares import Fit, intervals
 from discover.forward.modulus_errors import modulus_shifts
@@ -239,7 +240,8 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     search, model, batch, fit = final.search, final.model, final.batch, final.fit
     bounds = intervals(model, batch, fit, final.shifts)
     profile = profiled(search.problem, fit, bounds, _constants(final))
-    small = small_faults(final.fitted_readings)
+    repeats = repeats_among(final.fitted)
+    small = small_faults(final.fitted_readings, 0.0 if repeats is None else repeats.error)
     bounds = with_small_faults(profile.bounds, fit, model, small)
     bounds, otherwise = holding_misreading(bounds, fit, final.fitted_readings, model)
     unknown, coarse = final.between_samples(batch, final.fitted), None

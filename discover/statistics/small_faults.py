@@ -62,14 +62,23 @@ class Allowance:
         return min(low, middle - below), max(high, middle + above)
 
 
-def small_faults(runs: Sequence[Reading]) -> Allowance | None:
+def small_faults(runs: Sequence[Reading], loading: float = 0.0) -> Allowance | None:
     """Return what small faults of reading leave open of the constants; None where none is told.
 
-    Sizes of faults are normal with the noise and each of `WIDTHS`, so what the records say of them
-    is too, and the constants follow to first order   [Gelman et al. 2013, Bayesian Data Analysis,
-    ch. 14]. Widths, and levels from which on a range reads otherwise, are weighed by their
-    evidence, and of the mixture the mean and the covariance are kept.
+    Sizes of faults are normal with the noise and each of some widths, so what the records say of
+    them is too, and the constants follow to first order   [Gelman et al. 2013, Bayesian Data
+    Analysis, ch. 14]. Widths, and levels from which on a range reads otherwise, are weighed by
+    their evidence, and of the mixture the mean and the covariance are kept.
+
+    Parameters
+    ----------
+    runs
+        The fitted runs.
+    loading
+        Relative error of one run as repeats tell it, noise included; where it is larger than each
+        of the widths, it is one of them.
     """
+    widths = (*WIDTHS, loading) if loading > WIDTHS[-1] else WIDTHS
     session = Session(runs)
     if not session.is_told or not len(session.columns):
         return None
@@ -80,7 +89,7 @@ def small_faults(runs: Sequence[Reading]) -> Allowance | None:
     weights, steps, squares = [], [], []
     for own in _of_a_session(session):
         moves = -inverse @ own.T
-        for weight, mean, covariance in _posteriors(session, own):
+        for weight, mean, covariance in _posteriors(session, own, widths):
             weights.append(weight)
             steps.append(moves @ mean)
             squares.append(moves @ covariance @ moves.T + np.outer(steps[-1], steps[-1]))
@@ -108,11 +117,11 @@ def _of_a_session(session: Session) -> Iterator[Float[np.ndarray, "sizes m"]]:
 
 
 def _posteriors(
-    session: Session, own: Float[np.ndarray, "sizes m"]
+    session: Session, own: Float[np.ndarray, "sizes m"], widths: Sequence[float]
 ) -> Iterator[tuple[float, Float[np.ndarray, " sizes"], Float[np.ndarray, "sizes sizes"]]]:
     """Yield the log evidence of each width, and the mean and covariance of the sizes given it."""
     found = session.estimate(own, session.columns)
-    for width in WIDTHS:
+    for width in widths:
         prior = width**2 * np.eye(len(own))
         if found is None:  # constants do all that it does
             yield 0.0, np.zeros(len(prior)), prior

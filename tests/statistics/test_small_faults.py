@@ -105,3 +105,14 @@ def test_what_no_constant_was_fitted_to_needs_no_allowance(told):
     none = [Reading(r.times, r.predicted, r.residual, r.columns[:0]) for r in runs]
     assert small_faults(none) is None
     assert small_faults([]) is None
+
+
+def test_repeats_that_differ_by_more_than_an_instrument_widen_what_is_allowed_for(told):
+    stress, _ = told["slow"]
+    noise = 0.01 * rms(stress) * np.random.default_rng(6).standard_normal(len(stress))
+    run = Reading(GROWTH, stress, noise, stress[None])
+    alone, alike, apart = (
+        np.sqrt(small_faults([run], loading).covariance[0, 0]) for loading in (0.0, 0.02, 0.08)
+    )
+    assert alike == alone
+    assert apart > 1.3 * alone

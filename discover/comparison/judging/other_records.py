@@ -42,5 +42,7 @@ def holding_other_records(
         wider, held, of_readings = holding_misreading(*seen, expectation)
         said = (*of_filters, *of_readings)
     if not computed:
-        wider, held = holding_small_faults(wider, held, law, flows, fitted)
+        wider, held = holding_small_faults(
+            wider, held, law, flows, fitted, expectation.repeat_error
+        )
     return wider, held, said

@@ -28,6 +28,7 @@ def holding_small_faults(
     law: MovedLaw,
     flows: Sequence[Flow],
     fitted: Sequence[Reading],
+    loading: float = 0.0,
 ) -> tuple[dict[str, LearnerOutcome], dict[str, PredictionBand]]:
     """Return outcomes and bands that hold with small faults of reading too, to first order.
 
@@ -43,8 +44,10 @@ def holding_small_faults(
         In which it is simulated.
     fitted
         The fitted runs as it predicts them.
+    loading
+        Relative error of one run as repeats tell it; 0 without any.
     """
-    allowance = small_faults(fitted)
+    allowance = small_faults(fitted, loading)
     if allowance is None or not np.all(np.isfinite(allowance.covariance)):
         return dict(outcomes), dict(bands)
     wider = dict(bands)
