@@ -75,10 +75,8 @@ def small_faults(runs: Sequence[Reading], loading: float = 0.0) -> Allowance | N
     runs
         The fitted runs.
     loading
-        Relative error of one run as repeats tell it, noise included; where it is larger than each
-        of the widths, it is one of them.
+        Relative error of one run as repeats tell it: the width of its factor is no less.
     """
-    widths = (*WIDTHS, loading) if loading > WIDTHS[-1] else WIDTHS
     session = Session(runs)
     if not session.is_told or not len(session.columns):
         return None
@@ -87,9 +85,9 @@ def small_faults(runs: Sequence[Reading], loading: float = 0.0) -> Allowance | N
         return None
     inverse = np.linalg.pinv(session.columns.T / norms, rcond=1e-9) / norms[:, None]
     weights, steps, squares = [], [], []
-    for own in _of_a_session(session):
+    for own, least in _of_a_session(session, loading):
         moves = -inverse @ own.T
-        for weight, mean, covariance in _posteriors(session, own, widths):
+        for weight, mean, covariance in _posteriors(session, own, least):
             weights.append(weight)
             steps.append(moves @ mean)
             squares.append(moves @ covariance @ moves.T + np.outer(steps[-1], steps[-1]))
@@ -100,29 +98,33 @@ def small_faults(runs: Sequence[Reading], loading: float = 0.0) -> Allowance | N
     return Allowance(mean, covariance)
 
 
-def _of_a_session(session: Session) -> Iterator[Float[np.ndarray, "sizes m"]]:
+def _of_a_session(
+    session: Session, loading: float
+) -> Iterator[tuple[Float[np.ndarray, "sizes m"], Float[np.ndarray, " sizes"]]]:
     """Yield what all kinds of faults at once do to the records, for each level of a range.
 
-    A factor below a level is one above it, and one of all runs.
+    With it the least width of each size. A factor below a level is one above it, and one of all
+    runs.
     """
-    kinds: tuple[FaultKind, ...] = ("factor", "zero", "growth")
+    kinds: tuple[FaultKind, ...] = ("zero", "growth")
     if session.shared is None or not len(session.shared):  # else the sweep tells how far they err
         kinds = (*kinds, "modes")
-    every = [fault.own for kind in kinds for fault in session.faults(kind)]
-    ranges = list(session.faults("above"))
-    for fault in ranges:
-        yield np.concatenate([*every, fault.own])
-    if not ranges:
-        yield np.concatenate(every)
+    factors = [fault.own for fault in session.faults("factor")]
+    every = [*factors, *(fault.own for kind in kinds for fault in session.faults(kind))]
+    for own in [fault.own for fault in session.faults("above")] or [np.zeros_like(every[0][:0])]:
+        together = np.concatenate([*every, own])
+        least = np.zeros(len(together))
+        least[: sum(map(len, factors))] = loading
+        yield together, least
 
 
 def _posteriors(
-    session: Session, own: Float[np.ndarray, "sizes m"], widths: Sequence[float]
+    session: Session, own: Float[np.ndarray, "sizes m"], least: Float[np.ndarray, " sizes"]
 ) -> Iterator[tuple[float, Float[np.ndarray, " sizes"], Float[np.ndarray, "sizes sizes"]]]:
     """Yield the log evidence of each width, and the mean and covariance of the sizes given it."""
     found = session.estimate(own, session.columns)
-    for width in widths:
-        prior = width**2 * np.eye(len(own))
+    for width in WIDTHS:
+        prior = np.diag(np.maximum(width, least) ** 2)
         if found is None:  # constants do all that it does
             yield 0.0, np.zeros(len(prior)), prior
             continue
