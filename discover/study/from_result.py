@@ -151,22 +151,22 @@ def _with_added_modes(
         counts = {
             len(p["modes"]) for row in rows for p in row["parameters"].values() if p.get("degree")
         }
-        adding = [row for row in rows if isinstance(make_effect(row["effect"]), ModeEffect)]
+        made = [(row, make_effect(row["effect"])) for row in rows]
+        adding = [(row, effect) for row, effect in made if isinstance(effect, ModeEffect)]
         if not adding or counts != {len(equation.modulus) + len(adding)}:
             return equation, rows
-        modes = [[float(p["value"]) for p in row["parameters"].values()] for row in adding]
+        pairs = [
+            effect.mode(jnp.asarray([float(p["value"]) for p in row["parameters"].values()]))
+            for row, effect in adding
+        ]
     except (TypeError, KeyError, ValueError, AttributeError, InputError):
         raise _damaged(file) from None
-    pairs = [
-        make_effect(row["effect"]).mode(jnp.asarray(values))  # pyright: ignore
-        for row, values in zip(adding, modes, strict=True)
-    ]
     whole = replace(
         equation,
         modulus=(*equation.modulus, *(float(g) for g, _ in pairs)),
         relaxation_time=(*equation.relaxation_time, *(float(t) for _, t in pairs)),
     )
-    return whole, [row for row in rows if row not in adding]
+    return whole, [row for row, effect in made if not isinstance(effect, ModeEffect)]
 
 
 def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
