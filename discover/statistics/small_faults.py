@@ -19,9 +19,9 @@ HALF_BAND = 1.96
 """Standard deviations of half of a 95 % band."""
 
 WIDTHS = (0.005, 0.01, 0.02)
-"""Standard deviations of the sizes, of the stress or the modulus: from what a transducer that was
-calibrated errs by to what one filling differs from the next by   [Laun et al. 2014, Pure Appl.
-Chem. 86, 1945]."""
+"""Standard deviations of the sizes, of the stress or the modulus. A choice: from what a calibrated
+transducer errs by to what careful fillings differ by. What repeats differ by counts where it is
+more; that loadings of one melt differ by 10 % is reported too (docs/ldpe.md)."""
 
 
 @dataclass(frozen=True)
