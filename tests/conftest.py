@@ -148,6 +148,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: place.get(item.path.name, len(_LONG)))
 
 
+@pytest.fixture(scope="module")
+def optimised():
+    """Optimise the programs of models: these tests call each some thousand times."""
+    from discover.forward import program
+    from discover.programs import compiled
+
+    def slower_to_compile(function, **options):
+        made = compiled(function, **options)
+        made.ask_for(xla_backend_optimization_level=1)
+        return made
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(program, "compiled", slower_to_compile)
+        yield
+
+
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Return the folder of measured data sets, or skip and say why."""

@@ -45,7 +45,7 @@ def found_in(material, seed=0):
     base = dc.Fluid(dc.make_law("ucm"), (100.0,), (1.0,))
     return dc.close_loop(
         Dataset("two modes", runs), base, free=["modulus_Pa", "relaxation_time_s"],
-        held_out=["3.0"], effects=EFFECTS,
+        held_out=["3.0"], effects=EFFECTS, explanations=1,
     )  # fmt: skip
 
 

@@ -80,7 +80,12 @@ def giesekus_steps():
     ("records", "name", "others"),
     [
         (damped_steps, "thixotropy", ("strain_damping",)),
-        (damped_by_a_power, "convective_constraint_release", ("strain_damping",)),
+        pytest.param(
+            damped_by_a_power,
+            "convective_constraint_release",
+            ("strain_damping",),
+            marks=pytest.mark.slow,
+        ),
         (structure_in_start_up, "thixotropy", ()),
         (giesekus_steps, "giesekus_mobility", ()),
     ],

@@ -31,9 +31,8 @@ def maxwell(rate):
 
 def loop(stress, declared=DECLARED, effects=("stress_offset", "stress_gain"), **options):
     runs = [Run(n, TIMES, FLOWS[n], RATES[n], np.asarray(stress[n])) for n in FLOWS]
-    return run_loop(
-        Dataset("made", tuple(runs)), declared, effects=list(effects), max_effects=2, **options
-    )
+    options = {"effects": list(effects), "max_effects": 2, "explanations": 1} | options
+    return run_loop(Dataset("made", tuple(runs)), declared, **options)
 
 
 def drawn(signal, noise, seed=0):

@@ -9,17 +9,13 @@ import pytest
 sys.path.append(str(Path(__file__).parent))
 
 
-@pytest.fixture(scope="module")
-def optimised():
-    """Optimise the programs of models: these tests call each some thousand times."""
-    from discover.forward import program
-    from discover.programs import compiled
+@pytest.fixture
+def verdict_alone(monkeypatch):
+    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
+    from discover.comparison import judgement, learning
+    from discover.comparison.judging.next_measurement import NextMeasurement
 
-    def slower_to_compile(function, **options):
-        made = compiled(function, **options)
-        made.ask_for(xla_backend_optimization_level=1)
-        return made
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program, "compiled", slower_to_compile)
-        yield
+    nothing = judgement._Beside((), None, ())
+    monkeypatch.setattr(judgement, "_beside", lambda *_: nothing)
+    monkeypatch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
+    monkeypatch.setattr(learning, "physics_of", lambda *_: {"checks": []})
