@@ -164,6 +164,18 @@ def optimised():
         yield
 
 
+@pytest.fixture
+def verdict_alone(monkeypatch):
+    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
+    from discover.comparison import judgement, learning
+    from discover.comparison.judging.next_measurement import NextMeasurement
+
+    nothing = judgement._Beside((), None, ())
+    monkeypatch.setattr(judgement, "_beside", lambda *_: nothing)
+    monkeypatch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
+    monkeypatch.setattr(learning, "physics_of", lambda *_: {"checks": []})
+
+
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Return the folder of measured data sets, or skip and say why."""
