@@ -94,7 +94,7 @@ def giesekus_steps():
 def test_what_shows_only_as_a_damping_by_strain_is_named_so_too(tmp_path, records, name, others):
     data = folder(tmp_path, records())
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    loop = dc.close_loop(data, base, effects=CANDIDATES, max_effects=1)
+    loop = dc.close_loop(data, base, effects=CANDIDATES, max_effects=1, explanations=1)
     (stage,) = loop.stages
     assert stage.effect == name
     assert stage.aliases == others
