@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import jaxtyping
 import pytest
@@ -25,6 +26,26 @@ gc.set_threshold(100_000, 50, 100)
 # What is first imported inside a module under the hook below is compiled anew, in every worker.
 for _large in ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic"):
     importlib.import_module(_large)
+
+_with_checks = jaxtyping.jaxtyped
+
+
+def _jaxtyped(*args: Any, **kwargs: Any) -> Any:
+    """Check what is declared where a module is read, and leave alone what a function declares.
+
+    The hook wraps that anew at every call of the function, and so does it with what has no type.
+    """
+    made = _with_checks(*args, **kwargs)
+
+    def checked(declared: Any) -> Any:
+        inner = "<locals>" in getattr(declared, "__qualname__", "")
+        typed = isinstance(declared, type) or getattr(declared, "__annotations__", True)
+        return declared if inner or not typed else made(declared)
+
+    return made if args else checked
+
+
+jaxtyping.jaxtyped = _jaxtyped
 
 # Shapes written on public functions are checked while the tests run. The hook must come before
 # the packages are imported.
@@ -52,7 +73,12 @@ _END_TO_END = {
     "test_no_signal.py", "test_other_times.py", "test_known_effects_in_the_loop.py",
     "test_search_checkpoint.py", "test_mode_dependence.py", "test_held_out_pattern.py",
     "test_aliases.py", "test_known_laws_of_chains.py", "test_reports.py", "test_export.py",
-    "test_kills_and_clusters.py", "test_law_by_mode.py",
+    "test_kills_and_clusters.py", "test_law_by_mode.py", "test_added_mode_apart.py",
+    "test_limits_of_effects.py", "test_one_flow.py", "test_tests_together.py",
+    "test_constants_beside_other_times.py", "test_own_noise.py", "test_comparison.py",
+    "test_profile.py", "test_open_constants.py", "test_bands_of_states.py", "test_coarse_rates.py",
+    "test_modes_of_a_stiff_fluid.py", "test_named_effects.py", "test_folds.py",
+    "test_other_ways.py", "test_further_laws.py",
 }  # fmt: skip
 
 
@@ -146,6 +172,34 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if not item.get_closest_marker("slow")]
     place = {name: i for i, name in enumerate(_LONG)}
     items.sort(key=lambda item: place.get(item.path.name, len(_LONG)))
+
+
+@pytest.fixture(scope="module")
+def optimised():
+    """Optimise the programs of models: these tests call each some thousand times."""
+    from discover.forward import program
+    from discover.programs import compiled
+
+    def slower_to_compile(function, **options):
+        made = compiled(function, **options)
+        made.ask_for(xla_backend_optimization_level=1)
+        return made
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(program, "compiled", slower_to_compile)
+        yield
+
+
+@pytest.fixture
+def verdict_alone(monkeypatch):
+    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
+    from discover.comparison import judgement, learning
+    from discover.comparison.judging.next_measurement import NextMeasurement
+
+    nothing = judgement._Beside((), None, ())
+    monkeypatch.setattr(judgement, "_beside", lambda *_: nothing)
+    monkeypatch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
+    monkeypatch.setattr(learning, "physics_of", lambda *_: {"checks": []})
 
 
 @pytest.fixture(scope="session")

@@ -47,7 +47,7 @@ def compare(path, out, seed, overwrite, progress):
     for i in range(6):
         part = folder.load(f"part{i}")
         if part is None:
-            time.sleep(float(os.environ.get("SECONDS_A_PART", "0.08")))
+            time.sleep(float(os.environ.get("SECONDS_A_PART", "0")))
             part = {"x": np.random.default_rng([i, int(1000 * noise)]).normal(size=500).tolist()}
             folder.save(f"part{i}", part)
             with open(os.environ["COUNTS"], "a", errors="replace") as counts:
@@ -123,7 +123,8 @@ def wait_for(condition, seconds=120.0):
 
 
 @pytest.mark.slow
-def test_a_batch_killed_at_random_ends_with_the_same_bytes(studies, calm, tmp_path):
+def test_a_batch_killed_at_random_ends_with_the_same_bytes(studies, calm, tmp_path, monkeypatch):
+    monkeypatch.setenv("SECONDS_A_PART", "0.08")
     generator = random.Random(1)
     out = tmp_path / "out"
     arguments = ["batch", *map(str, studies), "--out", str(out), "--quiet"]
@@ -193,10 +194,11 @@ def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp
     assert max(computed(tmp_path).values()) == 1
 
 
-def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path):
+def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path, monkeypatch):
     dask = pytest.importorskip("dask")
     pytest.importorskip("distributed")
     out, killed = tmp_path / "out", []
+    monkeypatch.setenv("SECONDS_A_PART", "0.08")  # so that there is somebody to kill
 
     def kill_one():
         wait_for(lambda: computed(tmp_path).total() >= 1)

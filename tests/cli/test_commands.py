@@ -47,8 +47,8 @@ def trained(monkeypatch):
 
 
 @pytest.fixture
-def undrawn(monkeypatch):
-    """Pages without pictures, where what a command does with its page is asked and not the page."""
+def undrawn(monkeypatch, verdict_alone):
+    """A page of the verdict without pictures, where what a command does with it is asked."""
     monkeypatch.setattr(
         "discover.report.comparison.report.comparison_pictures", lambda *_: ([], [])
     )

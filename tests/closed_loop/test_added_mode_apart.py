@@ -1,5 +1,6 @@
 """Two modes with constants of their own, one of them declared: a law by mode and no structure."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,12 +10,21 @@ from independent.noise import rms
 
 import discover as dc
 from discover.closed_loop import DeclaredModel
+from discover.closed_loop.added_mode_apart import law_by_mode_instead, start_from
+from discover.closed_loop.search import Search
+from discover.closed_loop.searching import (
+    NumericalResolution,
+    SearchCheckpoint,
+    ToleratedMisfit,
+    admission,
+)
 from discover.dataset import Dataset, Run
 from discover.effects import make_effect
 from discover.errors import InputError
-from discover.forward import AugmentedModel, make_batch
+from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as starting
+from discover.statistics.residual import Expectation
 
 MODULI, TIMES = (60.0, 80.0), (3.0, 0.4)
 EFFECTS = ["relaxation_mode", "giesekus_mobility", "thixotropy"]
@@ -45,7 +55,7 @@ def found_in(material, seed=0):
     base = dc.Fluid(dc.make_law("ucm"), (100.0,), (1.0,))
     return dc.close_loop(
         Dataset("two modes", runs), base, free=["modulus_Pa", "relaxation_time_s"],
-        held_out=["3.0"], effects=EFFECTS,
+        held_out=["3.0"], effects=EFFECTS, explanations=1,
     )  # fmt: skip
 
 
@@ -54,9 +64,59 @@ def loop(mobilities):
     return found_in(fluid(mobilities))
 
 
-@pytest.mark.parametrize(
-    "mobilities", [(0.1, 0.5), pytest.param((0.15, 0.6), marks=pytest.mark.slow)]
-)
+def search_of(declared, runs):
+    scales = data_scales(runs)
+    model = AugmentedModel(declared, [make_effect(name) for name in EFFECTS], scales)
+    batch = make_batch(runs)
+    return Search(
+        model, batch, None, len(EFFECTS), admission(runs, []),
+        ToleratedMisfit(
+            Expectation(None, declared.linear_error), NumericalResolution(model, batch, runs)
+        ),
+        SearchCheckpoint(None, "made up"),
+    )  # fmt: skip
+
+
+def found_by_hand(material, names):
+    """A search that ends with these effects, fitted, and what is asked in the place of them."""
+    runs = [record(material, name, 0) for name in NAMES[:3]]
+    declared = DeclaredModel.maxwell(100.0, 1.0)
+    declared = replace(declared, fit_modulus=True, fit_relaxation_time=True)
+    search = search_of(declared, runs)
+    search.start()
+    model, theta = search.model, search.model.zero()
+    # near the two modes, so that no search is needed
+    theta[:2] = np.log([MODULI[0] / 100.0, TIMES[0]])
+    theta[model.positions("relaxation_mode")] = MODULI[1], TIMES[1]
+    theta[model.positions("giesekus_mobility")] = 0.3
+    if "thixotropy" in names:
+        theta[model.positions("thixotropy")] = 0.05, 2.0
+    search.take(search.fitted(names, theta), names)
+    return search, runs, law_by_mode_instead(search, 3, data_scales(runs))
+
+
+def test_a_law_by_mode_takes_the_place_of_a_structure_that_stood_for_the_second_mobility():
+    search, runs, instead = found_by_hand(fluid((0.1, 0.5)), EFFECTS)
+    assert search.explained  # by what is not there
+    assert instead is not None
+    assert (instead.name, set(instead.effects)) == ("giesekus_mobility", set(EFFECTS[:2]))
+    assert instead.is_likelier
+    # a search that begins with it ends with it
+    again = search_of(instead.model.declared, runs)
+    again.start(by_mode=False)
+    start_from(again, search, instead)
+    assert set(again.active) == set(EFFECTS[:2])
+    assert again.degrees["giesekus_mobility"].degree == 1
+
+
+def test_control_no_law_by_mode_takes_the_place_of_what_is_there():
+    assert found_by_hand(fluid((0.3, 0.3)), EFFECTS[:2])[-1] is None
+    broken = Thixotropic(fluid((0.3, 0.3)), 0.1, 4.0)
+    assert found_by_hand(broken, EFFECTS)[-1] is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mobilities", [(0.1, 0.5), (0.15, 0.6)])
 def test_mobilities_of_their_own_are_no_structure(mobilities):
     # with all candidates a structure at 89 % stood in the place of the second mobility
     result = loop(mobilities)
@@ -100,6 +160,7 @@ def test_mobilities_that_differ_by_less_than_evidence_tells_are_in_the_intervals
         assert not low < second < high
 
 
+@pytest.mark.slow
 def test_a_structure_that_is_there_is_named_beside_two_modes():
     result = found_in(Thixotropic(fluid((0.3, 0.3)), 0.1, 4.0))
     assert "thixotropy" in {stage.effect for stage in result.stages}

@@ -83,6 +83,7 @@ def test_a_band_of_another_fluid_does_not_hold_its_flow_curve(tmp_path):
     folder = planted(tmp_path, 0)
     keys = {kind: "fit" if kind == "relaxation" else "judge" for kind in KINDS}
     data = load_study_data(parse_study({"data": {"folder": str(folder), **keys}}))
-    loop = dc.close_loop(data.fit, BASE, held_out=data.held_out, effects=["stress_gain"])
+    options = {"effects": ["stress_gain"], "max_effects": 1, "explanations": 1}
+    loop = dc.close_loop(data.fit, BASE, held_out=data.held_out, **options)
     assert loop.verdict == "unexplained"
     assert loop.held_in_band < 0.95

@@ -17,8 +17,8 @@ def looped(told: float):
         runs.append(dc.Run(f"at_{rate:g}", TIMES, dc.start_up(rate), rates, stress + noise))
     data = dc.Dataset("giesekus", tuple(runs))
     base = dc.Fluid(dc.make_law("ucm"), 100.0, told)
-    effects = ["giesekus_mobility", "sigma"]
-    return dc.close_loop(data, base, held_out=["at_3"], effects=effects, max_effects=2)
+    options = {"effects": ["giesekus_mobility", "sigma"], "max_effects": 2, "explanations": 1}
+    return dc.close_loop(data, base, held_out=["at_3"], **options)
 
 
 def mobility(loop):

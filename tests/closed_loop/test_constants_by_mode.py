@@ -39,11 +39,13 @@ def loop(mobilities, rates=RATES, by_mode=("alpha",)):
     base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI, TIMES)
     return dc.close_loop(
         data(mobilities, rates), base, free=["alpha"], by_mode=by_mode, effects=["stress_gain"],
-        max_effects=1,
+        max_effects=1, explanations=1,
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("mobilities", [(0.1, 0.3, 0.6), (0.5, 0.1, 0.5)])
+@pytest.mark.parametrize(
+    "mobilities", [(0.1, 0.3, 0.6), pytest.param((0.5, 0.1, 0.5), marks=pytest.mark.slow)]
+)
 def test_the_constant_of_each_mode_is_found(mobilities):
     result = loop(mobilities)
     found = result.declared_parameters["alpha"]

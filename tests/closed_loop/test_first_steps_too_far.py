@@ -35,7 +35,8 @@ def records(folder, material):
     ],
 )
 def test_what_was_planted_is_found_from_the_far_end(tmp_path, effect, material, constant, planted):
-    loop = dc.close_loop(records(tmp_path, material), BASE, effects=[effect], max_effects=1)
+    options = {"effects": [effect], "max_effects": 1, "explanations": 1}
+    loop = dc.close_loop(records(tmp_path, material), BASE, **options)
     assert loop.verdict == "effects_added"
     low, high = loop.stages[0].parameters[constant].ci95
     assert low < planted < high
@@ -60,7 +61,8 @@ def test_a_slow_structure_is_not_taken_for_a_fast_one(tmp_path):
         for name, flow in flows.items()
     }
     data = write_folder(tmp_path, with_noise(runs, 0.01, np.random.default_rng(0)))
-    loop = dc.close_loop(dc.load_dataset(data), BASE, effects=["thixotropy"], max_effects=1)
+    options = {"effects": ["thixotropy"], "max_effects": 1, "explanations": 1}
+    loop = dc.close_loop(dc.load_dataset(data), BASE, **options)
     assert loop.verdict == "effects_added"
     constants = loop.stages[0].parameters
     assert constants["breakdown"].value == pytest.approx(0.25, rel=0.05)

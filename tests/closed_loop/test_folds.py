@@ -28,7 +28,8 @@ def explained() -> LoopResult:
     ]
     base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
     data = dc.Dataset("maxwell", tuple(runs))
-    return dc.close_loop(data, base, effects=["giesekus_mobility"], max_effects=1)
+    options = {"effects": ["giesekus_mobility"], "max_effects": 1, "explanations": 1}
+    return dc.close_loop(data, base, **options)
 
 
 def folds(*verdicts):

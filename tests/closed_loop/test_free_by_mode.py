@@ -17,6 +17,8 @@ from discover.inference.draws_by_mode import draw_constants
 from discover.inference.problem import FitProblem
 from discover.inference.varying_constant import freer_fits
 
+pytestmark = pytest.mark.usefixtures("optimised")
+
 MODULI = np.array([300.0, 200.0, 100.0, 60.0, 30.0])
 TIMES = np.array([0.03, 0.15, 0.7, 3.0, 15.0])
 RATES = (0.1, 0.3, 1.0, 4.0, 15.0, 60.0)

@@ -62,6 +62,7 @@ def test_a_saturated_transducer_is_found_as_a_function_of_the_stress(saturated):
     assert found.error.held_out < 1.5 * NOISE < saturated.error_after.held_out
 
 
+@pytest.mark.slow
 def test_the_verdict_says_of_what_it_is_a_function(saturated):
     said = loop_verdict(saturated)[0]
     assert "a function of the recorded stress alone" in said
@@ -77,6 +78,10 @@ def test_a_hum_is_found_as_a_function_of_time(tmp_path):
     # 3 Pa, within three times the half-width of the band
     off = np.abs(found.value - 3.0 * np.sin(0.9 * found.grid))
     assert np.mean(off < 3.0 * (found.high95 - found.low95) / 2.0) > 0.95
+    said = loop_verdict(loop)[0]
+    assert "a function of the time alone" in said
+    assert "periodic" in said
+    assert loop.to_json()["free_form"][0]["nearest"] == "periodic"
 
 
 def test_no_curve_is_found_in_a_sound_record(tmp_path):

@@ -80,7 +80,12 @@ def giesekus_steps():
     ("records", "name", "others"),
     [
         (damped_steps, "thixotropy", ("strain_damping",)),
-        (damped_by_a_power, "convective_constraint_release", ("strain_damping",)),
+        pytest.param(
+            damped_by_a_power,
+            "convective_constraint_release",
+            ("strain_damping",),
+            marks=pytest.mark.slow,
+        ),
         (structure_in_start_up, "thixotropy", ()),
         (giesekus_steps, "giesekus_mobility", ()),
     ],
@@ -89,7 +94,7 @@ def giesekus_steps():
 def test_what_shows_only_as_a_damping_by_strain_is_named_so_too(tmp_path, records, name, others):
     data = folder(tmp_path, records())
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    loop = dc.close_loop(data, base, effects=CANDIDATES, max_effects=1)
+    loop = dc.close_loop(data, base, effects=CANDIDATES, max_effects=1, explanations=1)
     (stage,) = loop.stages
     assert stage.effect == name
     assert stage.aliases == others

@@ -60,7 +60,8 @@ def loop(data, **options):
     declared = DeclaredModel.named(
         "giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"], **options
     )
-    return run_loop(Dataset("two", data), declared, effects=["thixotropy", "rate_gain"])
+    effects = ["thixotropy", "rate_gain"]
+    return run_loop(Dataset("two", data), declared, effects=effects, explanations=1)
 
 
 def test_the_exponent_gives_each_mode_its_own_constant():

@@ -103,7 +103,8 @@ def test_n1_that_was_not_fitted_judges_a_law_found_in_the_stress_alone(tmp_path)
 
 
 def test_the_page_of_a_flow_curve_has_the_rate_below_it_and_not_time(tmp_path):
-    loop = dc.close_loop(curve_folder(tmp_path, 0.3), BASE, effects=EFFECTS, max_effects=1)
+    options = {"effects": EFFECTS, "max_effects": 1, "explanations": 1}
+    loop = dc.close_loop(curve_folder(tmp_path, 0.3), BASE, **options)
     page = loop.to_html(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "shear rate (1/s)" in page
     assert "time (s)" not in page

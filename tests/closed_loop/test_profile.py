@@ -39,7 +39,7 @@ def curve(folder, rates, noise, seed=0):
 def test_a_flow_curve_tells_the_product_of_breakdown_and_build_up_time_and_neither_alone(tmp_path):
     data, _ = curve(tmp_path, np.geomspace(0.05, 20.0, 40), 0.01)
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, 1.0, SOLVENT)
-    loop = dc.close_loop(data, base, effects=["thixotropy"])
+    loop = dc.close_loop(data, base, effects=["thixotropy"], explanations=1)
     (stage,) = loop.stages
     assert stage.left_open == ("breakdown", "build_up_time")
     (together,) = stage.told_together

@@ -11,6 +11,7 @@ from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import find_rivals
+from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.statements import make_statements
 from discover.comparison.outcomes.flows import comparison_flows, predict
 from discover.comparison.outcomes.truth import true_terms
@@ -55,6 +56,11 @@ def trained(learner, study, model, runs, seed=0, progress=None):
 def comparison() -> Comparison:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
+        # what has tests of its own, and stands on the page of test_reports
+        patch.setattr("discover.comparison.learning.physics_of", lambda *_: {"checks": []})
+        patch.setattr(
+            "discover.comparison.judgement.next_measurement", lambda *_: NextMeasurement()
+        )
         return compare(fake_study())
 
 

@@ -113,9 +113,27 @@ def fitted(mobilities, fluid=None):
     return next(found, None)
 
 
+# one constant by mode and rivals of each kind; that of the fluid among all of them is a slow test
+FEW = ("giesekus_mobility",), ("ptt_linear",), (SLIP,), ("giesekus_mobility", SLIP)
+
+
 @pytest.fixture(scope="module")
 def law():
-    return fitted(MOBILITIES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(law_by_mode, "_NAMED", FEW)
+        return fitted(MOBILITIES)
+
+
+@pytest.mark.slow
+def test_the_law_is_the_same_among_all_that_are_asked(law):
+    found = fitted(MOBILITIES)
+    assert list(found.constants) == list(law.constants)
+    for own, one in zip(
+        found.constants["giesekus_mobility"].modes,
+        law.constants["giesekus_mobility"].modes,
+        strict=True,
+    ):
+        assert own.value == pytest.approx(one.value, rel=1e-6)
 
 
 def test_the_constant_of_each_mode_is_found_and_predicts_a_run_that_no_fit_saw(law):
@@ -171,7 +189,8 @@ def test_its_constants_are_told_in_few_words(law):
     assert brief.endswith("at 10 s")
 
 
-def test_control_one_constant_for_all_modes_is_no_law_by_mode():
+def test_control_one_constant_for_all_modes_is_no_law_by_mode(monkeypatch):
+    monkeypatch.setattr(law_by_mode, "_NAMED", FEW)
     assert fitted((0.25, 0.25, 0.25)) is None
 
 

@@ -7,13 +7,22 @@ import pytest
 from independent import PhanThienTanner, steps
 
 import discover as dc
-from discover.comparison.instrument import FittedAlong
+from discover.comparison.instrument import FittedAlong, before_learning
+from discover.comparison.instrument.before_learning import CLASSICAL_EFFECTS
 from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
+
+
+@pytest.fixture(autouse=True)
+def two_classical_laws(monkeypatch):
+    """The law of the fluid and another: each is fitted from many starts."""
+    few = {name: CLASSICAL_EFFECTS[name] for name in ("giesekus", "ptt_linear")}
+    monkeypatch.setattr(before_learning, "CLASSICAL_EFFECTS", few)
+
 
 MODULUS, TIME, EXTENSIBILITY = 2.0, 0.03, 16.0
 LIBRARY = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))

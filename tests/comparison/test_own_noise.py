@@ -7,6 +7,8 @@ from independent import Giesekus, Structured, start_up
 import discover as dc
 from discover.comparison import own_noise
 
+pytestmark = pytest.mark.usefixtures("verdict_alone")
+
 MOBILITY, MODULUS, TIME = 0.3, 100.0, 1.0
 TIMES = np.linspace(0.1, 8.0, 60)
 RATES = (0.5, 2.0, 5.0)

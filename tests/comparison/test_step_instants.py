@@ -35,7 +35,7 @@ def data_on(folder, flows):
 
 
 def dated(data):
-    return with_step_instants(declared_fluid(BASE, data.dataset), data, build_library(degree=1))
+    return with_step_instants(declared_fluid(BASE, data.dataset), data, build_library(degree=0))
 
 
 def test_steps_of_fitted_and_of_unseen_runs_are_dated(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,8 +128,20 @@ def test_the_cases_are_sixty_and_reproduce(tmp_path):
     assert white(0.0)(one, np.random.default_rng(0)) is not one
 
 
-@pytest.mark.parametrize("task", ["close-loop", pytest.param("compare", marks=pytest.mark.slow)])
-def test_a_dead_sensor_goes_through_the_whole_program_without_a_claim(task, tmp_path):
+@pytest.mark.parametrize(
+    ("task", "loop"),
+    [
+        # few candidates are a small program
+        ("close-loop", {"effects": ["giesekus_mobility", "stress_gain", "tool_compliance"]}),
+        pytest.param("close-loop", {}, marks=pytest.mark.slow),
+        pytest.param("compare", {}, marks=pytest.mark.slow),
+    ],
+    ids=["few candidates", "close-loop", "compare"],
+)
+def test_a_dead_sensor_goes_through_the_whole_program_without_a_claim(
+    task, loop, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(CASES, "dead_sensor", replace(CASES["dead_sensor"], loop=loop))
     row = run_case("dead_sensor", task, tmp_path, 0, pages=False)
     assert row["verdict"] in ("no_signal", "unexplained", "refused"), row.get("message")
     assert not row["falsehoods"]

@@ -165,14 +165,33 @@ def test_a_covariance_that_is_none_is_refused(covariance):
         make_problem(records(0), MOBILITY_TERM, MODULUS, TIME, modulus_covariance=covariance)
 
 
-def test_a_base_from_a_sweep_brings_the_errors_of_its_moduli():
+def test_a_base_from_a_sweep_brings_the_covariance_of_its_moduli(monkeypatch):
+    """Of which the problem that is fitted makes the errors beside every interval, as above."""
+
+    def stopped(*_, modulus_covariance=None, **__):
+        met.append(modulus_covariance)
+        raise InterruptedError
+
+    met: list = []
+    monkeypatch.setattr("discover.learners.tensor_sindy.estimator.make_problem", stopped)
+    base = dc.Fluid.from_sweep(sweep(0))
+    exact = dc.Fluid(dc.make_law("ucm"), base.modulus, base.relaxation_time)
+    for one in (base, exact):
+        with pytest.raises(InterruptedError):
+            dc.TensorSINDy(base=one, library=MOBILITY_TERM, n_stability=0).fit(records(0))
+    np.testing.assert_array_equal(met[0], base.modulus_covariance)
+    assert met[1] is None
+    with pytest.raises(InputError, match="base holds modulus_covariance already"):
+        dc.TensorSINDy(base=base, modulus_covariance=np.eye(3)).fit(records(0))
+
+
+@pytest.mark.slow
+def test_an_interval_beside_a_base_from_a_sweep_holds_the_mobility():
     base = dc.Fluid.from_sweep(sweep(0))
     sparse = dc.TensorSINDy(base=base, library=MOBILITY_TERM, n_stability=0).fit(records(0))
     assert sparse.uncertainty_.modulus_errors is not None
     low, high = sparse.terms_[0].ci95
     assert low <= MOBILITY <= high
-    with pytest.raises(InputError, match="base holds modulus_covariance already"):
-        dc.TensorSINDy(base=base, modulus_covariance=np.eye(3)).fit(records(0))
 
 
 def test_a_study_hands_every_learner_what_it_knows(monkeypatch):

@@ -43,7 +43,7 @@ def test_a_step_takes_its_new_rate_at_the_jump():
 def test_a_batch_gives_the_rates_of_its_members():
     flows = list(FLOWS.values())
     times = jnp.linspace(0.0, 5.0, 23)
-    batch = jax.vmap(lambda flow: jax.vmap(flow.rate)(times))(stack_protocols(flows))
+    batch = jax.jit(jax.vmap(lambda flow: jax.vmap(flow.rate)(times)))(stack_protocols(flows))
     for together, flow in zip(batch, flows, strict=True):
         np.testing.assert_allclose(together, jax.vmap(flow.rate)(times), atol=1e-14)
 

@@ -48,7 +48,9 @@ def in_the_loop(protocols, times=TIMES):
     return model.predict(model.zero(), make_batch(runs, strain_step=0.05))
 
 
-@pytest.mark.parametrize("kind", ["uniaxial", "planar", "biaxial"])
+@pytest.mark.parametrize(
+    "kind", ["uniaxial", "biaxial", pytest.param("planar", marks=pytest.mark.slow)]
+)
 def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     protocol = in_flow(start_up(0.6), kind)
     exact = BY_SCIPY.recorded(kind, lambda _: 0.6, TIMES)

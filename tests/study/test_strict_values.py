@@ -1,15 +1,19 @@
 """Values of a study are of the kind that they are written as; nothing is turned into another."""
 
+import os
 import subprocess
 import sys
 import time
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from discover.dataset.toml_file import read_toml
 from discover.errors import InputError
 from discover.study import parse_study, read_study
+
+ROOT = Path(__file__).parents[2]
 
 
 def study(section, **values):
@@ -61,9 +65,12 @@ made = dc.synthetic_dataset(
 )
 print(made.noise, len(made.runs[0]))
 """
+    # what it simulates is a program that others use
+    cache = {"JAX_COMPILATION_CACHE_DIR": str(ROOT / ".pytest_cache" / "compiled")}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
-    )
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True,
+        env=os.environ | cache,
+    )  # fmt: skip
     *refused, taken = done.stdout.splitlines()
     assert [line.split("; got ")[0].count(" must be ") for line in refused] == [1] * 6
     assert [line.split("; got ")[1].split(".")[0] for line in refused] == [

@@ -281,12 +281,15 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     slowest = int(np.argmax(times))
     # of one law for all modes the slowest gives way first
     numbers = range(len(times)) if differs_by_mode(fluid.law) else [slowest]
+    # as many rates at first as later on a finer grid, for which one program serves
+    same = np.pad(rates, (0, EXTENSION_RATES.size + _REFINED - rates.size), mode="edge")
     good = np.ones(rates.size, dtype=bool)
     for number in numbers:
         law = law_of_mode(fluid.law, number)
-        scaled = jnp.asarray(rates * (times[number] / times[slowest]))
+        scaled = jnp.asarray(same * (times[number] / times[slowest]))
         _, jacobian, residual = steady_uniaxial_extension(law, scaled)
-        good &= is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+        found = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+        good &= found[: rates.size]
     return rates.size if good.all() else int(np.argmin(good))
 
 
