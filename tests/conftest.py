@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import jaxtyping
 import pytest
@@ -26,26 +25,6 @@ gc.set_threshold(100_000, 50, 100)
 # What is first imported inside a module under the hook below is compiled anew, in every worker.
 for _large in ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic"):
     importlib.import_module(_large)
-
-_with_checks = jaxtyping.jaxtyped
-
-
-def _jaxtyped(*args: Any, **kwargs: Any) -> Any:
-    """Check what is declared where a module is read, and leave alone what a function declares.
-
-    The hook wraps that anew at every call of the function, and so does it with what has no type.
-    """
-    made = _with_checks(*args, **kwargs)
-
-    def checked(declared: Any) -> Any:
-        inner = "<locals>" in getattr(declared, "__qualname__", "")
-        typed = isinstance(declared, type) or getattr(declared, "__annotations__", True)
-        return declared if inner or not typed else made(declared)
-
-    return made if args else checked
-
-
-jaxtyping.jaxtyped = _jaxtyped
 
 # Shapes written on public functions are checked while the tests run. The hook must come before
 # the packages are imported.
