@@ -15,6 +15,7 @@ from discover.closed_loop.candidates import (
 from discover.closed_loop.explanations import (
     BEAM_WIDTH,
     explain,
+    modes_over_explanations,
     over_explanations,
     weighed_times,
     why_untested,
@@ -164,9 +165,10 @@ def run_loop(
             min((one.criterion for one in verdict.other_times), default=np.inf),
         )  # fmt: skip
     beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
-    bounds, by_mode = constants.bounds, constants.by_mode
+    bounds, seen = constants.bounds, (final.model, final.fit, final.carried, side_by_side)
+    by_mode = modes_over_explanations(constants.by_mode, *seen)
     times = weighed_times(verdict.other_times, final.carried, final.active)
-    over_all = over_explanations(bounds, final.model, final.fit, final.carried, side_by_side, times)
+    over_all = over_explanations(bounds, *seen, times)
     differ = {name for name, found in by_mode.items() if found.degree}
     own = declared_parameters(declared, final.fit, (bounds, over_all))
     of_law = {n: with_shared_interval(by_mode[n], one) for n, one in own.items() if n in by_mode}

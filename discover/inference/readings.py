@@ -38,7 +38,7 @@ def _readings(
     residual: Float[np.ndarray, "runs n"],
     jacobian: Float[np.ndarray, "free runs n"],
     moduli: Float[np.ndarray, "k runs n"],
-    errors: Float[np.ndarray, "k runs n"],
+    errors: Float[np.ndarray, "errors runs n"],
 ) -> list[Reading]:
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     found = []
@@ -68,7 +68,7 @@ def _readings(
 
 def _of_moduli(
     model: AugmentedModel, batch: Batch, theta: np.ndarray
-) -> tuple[Float[np.ndarray, "k runs n"], Float[np.ndarray, "k runs n"]]:
+) -> tuple[Float[np.ndarray, "k runs n"], Float[np.ndarray, "errors runs n"]]:
     """Return what relative changes of each modulus change, and errors that a sweep leaves."""
     modulus = np.asarray(model.declared.modulus, dtype=float)
     found = np.zeros((0, *np.shape(batch.weight)))

@@ -1,6 +1,9 @@
 """Several explanations of the same records: how probable each is, and what they predict."""
 
-from discover.closed_loop.explanations.bands.wider_intervals import over_explanations
+from discover.closed_loop.explanations.bands.wider_intervals import (
+    modes_over_explanations,
+    over_explanations,
+)
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
 from discover.closed_loop.explanations.other_times import weighed_times
 from discover.closed_loop.explanations.proposed_tests import next_tests
@@ -11,6 +14,7 @@ __all__ = [
     "BEAM_WIDTH",
     "Carried",
     "explain",
+    "modes_over_explanations",
     "next_tests",
     "over_explanations",
     "search_and_carry",

@@ -1,6 +1,7 @@
 """Intervals of constants that hold whichever of the explanations is the right one."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.other_times import OtherTimes
 from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
-from discover.forward import AugmentedModel
+from discover.forward import AugmentedModel, FreeParameter
 from discover.forward.least_squares import Fit
+from discover.inference.constants import ConstantByMode, ModeConstant
+from discover.inference.degrees import Degree
+from discover.inference.varying_constant import varying_constants
 
 Bounds = Mapping[int, tuple[float, float]]
 
@@ -71,6 +75,55 @@ def over_explanations(
             # half a normal distribution may reach beyond the range that is physical
             found[at] = (min(low, max(ends[0], least)), max(high, min(ends[1], largest)))
     return found
+
+
+def modes_over_explanations(
+    by_mode: Mapping[str, ConstantByMode],
+    model: AugmentedModel,
+    fit: Fit,
+    carried: Sequence[Carried],
+    explanations: Explanations,
+) -> dict[str, ConstantByMode]:
+    """Return constants by mode, the interval of each mode over all explanations that have them.
+
+    Beside a twin of another effect they often have other values: those of a law of Phan-Thien and
+    Tanner beside non-affine motion, and beside the term of the library that no shear stress tells
+    from it.
+
+    Parameters
+    ----------
+    by_mode
+        By name, given the effects of the fit.
+    model, fit, carried, explanations
+        As in `over_explanations`.
+    """
+    found, weighed = dict(by_mode), contenders(carried, explanations)
+    effects = {effect.name for effect in model.effects}
+    varying = varying_constants(model, fit, {name: Degree() for name in by_mode})
+    for name, constant in varying.items():
+        having = [pair for pair in weighed if name not in effects or name in pair[0].effects]
+        if not having:
+            continue
+        values = np.array([constant.of_modes(one.fit) for one, _ in having])
+        weights = np.array([weight for _, weight in having])
+        weights /= np.sum(weights)
+        modes = tuple(
+            _over(mode, column, weights, constant.law)
+            for mode, column in zip(by_mode[name].modes, values.T, strict=True)
+        )
+        found[name] = replace(by_mode[name], modes=modes)
+    return found
+
+
+def _over(
+    mode: ModeConstant, values: np.ndarray, weights: np.ndarray, law: FreeParameter
+) -> ModeConstant:
+    if mode.ci95 is None or not mode.ci95[0] < mode.value < mode.ci95[1]:
+        return mode
+    low, high = mode.ci95
+    ends = _ends(values, weights, mode.value - low, high - mode.value)
+    held = min(low, max(ends[0], law.low)), max(high, min(ends[1], law.high))
+    return replace(mode, ci95=held)
 
 
 def _ends(values, weights, below: float, above: float) -> tuple[float, float]:
