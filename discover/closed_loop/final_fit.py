@@ -17,6 +17,7 @@ from discover.closed_loop.judging.between_samples import (
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
+from discover.closed_loop.judging.loadings import LoadingFound, factors_of_loadings
 from discover.closed_loop.judging.misread_runs import holding_misreading
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.own_noise import weighed_like
@@ -74,6 +75,20 @@ class FinalFit:
     def batch(self) -> Batch:
         """The fitted runs as the model has them."""
         return self.search.batch
+
+    @property
+    def loading(self) -> float:
+        """Standard deviation of the factors of loadings; zero where runs are none of their own."""
+        return max((run.loading.deviation for run in self.fitted if run.loading), default=0.0)
+
+    @cached_property
+    def loadings(self) -> list[LoadingFound]:
+        """The factors of the loadings of all runs; none where they are none of their own."""
+        told, model = (self.batch, self.fit), self.model
+        found = factors_of_loadings(model, told, self.batch, held_out=False)
+        if self.held_batch is not None:
+            found += factors_of_loadings(model, told, self.held_batch, held_out=True)
+        return found
 
     @property
     def fit(self) -> Fit:
@@ -243,7 +258,9 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     repeats = repeats_among(final.fitted)
     small = small_faults(final.fitted_readings, 0.0 if repeats is None else repeats.error)
     bounds = with_small_faults(profile.bounds, fit, model, small)
-    bounds, otherwise = holding_misreading(bounds, fit, final.fitted_readings, model)
+    bounds, otherwise = holding_misreading(
+        bounds, fit, final.fitted_readings, model, bool(final.loading)
+    )
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)

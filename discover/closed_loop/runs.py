@@ -1,6 +1,7 @@
 """The runs that a closed loop fits, and those that judge it: without spikes, cut and thinned."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
 from discover.dataset.copies import require_no_copies
+from discover.dataset.loading import Loading
 from discover.dataset.spikes import without_spikes
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
@@ -22,6 +24,9 @@ FEWEST_LINEAR_SAMPLES = 10
 MOST_SAMPLES = 400
 """Samples of a run that are used by default, at most: a search costs as much as it has samples, and
 more of them say little more of a law."""
+
+LARGEST_LOADING = 0.1
+"""By more no two loadings of a sample differ; so `discover.dataset.repeats` has it."""
 
 _FEWEST_KEPT = 150
 _RESOLVED = 1e-3
@@ -78,6 +83,39 @@ def split_runs(
         for part in (fitted, held)
     )
     return fitted_runs, held_runs, spikes
+
+
+def with_loadings(
+    runs: Sequence[Run], deviation: float | None, noise: float | None
+) -> list[Run]:
+    """Return runs each of which is a loading of its own; as they are where nothing is said of it.
+
+    Parameters
+    ----------
+    deviation
+        Relative standard deviation by which loadings differ.
+    noise
+        Relative noise, where it is known.
+
+    Raises
+    ------
+    InputError
+        If they cannot differ so, or a stress was imposed, which a factor changes otherwise.
+    """
+    if deviation is None:
+        return list(runs)
+    if not 0.0 < deviation <= LARGEST_LOADING:
+        raise InputError(
+            f"loading must be above 0 and at most {LARGEST_LOADING:g}; got {deviation:g}. It is the "
+            "relative standard deviation by which loadings of the sample differ, such as 0.03."
+        )
+    creep = [run.name for run in runs if run.protocol.control == "stress"]
+    if creep:
+        raise InputError(
+            f"loading is a factor on a recorded stress, and the stress of the run {creep[0]!r} was "
+            "imposed. Take such runs out, or leave loading out."
+        )
+    return [replace(run, loading=Loading(deviation, noise)) for run in runs]
 
 
 def _without_spikes(runs: Sequence[Run], spikes: dict[str, list[float]]) -> Iterator[Run]:

@@ -182,6 +182,7 @@ class Loop(Section):
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
     explanations: Annotated[int, Field(ge=1, le=64)] = 8
+    loading: Annotated[float, Field(gt=0, le=0.1)] | None = None
 
     @model_validator(mode="after")
     def _window(self):

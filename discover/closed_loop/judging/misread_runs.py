@@ -35,6 +35,7 @@ def judged_as_read(
     resolution: NumericalResolution,
     theta: np.ndarray,
     active: Sequence[str],
+    loadings: bool = False,
 ) -> Judgement:
     """Return a judgement that another reading of the runs does not refute.
 
@@ -50,6 +51,8 @@ def judged_as_read(
         What arithmetic leaves of the fitted runs.
     theta, active
         The parameters, and the effects in the model.
+    loadings
+        Whether each run has a factor of its own already.
     """
     if judgement.verdict not in ("effects_added", "no_effect_needed"):
         return judgement
@@ -57,28 +60,31 @@ def judged_as_read(
     if expectation.noise is not None and left.misfit <= left.expected:
         return judgement
     sets = [fitted, [*fitted, *unseen]] if unseen else [fitted]
-    best = clear_misreading(sets, expectation, 0.0)
+    best = clear_misreading(sets, expectation, 0.0, loadings)
     if best is None or best.size <= STRUCTURE * resolution.limit(theta, active, best.size):
         return judgement
+    advised = advice(best)
+    if best.kind == "factor":
+        advised += ", or let each run be a loading of its own ([loop] loading)"
     text = (
         f"{judgement.description} But the records follow the model clearly better {reads(best)}: "
-        f"{advice(best)}. Constants beside it would be others, so nothing is explained."
+        f"{advised}. Constants beside it would be others, so nothing is explained."
     )
     return replace(
         judgement,
         verdict="unexplained",
         structured=True,
-        left=left.refuted(left.reason, advice(best)),
+        left=left.refuted(left.reason, advised),
         description=text,
         read_as=reads(best),
     )
 
 
 def holding_misreading(
-    bounds: Bounds, fit: Fit, fitted: Sequence[Reading], model: AugmentedModel
+    bounds: Bounds, fit: Fit, fitted: Sequence[Reading], model: AugmentedModel, loadings: bool
 ) -> tuple[Bounds, Misread | None]:
     """Return intervals that hold with a fault that is not ruled out too, and the fault."""
-    found = misread(fitted)
+    found = misread(fitted, loadings)
     if found is None or found.probability > POSSIBLE or not len(found.steps):
         return bounds, None
     wider = dict(bounds)

@@ -1,7 +1,8 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
 from discover.forward.batches.imposed_stress import StressBatch
-from discover.forward.batches.mixed import Batch, MixedBatch, Part, make_batch
+from discover.forward.batches.loadings import Loadings
+from discover.forward.batches.mixed import Batch, MixedBatch, Part, as_loaded, as_predicted, make_batch
 from discover.forward.batches.oscillation import OscillationBatch, Places
 from discover.forward.batches.samples import even
 from discover.forward.batches.scales import data_scales
@@ -10,6 +11,7 @@ from discover.forward.batches.transient import RunBatch
 
 __all__ = [
     "Batch",
+    "Loadings",
     "MixedBatch",
     "OscillationBatch",
     "Part",
@@ -17,6 +19,8 @@ __all__ = [
     "RunBatch",
     "SteadyBatch",
     "StressBatch",
+    "as_loaded",
+    "as_predicted",
     "data_scales",
     "even",
     "make_batch",
