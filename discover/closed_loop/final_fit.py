@@ -35,7 +35,7 @@ from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
-from discover.inference.readings import fitted_readings, unseen_readings
+from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.statistics.misread import Misread, not_ruled_out
@@ -167,6 +167,12 @@ class FinalFit:
             self.model, self.held_batch, self.held_out, self.fit, self.search.path[-1]
         )
 
+    @property
+    def readings(self) -> tuple[list[Reading], list[Reading]]:
+        """The fitted runs and those held out, to be asked together."""
+        constants = len(self.fit.free)
+        return beside_one_another(self.fitted_readings, self.unseen_readings, constants)
+
     def unseen(self) -> HeldOut | None:
         """Return what the final model leaves of the runs held out, if there are any."""
         if self.held_batch is None:
@@ -258,14 +264,13 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     repeats = repeats_among(final.fitted)
     small = small_faults(final.fitted_readings, 0.0 if repeats is None else repeats.error)
     bounds = with_small_faults(profile.bounds, fit, model, small)
-    bounds, otherwise = holding_misreading(
-        bounds, fit, final.fitted_readings, model, bool(final.loading)
-    )
+    bounds, otherwise = holding_misreading(bounds, fit, final.fitted_readings, model)
     unknown, coarse = final.between_samples(batch, final.fitted), None
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
     freer = freer_fits(model, batch, fit, search.degrees, search.prior)
-    beside = None if small is None else small.about_the_fit
+    count = len(fit.free)  # factors of loadings come after the constants
+    beside = None if small is None else small.about_the_fit[:count, :count]
     by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer, beside)
     return FinalConstants(
         bounds, unknown, coarse, {**by_mode, **apart}, profile.possible, otherwise

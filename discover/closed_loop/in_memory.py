@@ -59,8 +59,8 @@ def close_loop(
     progress
         Called now and then with a line of text and about what fraction is done.
     **options
-        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws`, `loading`
-        of `discover.closed_loop.run_loop`.
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` and
+        `loading` of `discover.closed_loop.run_loop`.
 
     Returns
     -------

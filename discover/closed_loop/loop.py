@@ -282,18 +282,19 @@ def _remaining(
             final.model, final.fit, constants.bounds, final.fitted, final.held_out
         ),
         "not_named": {n: text for n, text in search.not_named.items() if n not in final.active},
-        **_of_loadings(final),
+        **_of_loadings(final, judgement.structured),
     }
 
 
-def _of_loadings(final: FinalFit) -> dict[str, Any]:
+def _of_loadings(final: FinalFit, structured: bool) -> dict[str, Any]:
     """Return the factors of loadings by name of the run, where runs are loadings of their own."""
     if not final.loading:
         return {}
-    found = {
-        one.run: {"factor": one.factor, "ci95": [*one.ci95], "held_out": one.held_out}
-        for one in final.loadings
-    }
+    found = {}
+    for one in final.loadings:
+        # beside a law that is missing no interval is claimed
+        ci95 = None if structured else [*one.ci95]
+        found[one.run] = {"factor": one.factor, "ci95": ci95, "held_out": one.held_out}
     return {"loading_deviation": final.loading, "loading": found}
 
 

@@ -85,9 +85,7 @@ def split_runs(
     return fitted_runs, held_runs, spikes
 
 
-def with_loadings(
-    runs: Sequence[Run], deviation: float | None, noise: float | None
-) -> list[Run]:
+def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
     """Return runs each of which is a loading of its own; as they are where nothing is said of it.
 
     Parameters
@@ -106,8 +104,8 @@ def with_loadings(
         return list(runs)
     if not 0.0 < deviation <= LARGEST_LOADING:
         raise InputError(
-            f"loading must be above 0 and at most {LARGEST_LOADING:g}; got {deviation:g}. It is the "
-            "relative standard deviation by which loadings of the sample differ, such as 0.03."
+            f"loading must be above 0 and at most {LARGEST_LOADING:g}; got {deviation:g}. It is "
+            "the relative standard deviation by which loadings of a sample differ, such as 0.03."
         )
     creep = [run.name for run in runs if run.protocol.control == "stress"]
     if creep:

@@ -70,8 +70,8 @@ def verdict_on(
     judgement = judged_with(judgement, constants.coarse)
     tolerated = search.tolerated
     judgement = judged_as_read(
-        judgement, final.fitted_readings, final.unseen_readings, tolerated.expectation,
-        tolerated.resolution, final.fit.theta, active, bool(final.loading),
+        judgement, *final.readings, tolerated.expectation,
+        tolerated.resolution, final.fit.theta, active,
     )  # fmt: skip
     judgement = judged_by_loadings(judgement, final.loadings, final.loading)
     times = other_times(search, final.carried, judgement) if final.carried else []

@@ -82,7 +82,7 @@ class Misread:
         return expectation.excuses(self.size)
 
 
-def misread(runs: Sequence[Reading], loadings: bool = False) -> Misread | None:
+def misread(runs: Sequence[Reading]) -> Misread | None:
     """Return the fault by which records are described best; None where none can be told.
 
     The constants that the columns stand for are fitted along, and so is a factor that all runs
@@ -94,22 +94,16 @@ def misread(runs: Sequence[Reading], loadings: bool = False) -> Misread | None:
     ----------
     runs
         Fitted, or not; of one of fewer than eight samples nothing is asked.
-    loadings
-        Whether each run has a factor of its own already, which is no fault then.
     """
     session = Session(runs)
     if not session.is_told:
         return None
-    kinds = [kind for kind in KINDS if not (loadings and kind == "factor")]
-    found = [one for kind in kinds if (one := _likeliest(session, kind, loadings)) is not None]
+    found = [one for kind in KINDS if (one := _likeliest(session, kind)) is not None]
     return min(found, key=lambda one: one.probability, default=None)
 
 
 def clear_misreading(
-    sets: Sequence[Sequence[Reading]],
-    expectation: Expectation,
-    least: float,
-    loadings: bool = False,
+    sets: Sequence[Sequence[Reading]], expectation: Expectation, least: float
 ) -> Misread | None:
     """Return the fault by which records are described clearly better; None if by none.
 
@@ -121,11 +115,9 @@ def clear_misreading(
         What a complete law may leave: the error of linear data, or what repeats differ by.
     least
         Relative size that arithmetic explains.
-    loadings
-        As in `misread`.
     """
     sets = [runs for runs in sets if runs]
-    found = [one for runs in sets if (one := misread(runs, loadings)) is not None]
+    found = [one for runs in sets if (one := misread(runs)) is not None]
     clear = [one for one in found if len(sets) * one.probability <= CLEAR and one.size > least]
     seen = [one for one in clear if not one.excused(expectation)]
     return min(seen, key=lambda one: one.probability, default=None)
@@ -168,17 +160,15 @@ def not_ruled_out(found: Misread) -> str:
     )
 
 
-def _likeliest(session: Session, kind: FaultKind, loadings: bool) -> Misread | None:
+def _likeliest(session: Session, kind: FaultKind) -> Misread | None:
     """Return the likeliest fault of a kind; None where there is none of it."""
-    found = [_told(session, fault, loadings) for fault in session.faults(kind)]
+    found = [_told(session, fault) for fault in session.faults(kind)]
     told = [one for one in found if one is not None]
     return min(told, key=lambda one: one.probability, default=None)
 
 
-def _told(session: Session, fault: Fault, loadings: bool) -> Misread | None:
+def _told(session: Session, fault: Fault) -> Misread | None:
     beside = session.columns
-    if loadings:
-        beside = np.vstack([beside, *(fault.own for fault in session.faults("factor"))])
     if fault.kind == "factor":  # one that all runs share is a modulus, and no fault of theirs
         beside = np.vstack([beside, session.predicted])
     one = session.estimate(fault.own, beside)

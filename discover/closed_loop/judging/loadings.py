@@ -12,7 +12,7 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from discover.closed_loop.judging.judgement import Judgement
-from discover.forward import AugmentedModel, Batch, as_predicted
+from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, uncertainty, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.independent_samples import independent_samples
@@ -59,7 +59,7 @@ def factors_of_loadings(
     batch, held_out
         Runs, and whether the fit did not see them.
     """
-    own, fit = getattr(batch, "loadings", None), fitted[1]
+    own, fit = loadings_of(batch), fitted[1]
     if own is None or not fit.usable:
         return []
     trials, widths = [fit.theta], widths_of(model, fit.theta, fit.free)
@@ -97,7 +97,9 @@ def factors_of_loadings(
     ]
 
 
-def judged_by_loadings(judgement: Judgement, found: Sequence[LoadingFound], deviation: float):
+def judged_by_loadings(
+    judgement: Judgement, found: Sequence[LoadingFound], deviation: float
+) -> Judgement:
     """Return a judgement that factors larger than loadings differ by refute.
 
     Parameters
@@ -109,17 +111,21 @@ def judged_by_loadings(judgement: Judgement, found: Sequence[LoadingFound], devi
     deviation
         Standard deviation by which loadings are said to differ.
     """
-    explains = judgement.verdict in ("effects_added", "no_effect_needed")
     sets = [[one for one in found if one.held_out is held] for held in (False, True)]
     chances = [chi2.sf(sum(one.deviations**2 for one in s), len(s)) for s in sets if s]
-    if not explains or not chances or len(chances) * min(chances) > TOO_FAR:
+    silent = judgement.verdict == "no_signal"
+    if silent or not chances or len(chances) * min(chances) > TOO_FAR:
         return judgement
     worst = max(found, key=lambda one: one.deviations)
+    refuted = judgement.verdict != "unexplained"
     text = (
-        f"{judgement.description} But the loadings would have to differ by more than they are said "
-        f"to, {percent_of(deviation)}: {worst.run} is read as {worst.factor:.3g} times the model. "
-        "What differs so from run to run may be the law, so nothing is explained."
+        f"{judgement.description} {'But the' if refuted else 'The'} loadings would have to differ "
+        f"by more than they are said to, {percent_of(deviation)}: {worst.run} is read as "
+        f"{worst.factor:.3g} times the model. What differs so from run to run may be the law"
+        f"{', so nothing is explained' if refuted else ''}."
     )
+    if not refuted:
+        return replace(judgement, description=text)
     advice = "repeat a run on a new loading, which tells by how much loadings differ"
     return replace(
         judgement,
@@ -134,7 +140,7 @@ def _excess(
     model: AugmentedModel, theta: np.ndarray, batch: Batch
 ) -> Float[np.ndarray, " loadings"]:
     """Return the variance of the mean of what is left of each loading, over what was assumed."""
-    own = getattr(batch, "loadings", None)
+    own = loadings_of(batch)
     assert own is not None
     residual = model.residuals([theta], batch)[0]
     found = []
@@ -156,7 +162,7 @@ def _by_moduli(
     slopes: Float[np.ndarray, "free loadings"],
 ) -> Float[np.ndarray, " loadings"]:
     """Return the variance of factors by errors of moduli, as a sweep leaves them."""
-    fit, own = fitted[1], getattr(batch, "loadings", None)
+    fit, own = fitted[1], loadings_of(batch)
     shifts = modulus_shifts(model, fit.theta, fitted[0])
     assert own is not None
     if not len(shifts):

@@ -35,7 +35,6 @@ def judged_as_read(
     resolution: NumericalResolution,
     theta: np.ndarray,
     active: Sequence[str],
-    loadings: bool = False,
 ) -> Judgement:
     """Return a judgement that another reading of the runs does not refute.
 
@@ -51,8 +50,6 @@ def judged_as_read(
         What arithmetic leaves of the fitted runs.
     theta, active
         The parameters, and the effects in the model.
-    loadings
-        Whether each run has a factor of its own already.
     """
     if judgement.verdict not in ("effects_added", "no_effect_needed"):
         return judgement
@@ -60,7 +57,7 @@ def judged_as_read(
     if expectation.noise is not None and left.misfit <= left.expected:
         return judgement
     sets = [fitted, [*fitted, *unseen]] if unseen else [fitted]
-    best = clear_misreading(sets, expectation, 0.0, loadings)
+    best = clear_misreading(sets, expectation, 0.0)
     if best is None or best.size <= STRUCTURE * resolution.limit(theta, active, best.size):
         return judgement
     advised = advice(best)
@@ -81,14 +78,15 @@ def judged_as_read(
 
 
 def holding_misreading(
-    bounds: Bounds, fit: Fit, fitted: Sequence[Reading], model: AugmentedModel, loadings: bool
+    bounds: Bounds, fit: Fit, fitted: Sequence[Reading], model: AugmentedModel
 ) -> tuple[Bounds, Misread | None]:
     """Return intervals that hold with a fault that is not ruled out too, and the fault."""
-    found = misread(fitted, loadings)
+    found = misread(fitted)
     if found is None or found.probability > POSSIBLE or not len(found.steps):
         return bounds, None
     wider = dict(bounds)
-    for position, step in zip(fit.free, found.steps, strict=True):
+    # factors of loadings, where these are fitted along, are no constants and come last
+    for position, step in zip(fit.free, found.steps[: len(fit.free)], strict=True):
         if position not in bounds or not np.isfinite(step):
             continue
         low, high = bounds[position]

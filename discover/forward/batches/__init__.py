@@ -2,7 +2,15 @@
 
 from discover.forward.batches.imposed_stress import StressBatch
 from discover.forward.batches.loadings import Loadings
-from discover.forward.batches.mixed import Batch, MixedBatch, Part, as_loaded, as_predicted, make_batch
+from discover.forward.batches.mixed import (
+    Batch,
+    MixedBatch,
+    Part,
+    as_loaded,
+    as_predicted,
+    loadings_of,
+    make_batch,
+)
 from discover.forward.batches.oscillation import OscillationBatch, Places
 from discover.forward.batches.samples import even
 from discover.forward.batches.scales import data_scales
@@ -23,5 +31,6 @@ __all__ = [
     "as_predicted",
     "data_scales",
     "even",
+    "loadings_of",
     "make_batch",
 ]

@@ -48,6 +48,11 @@ class MixedBatch(eqx.Module):
 Batch = Part | MixedBatch
 
 
+def loadings_of(batch: Batch) -> Loadings | None:
+    """Return the loadings of a batch; None where its runs are none of their own."""
+    return batch.loadings if isinstance(batch, MixedBatch) else None
+
+
 def as_predicted(batch: Batch) -> Batch:
     """Return a batch whose residuals are those of predictions, without factors of loadings."""
     if not isinstance(batch, MixedBatch) or batch.loadings is None:

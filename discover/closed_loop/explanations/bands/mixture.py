@@ -12,7 +12,7 @@ from discover.closed_loop.explanations.bands.growth import growth
 from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.held_out import root_of_covariance
-from discover.forward import AugmentedModel, Batch, as_predicted
+from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
@@ -90,10 +90,11 @@ def mixed_bands(
 
 def _deviations(batch: Batch) -> Float[np.ndarray, "runs 1"]:
     """Return by how much the factor of each run may differ from one; zero where it has none."""
-    own = getattr(batch, "loadings", None)
+    own = loadings_of(batch)
     found = np.zeros((len(batch.weight), 1))
-    for rows in () if own is None else own.rows:
-        found[[*rows]] = own.deviation
+    if own is not None:
+        for rows in own.rows:
+            found[[*rows]] = own.deviation
     return found
 
 
