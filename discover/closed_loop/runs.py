@@ -10,7 +10,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
 from discover.dataset.copies import require_no_copies
-from discover.dataset.loading import Loading
+from discover.dataset.loading import LARGEST, Loading
 from discover.dataset.spikes import without_spikes
 from discover.dataset.thinning import thin_run
 from discover.errors import InputError
@@ -24,9 +24,6 @@ FEWEST_LINEAR_SAMPLES = 10
 MOST_SAMPLES = 400
 """Samples of a run that are used by default, at most: a search costs as much as it has samples, and
 more of them say little more of a law."""
-
-LARGEST_LOADING = 0.1
-"""By more no two loadings of a sample differ; so `discover.dataset.repeats` has it."""
 
 _FEWEST_KEPT = 150
 _RESOLVED = 1e-3
@@ -102,9 +99,9 @@ def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | N
     """
     if deviation is None:
         return list(runs)
-    if not 0.0 < deviation <= LARGEST_LOADING:
+    if not 0.0 < deviation <= LARGEST:
         raise InputError(
-            f"loading must be above 0 and at most {LARGEST_LOADING:g}; got {deviation:g}. It is "
+            f"loading must be above 0 and at most {LARGEST:g}; got {deviation:g}. It is "
             "the relative standard deviation by which loadings of a sample differ, such as 0.03."
         )
     creep = [run.name for run in runs if run.protocol.control == "stress"]

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+LARGEST = 0.1
+"""By more no two loadings of one sample differ; `discover.dataset.repeats` takes it so, too."""
+
 
 @dataclass(frozen=True)
 class Loading:
