@@ -104,7 +104,7 @@ def test_page_says_that_it_holds_if_loadings_differ_so(loaded, tmp_path):
 
 def test_runs_of_one_loading_have_the_same_answer_with_wider_intervals(exact):
     data = data_of(exact, {})
-    plain, free = closed(data), closed(data, loading=0.03)
+    plain, free = (closed(data, max_effects=1, loading=one) for one in (None, 0.03))
     assert plain.verdict == free.verdict == "effects_added"
     assert "loading" not in plain.remaining
     low, high = mobility(free)
@@ -128,7 +128,7 @@ def test_what_refutes_runs_read_by_factors_names_the_way_out(exact, monkeypatch)
 
 
 def test_a_law_of_another_kind_is_not_explained_by_factors():
-    loop = closed(data_of(records(KBKZ(modulus=100.0)), FACTORS), loading=0.03)
+    loop = closed(data_of(records(KBKZ(modulus=100.0)), FACTORS), loading=0.03, max_effects=1)
     assert loop.verdict == "unexplained"
     assert all(one["ci95"] is None for one in loop.remaining["loading"].values())
 
