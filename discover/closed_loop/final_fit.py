@@ -17,6 +17,7 @@ from discover.closed_loop.judging.between_samples import (
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
+from discover.closed_loop.judging.loadings import LoadingFound, factors_of_loadings
 from discover.closed_loop.judging.misread_runs import holding_misreading
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.own_noise import weighed_like
@@ -34,7 +35,7 @@ from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.profile import profiled
-from discover.inference.readings import fitted_readings, unseen_readings
+from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.statistics.misread import Misread, not_ruled_out
@@ -74,6 +75,20 @@ class FinalFit:
     def batch(self) -> Batch:
         """The fitted runs as the model has them."""
         return self.search.batch
+
+    @property
+    def loading(self) -> float:
+        """Standard deviation of the factors of loadings; zero where runs are none of their own."""
+        return max((run.loading.deviation for run in self.fitted if run.loading), default=0.0)
+
+    @cached_property
+    def loadings(self) -> list[LoadingFound]:
+        """The factors of the loadings of all runs; none where they are none of their own."""
+        told, model = (self.batch, self.fit), self.model
+        found = factors_of_loadings(model, told, self.batch, held_out=False)
+        if self.held_batch is not None:
+            found += factors_of_loadings(model, told, self.held_batch, held_out=True)
+        return found
 
     @property
     def fit(self) -> Fit:
@@ -151,6 +166,12 @@ class FinalFit:
         return unseen_readings(
             self.model, self.held_batch, self.held_out, self.fit, self.search.path[-1]
         )
+
+    @property
+    def readings(self) -> tuple[list[Reading], list[Reading]]:
+        """The fitted runs and those held out, to be asked together."""
+        constants = len(self.fit.free)
+        return beside_one_another(self.fitted_readings, self.unseen_readings, constants)
 
     def unseen(self) -> HeldOut | None:
         """Return what the final model leaves of the runs held out, if there are any."""
@@ -248,7 +269,8 @@ def final_constants(final: FinalFit, apart: Mapping[str, ConstantByMode]) -> Fin
     if unknown is not None:
         coarse, bounds = coarse_rates(model, batch, final.fitted, fit, bounds, unknown)
     freer = freer_fits(model, batch, fit, search.degrees, search.prior)
-    beside = None if small is None else small.about_the_fit
+    count = len(fit.free)  # factors of loadings come after the constants
+    beside = None if small is None else small.about_the_fit[:count, :count]
     by_mode = constants_by_mode(model, batch, fit, bounds, search.degrees, freer, beside)
     return FinalConstants(
         bounds, unknown, coarse, {**by_mode, **apart}, profile.possible, otherwise

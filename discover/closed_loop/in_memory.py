@@ -18,7 +18,9 @@ from discover.study.schema import Loop
 from discover.validation import validated
 from discover.words import counted
 
-_OPTIONS = {"effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws"}
+_OPTIONS = {
+    "effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws", "loading",
+}  # fmt: skip
 
 
 def close_loop(
@@ -57,8 +59,8 @@ def close_loop(
     progress
         Called now and then with a line of text and about what fraction is done.
     **options
-        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` of
-        `discover.closed_loop.run_loop`.
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` and
+        `loading` of `discover.closed_loop.run_loop`.
 
     Returns
     -------

@@ -36,7 +36,13 @@ from discover.closed_loop.judging.told_by_kinds import told_by_kinds
 from discover.closed_loop.own_noise import searched_by_noise
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs, with_later_spikes
+from discover.closed_loop.runs import (
+    MOST_SAMPLES,
+    require_samples,
+    split_runs,
+    with_later_spikes,
+    with_loadings,
+)
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import Store
 from discover.closed_loop.searching import SearchResult, SearchTask
@@ -68,6 +74,7 @@ def run_loop(
     store: Store | None = None,
     name: str = "search",
     left_out_in_turn: bool = False,
+    loading: float | None = None,
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
 
@@ -114,6 +121,10 @@ def run_loop(
         Of this search among others in the store.
     left_out_in_turn
         Whether other searches leave each of the runs out, and so test what this one finds.
+    loading
+        Relative standard deviation by which loadings of the sample differ, where each run is one of
+        its own: its record is then a factor of its own times what the model predicts, with that
+        deviation from one. By default there is no such factor.
 
     Raises
     ------
@@ -123,6 +134,9 @@ def run_loop(
     started = time.perf_counter()
     say = progress or (lambda line: None)
     fitted_runs, held_runs, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
+    fitted_runs, held_runs = (
+        with_loadings(some, loading, noise) for some in (fitted_runs, held_runs)
+    )
     candidates = candidates_of(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
@@ -270,7 +284,20 @@ def _remaining(
             final.model, final.fit, constants.bounds, final.fitted, final.held_out
         ),
         "not_named": {n: text for n, text in search.not_named.items() if n not in final.active},
+        **_of_loadings(final, judgement.structured),
     }
+
+
+def _of_loadings(final: FinalFit, structured: bool) -> dict[str, Any]:
+    """Return the factors of loadings by name of the run, where runs are loadings of their own."""
+    if not final.loading:
+        return {}
+    found = {}
+    for one in final.loadings:
+        # beside a law that is missing no interval is claimed
+        ci95 = None if structured else [*one.ci95]
+        found[one.run] = {"factor": one.factor, "ci95": ci95, "held_out": one.held_out}
+    return {"loading_deviation": final.loading, "loading": found}
 
 
 def _with_refusals(judgement: Judgement, search: Search) -> str:

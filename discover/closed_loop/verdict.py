@@ -14,6 +14,7 @@ from discover.closed_loop.final_fit import FinalConstants, FinalFit
 from discover.closed_loop.judging.between_samples import judged_with
 from discover.closed_loop.judging.judgement import Judgement, judge
 from discover.closed_loop.judging.left_out_in_turn import judged_in_turn
+from discover.closed_loop.judging.loadings import judged_by_loadings
 from discover.closed_loop.judging.misread_runs import judged_as_read
 from discover.closed_loop.judging.silence import Silence, fluid_is_silent
 from discover.dataset import Run
@@ -69,9 +70,10 @@ def verdict_on(
     judgement = judged_with(judgement, constants.coarse)
     tolerated = search.tolerated
     judgement = judged_as_read(
-        judgement, final.fitted_readings, final.unseen_readings, tolerated.expectation,
+        judgement, *final.readings, tolerated.expectation,
         tolerated.resolution, final.fit.theta, active,
     )  # fmt: skip
+    judgement = judged_by_loadings(judgement, final.loadings, final.loading)
     times = other_times(search, final.carried, judgement) if final.carried else []
     judgement, instead = compared_with_times(judgement, active, final.carried, times)
     aliases = [(name, FACTOR) for name in instead]

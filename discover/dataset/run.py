@@ -9,6 +9,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.columns import as_column
+from discover.dataset.loading import Loading
 from discover.errors import InputError
 from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
@@ -92,6 +93,8 @@ class Run:
         noise, in units of the mean. Misfits that are told or judged do not know it.
     normal_weights
         The same of its N1 and N2, where they are fitted beside the stress.
+    loading
+        How much a factor of its own on its record may differ from one; None where there is none.
 
     Examples
     --------
@@ -122,6 +125,7 @@ class Run:
     rate_steps: tuple[RateStep, ...] = ()
     weight: float = 1.0
     normal_weights: tuple[float, float] = (1.0, 1.0)
+    loading: Loading | None = None
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

@@ -5,7 +5,16 @@ declared law, then those of every candidate effect. At zero amplitude an effect 
 """
 
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import Batch, RunBatch, data_scales, even, make_batch
+from discover.forward.batches import (
+    Batch,
+    RunBatch,
+    as_loaded,
+    as_predicted,
+    data_scales,
+    even,
+    loadings_of,
+    make_batch,
+)
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 
 __all__ = [
@@ -16,7 +25,10 @@ __all__ = [
     "DeclaredModel",
     "FreeParameter",
     "RunBatch",
+    "as_loaded",
+    "as_predicted",
     "data_scales",
     "even",
+    "loadings_of",
     "make_batch",
 ]

@@ -256,6 +256,8 @@ class AugmentedModel:
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the weighted residuals of parameter vectors; not finite where one fails.
 
+        Those of runs that are loadings of their own are what the factors of these leave.
+
         Parameters
         ----------
         thetas, batch
@@ -267,7 +269,9 @@ class AugmentedModel:
         """
         recorded, weight = np.asarray(batch.recorded), np.asarray(batch.weight)
         if limits is None or not isinstance(batch, MixedBatch):
-            return (self.predictions(thetas, batch) - recorded) * weight
+            predicted = self.predictions(thetas, batch)
+            off = (predicted - recorded) * weight
+            return _with_factors(off, predicted * weight, batch, range(len(weight)))
         vectors = np.asarray(thetas, dtype=float)
         out = np.zeros((len(vectors), *recorded.shape))
         sums = np.zeros(len(vectors))
@@ -279,11 +283,31 @@ class AugmentedModel:
             found = self._of_rows(vectors[asked], batch, part)
             at = np.ix_(rows, range(found.shape[2]))
             off = (found - recorded[at]) * weight[at]
+            off = _with_factors(off, found * weight[at], batch, rows)
             out[np.ix_(asked.tolist(), rows, range(found.shape[2]))] = off
             with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
                 sums[asked] += np.sum(off**2, axis=(1, 2))
         out[~(sums < limits)] = np.inf  # what is not a number among them
         return out
+
+    def factors(
+        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
+    ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
+        """Return factors of loadings less one, and their precisions; see `Loadings.factors`."""
+        assert isinstance(batch, MixedBatch)
+        assert batch.loadings is not None
+        predicted = self.predictions(thetas, batch)
+        recorded, weight = np.asarray(batch.recorded), np.asarray(batch.weight)
+        return batch.loadings.factors((predicted - recorded) * weight, predicted * weight)
+
+
+def _with_factors(
+    residual: np.ndarray, predicted: np.ndarray, batch: Batch, rows: Sequence[int]
+) -> np.ndarray:
+    """Return weighted residuals of rows of a batch, with the factors of its loadings if any."""
+    if not isinstance(batch, MixedBatch) or batch.loadings is None:
+        return residual
+    return batch.loadings.whitened(residual, predicted, rows)
 
 
 def _of_sweeps(

@@ -191,10 +191,7 @@ def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
     """Return derivatives of the residuals in the free parameters, (free, runs, n) each."""
     trials, widths = [], []
     for theta, positions in zip(thetas, free, strict=True):
-        for position in positions:
-            width = 1e-5 * max(abs(theta[position]), model.first_trial[position])
-            # away from an upper bound
-            width = -width if theta[position] + width > model.high[position] else width
+        for position, width in zip(positions, widths_of(model, theta, positions), strict=True):
             moved = theta.copy()
             moved[position] += width
             trials.append(moved)
@@ -210,6 +207,15 @@ def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
         out.append(difference / np.asarray(widths[row : row + n])[:, None, None])
         row += n
     return out
+
+
+def widths_of(
+    model: AugmentedModel, theta: Float[np.ndarray, " p"], positions: Sequence[int]
+) -> Float[np.ndarray, " positions"]:
+    """Return by how much parameters are moved for a derivative, away from an upper bound."""
+    at = list(positions)
+    width = 1e-5 * np.maximum(np.abs(theta[at]), model.first_trial[at])
+    return np.where(theta[at] + width > model.high[at], -width, width)
 
 
 def _corrected(jacobian, step, change):

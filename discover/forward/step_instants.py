@@ -72,7 +72,8 @@ def with_own_instants(
     rows = [i for i, run in enumerate(runs) if any(s.place is None for s in run.rate_steps)]
     if not rows:
         return list(runs)
-    batch = make_batch([runs[i] for i in rows])
+    # a factor on the whole record dates no step
+    batch = make_batch([replace(runs[i], loading=None) for i in rows])
     assert isinstance(batch, RunBatch)  # only a given rate steps
     assert batch.steps is not None
     sources = np.unique([runs[i].source for i in rows], return_inverse=True)[1]

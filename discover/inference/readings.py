@@ -1,12 +1,13 @@
 """Runs as a fit has them, for the question how they were read (`discover.statistics.misread`)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.forward import AugmentedModel, Batch, even
+from discover.forward import AugmentedModel, Batch, as_predicted, even, loadings_of
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts
 from discover.statistics.outliers import stray
@@ -18,9 +19,15 @@ _STEP = 1e-2  # relative, of a modulus
 def fitted_readings(
     model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit
 ) -> list[Reading]:
-    """Return the fitted runs for the question how they were read."""
+    """Return the fitted runs for the question how they were read.
+
+    The factors of loadings, where runs have any, are constants of them that come last.
+    """
     changes = _of_moduli(model, batch, fit.theta)
-    return _readings(batch, runs, fit.residual, fit.jacobian, *changes)
+    columns = fit.jacobian
+    if loadings_of(batch) is not None:
+        columns = _with_factors(model, batch, fit.theta, fit.free)
+    return _readings(batch, runs, fit.residual, columns, *changes)
 
 
 def unseen_readings(
@@ -28,8 +35,53 @@ def unseen_readings(
 ) -> list[Reading]:
     """Return runs that no fit saw for the same question, as these parameters predict them."""
     residual = model.residuals([theta], batch)
-    columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
+    if loadings_of(batch) is None:
+        columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
+    else:
+        columns = _with_factors(model, batch, theta, fit.free)
     return _readings(batch, runs, residual[0], columns, *_of_moduli(model, batch, theta))
+
+
+def beside_one_another(
+    fitted: Sequence[Reading], unseen: Sequence[Reading], constants: int
+) -> tuple[list[Reading], list[Reading]]:
+    """Return runs with a column for the factor of each loading of all of them, where they have any.
+
+    Parameters
+    ----------
+    fitted, unseen
+        Of which each has columns of the constants, and then of the loadings of its kind.
+    constants
+        How many constants were fitted.
+    """
+    own, others = (
+        max((len(run.columns) for run in runs), default=constants) - constants
+        for runs in (fitted, unseen)
+    )
+
+    def padded(run: Reading, before: int, after: int) -> Reading:
+        first, last = run.columns[:constants], run.columns[constants:]
+        none = np.zeros((before, len(run.times))), np.zeros((after, len(run.times)))
+        return replace(run, columns=np.concatenate([first, none[0], last, none[1]]))
+
+    if not own and not others:
+        return list(fitted), list(unseen)
+    return [padded(run, 0, others) for run in fitted], [padded(run, own, 0) for run in unseen]
+
+
+def _with_factors(
+    model: AugmentedModel, batch: Batch, theta: np.ndarray, free: Sequence[int]
+) -> Float[np.ndarray, "columns runs n"]:
+    """Return changes of the weighted predictions by constants, and by factors of the loadings."""
+    own, plain = loadings_of(batch), as_predicted(batch)
+    assert own is not None
+    residual = model.residuals([theta], plain)
+    columns = jacobians(model, plain, [theta], residual, [free])[0]
+    predicted = residual[0] + np.asarray(batch.recorded) * np.asarray(batch.weight)
+    factors = np.zeros((len(own.rows), *predicted.shape))
+    for i, rows in enumerate(own.rows):
+        factors[i, [*rows]] = predicted[[*rows]]
+    return np.concatenate([columns, factors])
 
 
 def _readings(

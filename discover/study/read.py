@@ -2,6 +2,7 @@
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 from discover._version import __version__
 from discover.dataset.load import folder_roots, resolve_folder
@@ -69,7 +70,9 @@ def fingerprint(study: Study, *extra: object) -> str:
         If the data folder or a file in it cannot be read.
     """
     # a page without overlays is what it was before there were any
-    left_out = None if study.report.overlay else {"report"}
+    left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}
+    if study.loop.loading is None:  # and so is a loop without loadings of its own
+        left_out["loop"] = {"loading"}
     digest = hashlib.sha256(study.model_dump_json(exclude=left_out).encode())
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())

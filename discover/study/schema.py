@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
+from discover.dataset.loading import LARGEST
 from discover.laws.registry import ANY, LAWS
 from discover.learners.registry import learner_names
 from discover.validation import Section
@@ -182,6 +183,7 @@ class Loop(Section):
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
     explanations: Annotated[int, Field(ge=1, le=64)] = 8
+    loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
 
     @model_validator(mode="after")
     def _window(self):

@@ -68,9 +68,12 @@ def next_tests(
     noise = max(judgement.left.noise, left)
     longest = float(np.max(np.asarray(model.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
+    loading = max((run.loading.deviation for run in runs if run.loading), default=0.0)
     predicted = _predicted(model, varied, make_batch([t.run for t in tests])) if tests else []
     found = [
-        _expected_of(test, [of[:, i, : len(test.run)] for of in predicted], share, noise, fresh)
+        _expected_of(
+            test, [of[:, i, : len(test.run)] for of in predicted], share, noise, fresh, loading
+        )
         for i, test in enumerate(tests)
     ]
     if kept:
@@ -80,7 +83,7 @@ def next_tests(
             again = _predicted(model, altered, batch)
             test = PossibleTest(f"{runs[fastest].name} again, {title}", runs[fastest])
             seen = [of[:, fastest, : len(runs[fastest])] for of in again]
-            found.append(_expected_of(test, seen, share, noise, fresh))
+            found.append(_expected_of(test, seen, share, noise, fresh, loading))
     told = [one for one in found if one is not None]
     told.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
     names = tuple(one.effects for one, _ in weighed)
@@ -160,8 +163,12 @@ def _expected_of(
     share: Float[np.ndarray, " e"],
     noise: float,
     fresh: float,
+    loading: float,
 ) -> NextTest | None:
-    """Return what a test is expected to tell; None if not every explanation can be followed."""
+    """Return what a test is expected to tell; None if not every explanation can be followed.
+
+    Where loadings differ a factor between two explanations is no difference of these.
+    """
     curves = np.stack([of[0] for of in predicted])
     if not np.all(np.isfinite(curves)):
         return None
@@ -174,6 +181,8 @@ def _expected_of(
     for i in range(count):
         for j in range(i):
             factor = np.concatenate([factors[i], factors[j]])
+            if loading:
+                factor = np.vstack([factor, loading * curves[i] / scale])
             apart = 0.5 * squared_distance((curves[i] - curves[j]) / scale, factor)
             evidence[i, j] = evidence[j, i] = min(apart, MOST_EVIDENCE)
     nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))

@@ -9,7 +9,7 @@ from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.errors import InputError
-from discover.forward import AugmentedModel, Batch
+from discover.forward import AugmentedModel, Batch, as_loaded
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
 
@@ -68,6 +68,9 @@ def record_runs(
 ) -> list[RunRecord]:
     """Return each run with the predictions of several parameter vectors.
 
+    Of fitted runs with the factors of their loadings, where they have any; those of runs that no
+    fit saw are told by these runs themselves, so they are no part of a prediction.
+
     Parameters
     ----------
     model, batch, runs, thetas
@@ -78,6 +81,8 @@ def record_runs(
         Names of the runs of the data set, in its order.
     """
     predictions = model.predictions(thetas, batch)
+    if not held_out:
+        predictions = as_loaded(predictions, batch)
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]

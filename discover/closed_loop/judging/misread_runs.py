@@ -60,15 +60,18 @@ def judged_as_read(
     best = clear_misreading(sets, expectation, 0.0)
     if best is None or best.size <= STRUCTURE * resolution.limit(theta, active, best.size):
         return judgement
+    advised = advice(best)
+    if best.kind == "factor":
+        advised += ", or let each run be a loading of its own ([loop] loading)"
     text = (
         f"{judgement.description} But the records follow the model clearly better {reads(best)}: "
-        f"{advice(best)}. Constants beside it would be others, so nothing is explained."
+        f"{advised}. Constants beside it would be others, so nothing is explained."
     )
     return replace(
         judgement,
         verdict="unexplained",
         structured=True,
-        left=left.refuted(left.reason, advice(best)),
+        left=left.refuted(left.reason, advised),
         description=text,
         read_as=reads(best),
     )
@@ -82,7 +85,8 @@ def holding_misreading(
     if found is None or found.probability > POSSIBLE or not len(found.steps):
         return bounds, None
     wider = dict(bounds)
-    for position, step in zip(fit.free, found.steps, strict=True):
+    # factors of loadings, where these are fitted along, are no constants and come last
+    for position, step in zip(fit.free, found.steps[: len(fit.free)], strict=True):
         if position not in bounds or not np.isfinite(step):
             continue
         low, high = bounds[position]

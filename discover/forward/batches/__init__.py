@@ -1,7 +1,16 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
 from discover.forward.batches.imposed_stress import StressBatch
-from discover.forward.batches.mixed import Batch, MixedBatch, Part, make_batch
+from discover.forward.batches.loadings import Loadings
+from discover.forward.batches.mixed import (
+    Batch,
+    MixedBatch,
+    Part,
+    as_loaded,
+    as_predicted,
+    loadings_of,
+    make_batch,
+)
 from discover.forward.batches.oscillation import OscillationBatch, Places
 from discover.forward.batches.samples import even
 from discover.forward.batches.scales import data_scales
@@ -10,6 +19,7 @@ from discover.forward.batches.transient import RunBatch
 
 __all__ = [
     "Batch",
+    "Loadings",
     "MixedBatch",
     "OscillationBatch",
     "Part",
@@ -17,7 +27,10 @@ __all__ = [
     "RunBatch",
     "SteadyBatch",
     "StressBatch",
+    "as_loaded",
+    "as_predicted",
     "data_scales",
     "even",
+    "loadings_of",
     "make_batch",
 ]

@@ -21,6 +21,11 @@ def how_sure(result: LoopResult) -> str:
         sentences.append(coarse.sentence)
     if said := result.remaining.get("read_otherwise"):
         sentences.append(said)
+    if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
+        sentences.append(
+            f"This holds if each run is a loading of its own, {percent(deviation)}: its factor is "
+            "fitted along, that of a run held out to that run itself, whose error is told without."
+        )
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
         sentences.append(

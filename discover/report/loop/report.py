@@ -99,6 +99,7 @@ def write_loop(
         is_unexplained=result.verdict == "unexplained",
         law=tables.law(result),
         remaining=tables.remaining_rows(result),
+        loadings=tables.loadings(result),
         readings=[
             (f"Of the {name} model", reading.sentences)
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)

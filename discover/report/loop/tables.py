@@ -274,6 +274,7 @@ _REMAINING = {
     "not judging": "runs held out that cannot judge",
     "worst run": "run missed most",
     "worst run error": "its error",
+    "loading deviation": "loadings are taken to differ by, relative standard deviation",
     "read otherwise": "how else the runs may have been read",
     "description": "in words",
 }
@@ -282,7 +283,15 @@ _REMAINING = {
 
 def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
     """Return what is said of the residual, as names and values."""
-    return [(_REMAINING.get(key, key), value) for key, value in _flatten(result.remaining)]
+    # factors of loadings have a table of their own
+    content = {key: value for key, value in result.remaining.items() if key != "loading"}
+    return [(_REMAINING.get(key, key), value) for key, value in _flatten(content)]
+
+
+def loadings(result: LoopResult) -> list[dict[str, Any]]:
+    """Return the factors of loadings, run by run; none where runs are none of their own."""
+    found = result.remaining.get("loading") or {}
+    return [{"run": name, **one} for name, one in found.items()]
 
 
 def _flatten(content: Any, prefix: str = "") -> list[tuple[str, str]]:

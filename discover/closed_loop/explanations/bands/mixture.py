@@ -12,7 +12,7 @@ from discover.closed_loop.explanations.bands.growth import growth
 from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.held_out import root_of_covariance
-from discover.forward import AugmentedModel, Batch
+from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
@@ -59,6 +59,9 @@ def mixed_bands(
     For each of `batches` the lower and the upper limit, in the unit of the record; zero at padding.
     """
     at = carried[0].fit.theta
+    # a run that no fit saw is predicted without the factor of its loading, which may be anything
+    loaded = [_deviations(batch) if batch is not fitted else 0.0 for batch in batches]
+    batches = [batch if batch is fitted else as_predicted(batch) for batch in batches]
     shifts = modulus_shifts(model, at, fitted)
     moved = [shifts if b is fitted else modulus_shifts(model, at, b) for b in batches]
     tails = student.ppf(_TAILS[1], len(fitted.weight)) / ndtri(_TAILS[1]) if structured else 1.0
@@ -74,14 +77,25 @@ def mixed_bands(
         faster = [np.ones(len(batch.weight)) for batch in batches]
         if structured and rates:
             faster = [growth(one.fit.run_errors, rates[0], other) for other in rates[1:]]
-        for part, batch, square, more, by_moduli in zip(
-            parts, batches, lacking, faster, moved, strict=True
+        for part, batch, square, more, by_moduli, own_factor in zip(
+            parts, batches, lacking, faster, moved, loaded, strict=True
         ):
             size = left * more[:, None]
             found = _distribution(model, one.fit, (root, off, by_moduli), square, size, batch)
             if found is not None:
-                part.append((found[0], wider * found[1], probability))
+                spread = np.hypot(wider * found[1], own_factor * found[0])
+                part.append((found[0], spread, probability))
     return [_limits(part, batch) for part, batch in zip(parts, batches, strict=True)]
+
+
+def _deviations(batch: Batch) -> Float[np.ndarray, "runs 1"]:
+    """Return by how much the factor of each run may differ from one; zero where it has none."""
+    own = loadings_of(batch)
+    found = np.zeros((len(batch.weight), 1))
+    if own is not None:
+        for rows in own.rows:
+            found[[*rows]] = own.deviation
+    return found
 
 
 def _distribution(

@@ -1,0 +1,87 @@
+"""Runs that are loadings of their own: how often a loop that is told so is right.
+
+Three start-ups and an oscillation are fitted and a faster start-up judges, by scipy, with 1 % of
+noise and a factor of its own on each run. Each draw has other factors and another noise.
+
+    python benchmarks/loadings.py --draws 100 --differ 0.03
+"""
+
+import argparse
+
+import numpy as np
+from independent import Giesekus, oscillation, start_up
+from independent.k_bkz import KBKZ
+from independent.pom_pom import PomPom
+
+import discover as dc
+from discover.dataset import Dataset, Run
+from discover.protocols import oscillatory_shear
+from discover.protocols import start_up as protocol
+
+GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
+FLOWS = {
+    "slow.csv": (start_up(0.5), protocol(0.5), GROWTH),
+    "middle.csv": (start_up(1.0), protocol(1.0), GROWTH),
+    "fast.csv": (start_up(2.0), protocol(2.0), GROWTH),
+    "wave.csv": (oscillation(2.0, 1.0), oscillatory_shear(2.0, 1.0), WAVE),
+    "held.csv": (start_up(3.0), protocol(3.0), GROWTH),
+}
+FLUIDS = {
+    "giesekus": Giesekus(0.3, 100.0),
+    "k_bkz": KBKZ(modulus=100.0),
+    "pom_pom": PomPom(modulus=100.0),
+}
+EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "wall_slip", "stress_gain"]
+NOISE, MOBILITY = 0.01, 0.3
+
+
+def drawn(exact, seed: int, differ: float, correlation: float) -> tuple[Dataset, dict[str, float]]:
+    """Return records of one draw, and the factors in them."""
+    lot, runs, factors = np.random.default_rng(seed), [], {}
+    for name, (flow, own, times) in FLOWS.items():
+        stress = exact[name]
+        factors[name] = 1.0 + differ * lot.standard_normal()
+        noise = lot.standard_normal(len(times))
+        for i in range(1, len(noise)):
+            noise[i] = correlation * noise[i - 1] + np.sqrt(1.0 - correlation**2) * noise[i]
+        noise *= NOISE * np.sqrt(np.mean(stress**2))
+        rates = np.asarray(flow.rate(times), float) + 0.0 * times
+        runs.append(Run(name, times, own, rates, factors[name] * stress + noise))
+    return Dataset("runs", tuple(runs)), factors
+
+
+def main() -> None:
+    """Print the shares of draws."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fluid", choices=FLUIDS, default="giesekus")
+    parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=5000)
+    parser.add_argument("--differ", type=float, default=0.03)
+    parser.add_argument("--told", type=float, default=0.03, help="0 tells the loop nothing")
+    parser.add_argument("--correlation", type=float, default=0.0)
+    asked = parser.parse_args()
+    fluid = FLUIDS[asked.fluid]
+    exact = {name: fluid.respond(flow, times).sigma12 for name, (flow, _, times) in FLOWS.items()}
+    base = dc.Fluid(dc.make_law("ucm"), [100.0], [1.0])
+    explained = named = held = factors_held = factors_told = 0
+    for seed in range(asked.seed, asked.seed + asked.draws):
+        data, factors = drawn(exact, seed, asked.differ, asked.correlation)
+        loop = dc.close_loop(
+            data, base, held_out=["held.csv"], effects=EFFECTS, max_effects=2,
+            loading=asked.told or None,
+        )  # fmt: skip
+        explained += loop.verdict != "unexplained"
+        if [stage.effect for stage in loop.stages] == ["giesekus_mobility"]:
+            named += 1
+            low, high = loop.stages[0].parameters["alpha"].ci95
+            held += low < MOBILITY < high
+        for name, one in loop.remaining.get("loading", {}).items():
+            if one["ci95"] is not None:
+                factors_told += 1
+                factors_held += one["ci95"][0] < factors[name] < one["ci95"][1]
+    print(f"{asked.fluid}: {explained} of {asked.draws} explained; mobility alone in {named}, its")
+    print(f"interval holds {MOBILITY} in {held}; {factors_held} of {factors_told} factors held")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""Factors on the records of runs that are loadings of their own: how large, and whether too large.
+
+See `discover.forward.batches.loadings`. They are no constants of the law. But factors larger than
+loadings differ by would stand for a law that is missing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import chi2
+
+from discover.closed_loop.judging.judgement import Judgement
+from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
+from discover.forward.least_squares import Fit, uncertainty, widths_of
+from discover.forward.modulus_errors import modulus_shifts, response
+from discover.statistics.independent_samples import independent_samples
+from discover.words import percent_of
+
+TOO_FAR = 1e-3
+"""Probability of factors so large, among loadings that differ as is said, up to which the model is
+refuted. What is said is a guess, so that one in a hundred does not do."""
+
+
+@dataclass(frozen=True)
+class LoadingFound:
+    """The factor of one loading.
+
+    Attributes
+    ----------
+    run
+        Name of the run.
+    held_out
+        Whether no fit saw it; the factor is fitted to it all the same.
+    factor, ci95
+        On its record, and the 95 % interval.
+    deviations
+        By how many standard deviations of loadings, noise and constants together the factor that
+        fits best differs from one.
+    """
+
+    run: str
+    held_out: bool
+    factor: float
+    ci95: tuple[float, float]
+    deviations: float
+
+
+def factors_of_loadings(
+    model: AugmentedModel, fitted: tuple[Batch, Fit], batch: Batch, held_out: bool
+) -> list[LoadingFound]:
+    """Return the factors of the loadings of some runs; none where they have none.
+
+    Parameters
+    ----------
+    model, fitted
+        The model, and the fitted runs with the fit that predicts.
+    batch, held_out
+        Runs, and whether the fit did not see them.
+    """
+    own, fit = loadings_of(batch), fitted[1]
+    if own is None or not fit.usable:
+        return []
+    trials, widths = [fit.theta], widths_of(model, fit.theta, fit.free)
+    for position, width in zip(fit.free, widths, strict=True):
+        moved = fit.theta.copy()
+        moved[position] += width
+        trials.append(moved)
+    factors, precision = model.factors(trials, batch)
+    if not np.all(np.isfinite(factors)):
+        return []
+    best, size = factors[0], precision[0]
+    by_noise = _excess(model, fit.theta, batch) / np.where(size > 0.0, size, 1e-12)
+    by_constants = np.zeros(len(best))
+    quantile = 1.96
+    if fit.free:
+        slopes = (factors[1:] - best) / widths[:, None]
+        covariance, quantile = uncertainty(fitted[0], fit.residual, fit.jacobian)
+        by_constants = np.einsum("ik,ij,jk->k", slopes, covariance, slopes)
+        by_constants += _by_moduli(model, fitted, batch, slopes)
+    loading = own.deviation**2
+    shrunk = loading / (loading + by_noise)
+    half = quantile * np.sqrt(shrunk * by_noise + shrunk**2 * np.maximum(by_constants, 0.0))
+    # what constants leave open of a run that they were fitted to is in them already
+    far = np.sqrt(loading + by_noise + (by_constants if held_out else 0.0))
+    return [
+        LoadingFound(name, held_out, 1.0 + f, (1.0 + f - h, 1.0 + f + h), abs(raw) / deviation)
+        for name, f, h, raw, deviation in zip(
+            own.names,
+            (shrunk * best).tolist(),
+            half.tolist(),
+            best.tolist(),
+            far.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def judged_by_loadings(
+    judgement: Judgement, found: Sequence[LoadingFound], deviation: float
+) -> Judgement:
+    """Return a judgement that factors larger than loadings differ by refute.
+
+    Parameters
+    ----------
+    judgement
+        Of the final model.
+    found
+        The factors of all runs.
+    deviation
+        Standard deviation by which loadings are said to differ.
+    """
+    sets = [[one for one in found if one.held_out is held] for held in (False, True)]
+    chances = [chi2.sf(sum(one.deviations**2 for one in s), len(s)) for s in sets if s]
+    silent = judgement.verdict == "no_signal"
+    if silent or not chances or len(chances) * min(chances) > TOO_FAR:
+        return judgement
+    worst = max(found, key=lambda one: one.deviations)
+    refuted = judgement.verdict != "unexplained"
+    text = (
+        f"{judgement.description} {'But the' if refuted else 'The'} loadings would have to differ "
+        f"by more than they are said to, {percent_of(deviation)}: {worst.run} is read as "
+        f"{worst.factor:.3g} times the model. What differs so from run to run may be the law"
+        f"{', so nothing is explained' if refuted else ''}."
+    )
+    if not refuted:
+        return replace(judgement, description=text)
+    advice = "repeat a run on a new loading, which tells by how much loadings differ"
+    return replace(
+        judgement,
+        verdict="unexplained",
+        structured=True,
+        left=judgement.left.refuted(judgement.left.reason, advice),
+        description=text,
+    )
+
+
+def _excess(
+    model: AugmentedModel, theta: np.ndarray, batch: Batch
+) -> Float[np.ndarray, " loadings"]:
+    """Return the variance of the mean of what is left of each loading, over what was assumed."""
+    own = loadings_of(batch)
+    assert own is not None
+    residual = model.residuals([theta], batch)[0]
+    found = []
+    for rows in own.rows:
+        power, count, independent = 0.0, 0, 0.0
+        for row in rows:
+            values = residual[row, np.asarray(batch.weight)[row] > 0] / own.noise[row]
+            power += float(values @ values)
+            count += len(values)
+            independent += independent_samples(values)
+        found.append(power / max(count, 1) * max(count / max(independent, 1.0), 1.0))
+    return np.array(found)
+
+
+def _by_moduli(
+    model: AugmentedModel,
+    fitted: tuple[Batch, Fit],
+    batch: Batch,
+    slopes: Float[np.ndarray, "free loadings"],
+) -> Float[np.ndarray, " loadings"]:
+    """Return the variance of factors by errors of moduli, as a sweep leaves them."""
+    fit, own = fitted[1], loadings_of(batch)
+    shifts = modulus_shifts(model, fit.theta, fitted[0])
+    assert own is not None
+    if not len(shifts):
+        return np.zeros(len(own.rows))
+    predicted = model.predictions([fit.theta], batch) * np.asarray(batch.weight)
+    raw = modulus_shifts(model, fit.theta, as_predicted(batch))
+    direct = own.factors(raw, np.broadcast_to(predicted, raw.shape))[0]
+    return np.sum((direct - response(fit.jacobian, shifts).T @ slopes) ** 2, axis=0)
