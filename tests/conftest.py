@@ -169,16 +169,26 @@ def optimised():
         yield
 
 
-@pytest.fixture
-def verdict_alone(monkeypatch):
-    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
+def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:
     from discover.comparison import judgement, learning
     from discover.comparison.judging.next_measurement import NextMeasurement
 
     nothing = judgement._Beside((), None, ())
-    monkeypatch.setattr(judgement, "_beside", lambda *_: nothing)
-    monkeypatch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
-    monkeypatch.setattr(learning, "physics_of", lambda *_: {"checks": []})
+    patch.setattr(judgement, "_beside", lambda *_: nothing)
+    patch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
+    patch.setattr(learning, "physics_of", lambda *_: {"checks": []})
+
+
+@pytest.fixture
+def verdict_alone(monkeypatch):
+    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
+    _leave_out_what_stands_beside_a_verdict(monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def left_to_the_verdict():
+    """Return what does the same as `verdict_alone` to a patch of longer life than a test."""
+    return _leave_out_what_stands_beside_a_verdict
 
 
 @pytest.fixture(scope="session")

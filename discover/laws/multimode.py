@@ -27,8 +27,12 @@ class HasSpectrum(Protocol):
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
+    dtype = jnp.result_type(float)
     try:
-        return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
+        if isinstance(value, int | float | np.ndarray):  # without a program for each shape
+            value = np.atleast_1d(np.asarray(value, dtype=dtype))
+        modes = jnp.asarray(value, dtype=dtype)
+        return modes if modes.ndim else jnp.atleast_1d(modes)
     except (TypeError, ValueError):
         raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
 
@@ -164,7 +168,9 @@ class Fluid(eqx.Module):
     @property
     def settling_time(self) -> float | None:
         """Longest relaxation time in s; None where the law itself has no linear relaxation."""
-        return float(np.max(self.relaxation_time)) if self.law.linear_relaxation else None
+        return (
+            float(np.max(np.asarray(self.relaxation_time))) if self.law.linear_relaxation else None
+        )
 
     def rest(self) -> Float[Array, "k s"]:
         """Return the state at rest."""

@@ -24,6 +24,15 @@ next = { flows = ["laos"], weissenberg_numbers = [1.0, 2.0], deborah_numbers = [
 """
 
 
+# where it is asked what a command does with a study, whatever is in it
+ONE_RUN = """
+[data]
+folder = "one"
+[compare]
+library = { degree = 0 }
+"""
+
+
 def invoke(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
@@ -129,7 +138,8 @@ def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
             raise KeyboardInterrupt
         return known(learner, *args, **kwargs)
 
-    (tmp_path / "s.toml").write_text(STUDY)
+    data_folder(tmp_path / "one")
+    (tmp_path / "s.toml").write_text(ONE_RUN)
     with monkeypatch.context() as patch:
         patch.setattr(module, "train", interrupted)
         result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
@@ -258,7 +268,8 @@ def test_distil_refuses_what_it_cannot_read(arguments):
 
 
 def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained, undrawn):
-    (tmp_path / "good.toml").write_text(STUDY)
+    data_folder(tmp_path / "one")
+    (tmp_path / "good.toml").write_text(ONE_RUN)
     (tmp_path / "bad.toml").write_text("[data]\n")
     studies = (tmp_path / "bad.toml", tmp_path / "good.toml")
     result = invoke("batch", *studies, "--out", tmp_path / "b")

@@ -12,24 +12,26 @@ GOOD = {
 }
 
 
-@pytest.fixture(scope="module")
-def slice_of_cases():
+@pytest.fixture(scope="module", params=[50, pytest.param(100, marks=pytest.mark.slow)])
+def slice_of_cases(request):
     said = []
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("DISCOVER_DATA", raising=False)
-        counts, lines = all_cases(range(100), 15, said.append)
-    return counts, lines
+        counts, lines = all_cases(range(request.param), 15, said.append)
+    return counts, lines, request.param
 
 
 def test_hostile_inputs_end_in_a_message_that_helps_or_are_fine(slice_of_cases):
-    counts, lines = slice_of_cases
+    counts, lines, cases = slice_of_cases
     assert lines == []
-    assert sum(n for (_, verdict), n in counts.items() if verdict == "refused") > 30
+    refused = sum(n for (_, verdict), n in counts.items() if verdict == "refused")
+    assert refused > 0.3 * cases
 
 
 def test_sane_ones_among_them_are_taken(slice_of_cases):
-    counts, _ = slice_of_cases
-    assert sum(n for (_, verdict), n in counts.items() if verdict == "accepted") > 10
+    counts, _, cases = slice_of_cases
+    accepted = sum(n for (_, verdict), n in counts.items() if verdict == "accepted")
+    assert accepted > 0.1 * cases
 
 
 def test_a_good_study_reaches_the_computation_and_a_good_folder_its_end(tmp_path):

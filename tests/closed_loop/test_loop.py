@@ -68,7 +68,7 @@ def planted_mobility():
     return loop(make_dataset(Giesekus(0.2)), explanations=BEAM_WIDTH)
 
 
-@pytest.mark.parametrize("seed", [0, 1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2))])
 def test_no_effect_is_attributed_to_noise(seed):
     result = loop(make_dataset(UpperConvectedMaxwell(), seed=seed), max_effects=1)
     assert result.verdict == "no_effect_needed"

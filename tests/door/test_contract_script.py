@@ -9,6 +9,7 @@ from independent_folder import MOBILITY, write_folder
 
 import discover as dc
 from discover.closed_loop import in_memory
+from discover.learners.tbnn_ude import DefaultRecipe
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tensor_sindy.estimator import TensorSINDy
 from tensor_library import parse_term
@@ -23,8 +24,13 @@ def script():
                      re.S | re.M)[1]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def after(tmp_path_factory):
+# constants alone, which is all that these data need: functions have tests of their own
+SMALL = DefaultRecipe(width=4, steps=6, polish_steps=30, max_tensors=0)
+
+
+@pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.slow)],
+                ids=["verdict", "whole"])  # fmt: skip
+def after(request, tmp_path_factory, left_to_the_verdict):
     """What the script leaves behind, with settings that cost less: its words are not changed."""
     folder = tmp_path_factory.mktemp("door")
     write_folder(folder / "FOLDER")
@@ -33,9 +39,14 @@ def after(tmp_path_factory):
         quick = {"library": LIBRARY, "max_terms": 1, "n_folds": 0, "n_stability": 0}
         said: dict = {"sindy": [], "network": [], "loop": []}
         heard = {name: lambda *news, name=name: said[name].append(news) for name in said}
+        network, loop = {"quick": True}, {}
+        if not request.param:
+            network, loop = {"recipe": SMALL}, {"explanations": 1}
+            left_to_the_verdict(patch)
+        network["progress"], loop["progress"] = heard["network"], heard["loop"]
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
-        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, progress=heard["network"], quick=True))
-        patch.setattr(dc, "close_loop", partial(in_memory.close_loop, progress=heard["loop"]))
+        patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, **network))
+        patch.setattr(dc, "close_loop", partial(in_memory.close_loop, **loop))
         few = partial(in_memory.run_loop_on, effects=["giesekus_mobility", "stress_gain"])
         patch.setattr(in_memory, "run_loop_on", few)
         left: dict = {"folder": folder, "said": said}

@@ -68,16 +68,23 @@ def few_pictures(monkeypatch):
             monkeypatch.setattr(report, name, lambda *_: None)
 
 
-def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
-    folder = RunFolder(tmp_path, "x")
-    page = write_loop(loop_result(), folder, "<i>name", "data", "").read_text("utf-8")
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The folder of a report with all its pictures."""
+    folder = tmp_path_factory.mktemp("loop")
+    write_loop(loop_result(), RunFolder(folder, "x"), "<i>name", "data", "")
+    return folder
+
+
+def test_the_loop_report_holds_data_residual_ranking_and_errors(written):
+    page = (written / "report.html").read_text("utf-8")
     assert stands_alone(page)
     assert "<i>name" not in page
     assert r"a&lt;b&gt;$\frac$.csv" in page
     names = ("waterfall", "runs", "residual_map", "residual", "reading", "run_errors", "ranking")
     for name in names:
         assert f'<figure id="{name}">' in page
-        assert (tmp_path / "figures" / f"{name}.svg").is_file()
+        assert (written / "figures" / f"{name}.svg").is_file()
     for text in (
         "cannot tell it from",
         "rate gain",
@@ -86,8 +93,8 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(tmp_path):
         "0.69 to 0.71",
     ):
         assert text in page
-    assert (tmp_path / "loop.json").is_file()
-    assert r"\begin{equation}" in (tmp_path / "equations.tex").read_text()
+    assert (written / "loop.json").is_file()
+    assert r"\begin{equation}" in (written / "equations.tex").read_text()
 
 
 def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, few_pictures):
@@ -289,13 +296,11 @@ def test_lissajous_curves_hold_the_samples_of_every_cycle():
     assert marks > 2 * oscillating().time.size  # each sample in both panels
 
 
-def test_the_page_carries_the_data_of_its_pictures(tmp_path):
-    page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "name", "data", "").read_text(
-        "utf-8"
-    )
+def test_the_page_carries_the_data_of_its_pictures(written):
+    page = (written / "report.html").read_text("utf-8")
     for name in ("predictions.csv", "loop.json"):
         (inside,) = re.findall(rf'data-name="{name}">([^<]*)</script>', page)
-        assert json.loads(inside) == (tmp_path / name).read_text("utf-8")
+        assert json.loads(inside) == (written / name).read_text("utf-8")
         assert page.count(f'<a class="data" href="{name}" download>') == page.count("<figure id=")
 
 

@@ -83,12 +83,22 @@ def test_zeros_are_told_in_their_unit(told):
     assert 0.9 < slow - fast < 1.5  # truly 1.2, known to a tenth or so
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
-def test_noise_is_no_reading(told, correlation):
-    drawn = [misread(fitted(told, seed=seed, correlation=correlation)) for seed in range(25)]
+# of white noise one in thirty, of noise correlated to 0.9 one in four: at such shares more than
+# these are met in 4 of 1,000 sets of draws at most
+@pytest.mark.parametrize(
+    ("correlation", "draws", "most"),
+    [
+        (0.0, 10, 3),
+        (0.9, 10, 6),
+        pytest.param(0.0, 25, 5, marks=pytest.mark.slow),
+        pytest.param(0.5, 25, 5, marks=pytest.mark.slow),
+        pytest.param(0.9, 25, 12, marks=pytest.mark.slow),
+    ],
+)
+def test_noise_is_no_reading(told, correlation, draws, most):
+    drawn = [misread(fitted(told, seed=seed, correlation=correlation)) for seed in range(draws)]
     assert all(one.probability > CLEAR for one in drawn)
-    # of white noise one in thirty, of noise correlated to 0.9 one in four
-    assert sum(one.probability < POSSIBLE for one in drawn) <= (5 if correlation < 0.9 else 12)
+    assert sum(one.probability < POSSIBLE for one in drawn) <= most
 
 
 def test_a_factor_of_all_runs_is_a_modulus_and_no_reading(told):

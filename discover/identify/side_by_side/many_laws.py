@@ -196,7 +196,9 @@ def predict_laws(
         Limits of steps, as `make_grids` takes them.
     """
     flows = lay_out(protocols, times, relaxation_time=fluids.settling_time, **limits)
-    first = jax.tree.map(lambda leaf: leaf[0], eqx.filter(fluids, eqx.is_array))
+    first = jax.tree.map(
+        lambda leaf: on_device(np.asarray(leaf)[0, ...]), eqx.filter(fluids, eqx.is_array)
+    )
     fluid = eqx.combine(first, eqx.filter(fluids, eqx.is_array, inverse=True))
     flows = in_enough_steps(fluid, flows)
     return np.asarray(_predict(fluids, flows))

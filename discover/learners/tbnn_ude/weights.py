@@ -29,6 +29,10 @@ def weights_of(law: TensorBasisNetwork) -> Float[Array, " p"]:
     return ravel_pytree(split_law(law)[0])[0]
 
 
+def _count_of(law: TensorBasisNetwork) -> int:
+    return sum(leaf.size for leaf in jax.tree.leaves(split_law(law)[0]))
+
+
 def places_of(law: TensorBasisNetwork) -> TensorBasisNetwork:
     """Return the law with every trainable number replaced by its place in `weights_of`."""
     leaves, structure = jax.tree.flatten(split_law(law)[0])
@@ -67,7 +71,7 @@ class Rebuild(eqx.Module):
     @classmethod
     def everything(cls, law: TensorBasisNetwork) -> "Rebuild":
         """Return the vector of all trainable numbers."""
-        n = weights_of(law).shape[0]
+        n = _count_of(law)
         return cls(law, jnp.arange(n), jnp.ones(n, bool), jnp.ones(n))
 
     @classmethod
@@ -88,7 +92,7 @@ class Rebuild(eqx.Module):
         scale
             Unit of each: a constant is as large as the stress that it contributes.
         """
-        n = weights_of(law).shape[0]
+        n = _count_of(law)
         positions = jnp.arange(n - N_COEFFICIENTS, n)
         return cls(law, positions, jnp.asarray(moving), jnp.asarray(scale))
 
@@ -109,7 +113,7 @@ class Rebuild(eqx.Module):
         moving = np.asarray(moving)
         last: Any = places_of(law).network.layers[-1]  # its bias is there: it was made with one
         idle = np.append(last.weight[~moving], last.bias[~moving])
-        positions = np.setdiff1d(np.arange(weights_of(law).shape[0]), idle)
+        positions = np.setdiff1d(np.arange(_count_of(law)), idle)
         network = np.ones(positions.size - N_COEFFICIENTS)
         return cls(
             law,
