@@ -99,7 +99,9 @@ def modes_over_explanations(
     """
     found, weighed = dict(by_mode), contenders(carried, explanations)
     effects = {effect.name for effect in model.effects}
-    varying = varying_constants(model, fit, {name: Degree() for name in by_mode})
+    # of modes that were told apart afterwards the model has one constant for all
+    told = [name for name in by_mode if name in model.declared.by_mode_slices]
+    varying = varying_constants(model, fit, dict.fromkeys(told, Degree()))
     for name, constant in varying.items():
         having = [pair for pair in weighed if name not in effects or name in pair[0].effects]
         if not having:
