@@ -28,7 +28,7 @@ from discover.closed_loop.searching import SearchResult
 from discover.dataset import Run
 from discover.dataset.coarse_rates import CoarseRates
 from discover.dataset.repeats import repeats_among
-from discover.forward import AugmentedModel, Batch, make_batch
+from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
 from discover.forward.least_squares import Fit, intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import with_own_instants
@@ -79,7 +79,7 @@ class FinalFit:
     @property
     def loading(self) -> float:
         """Standard deviation of the factors of loadings; zero where runs are none of their own."""
-        return max((run.loading.deviation for run in self.fitted if run.loading), default=0.0)
+        return deviation_of_loadings(self.batch)
 
     @cached_property
     def loadings(self) -> list[LoadingFound]:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 LARGEST = 0.1
-"""By more no two loadings of one sample differ; `discover.dataset.repeats` takes it so, too."""
+"""Relative error of one run above which two do not differ by their loading: fillings and trimmings
+of one sample differ by some per cent, and what differs by more, as a run told in minutes does, may
+not excuse what a law leaves of all others."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from discover.dataset.loading import LARGEST
 from discover.dataset.run import Run
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
@@ -19,11 +20,6 @@ _FEWEST_SAMPLES = 10
 _SHARED = 0.5
 """Share of the longer run that both must cover for their difference to tell an error of all of it,
 or for their rates to be held against each other there alone."""
-
-_LARGEST = 0.1
-"""Relative error of one run above which two do not differ by their loading: fillings and trimmings
-of one sample differ by some per cent, and what differs by more, as a run told in minutes does, may
-not excuse what a law leaves of all others."""
 
 # What a source counts or sums up of a record, and no condition of the test
 _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_sequence_s")
@@ -62,7 +58,7 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
     for group in repeated_tests(runs):
         pairs = combinations([named[name] for name in group], 2)
         told = {(one.name, other.name): _difference(one, other) for one, other in pairs}
-        told = {pair: error for pair, error in told.items() if error <= _LARGEST}
+        told = {pair: error for pair, error in told.items() if error <= LARGEST}
         if told:
             among = {name for pair in told for name in pair}
             groups.append(tuple(name for name in group if name in among))

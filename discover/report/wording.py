@@ -31,6 +31,12 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
     return FIGURE_SYMBOLS[found.pop()]
 
 
+SMALL_FAULTS = (
+    "for noise and for small faults of reading, of 0.5 to 2 %: in filling, zero and course of each "
+    "run, and in the ranges of the torque"
+)
+"""What an interval allows for."""
+
 A_TRANSIENT = (
     "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
     "alone do not tell a law from another, or from a structure that flow breaks down."

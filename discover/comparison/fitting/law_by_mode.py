@@ -25,6 +25,7 @@ from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 from discover.statistics.misread import Misread, clear_misreading
+from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import Expectation
 from discover.statistics.small_faults import small_faults
 from discover.study.declared_model import DeclaredModel
@@ -200,7 +201,8 @@ def fit_laws_by_mode(
         return
     worth = _worth_of(sparse, problem, fitted, effective)
     while fit.usable:
-        constants, bands = _told(problem, fit, degrees, fitted, model, flows)
+        seen = fitted_readings(forward, problem.batch, fitted, fit)
+        constants, bands = _told(problem, fit, degrees, seen, model, flows)
         left = problem.lack_of_fit(fit, fitted, expectation)
         yield LawByMode(
             constants,
@@ -208,7 +210,7 @@ def fit_laws_by_mode(
             worth - problem.worth(fit, [*degrees], effective),
             _errors(forward, fit, held_out),
             bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
-            misread=_misread(problem, fit, left, fitted, held_out, expectation),
+            misread=_misread(problem, fit, left, seen, held_out, expectation),
         )
         least = one_degree_more(forward, degrees)
         before = degrees
@@ -248,7 +250,8 @@ def coefficients_in_modes(
     fit, degrees = _fitted(problem, [*names])
     if not fit.usable:
         return None
-    constants, bands = _told(problem, fit, degrees, fitted, model, flows)
+    seen = fitted_readings(problem.model, problem.batch, fitted, fit)
+    constants, bands = _told(problem, fit, degrees, seen, model, flows)
     if set(constants) != set(names):
         return None
     return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
@@ -258,7 +261,7 @@ def _misread(
     problem: FitProblem,
     fit: Fit,
     left: LackOfFit,
-    fitted: Sequence[Run],
+    seen: Sequence[Reading],
     held_out: Sequence[Run],
     expectation: Expectation,
 ) -> Misread | None:
@@ -267,7 +270,6 @@ def _misread(
     if left.verdict != "explained" or known:
         return None
     model = problem.model
-    seen = fitted_readings(model, problem.batch, fitted, fit)
     sets = [seen]
     if held_out:
         unseen = unseen_readings(model, make_batch(held_out), held_out, fit, fit.theta)
@@ -279,7 +281,7 @@ def _told(
     problem: FitProblem,
     fit: Fit,
     degrees: Mapping[str, Degree],
-    fitted: Sequence[Run],
+    seen: Sequence[Reading],
     model: DeclaredModel,
     flows: Sequence[Flow],
 ) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
@@ -287,7 +289,7 @@ def _told(
     forward = problem.model
     freer = freer_fits(forward, problem.batch, fit, degrees)
     bounds = intervals(forward, problem.batch, fit)
-    small = small_faults(fitted_readings(forward, problem.batch, fitted, fit))
+    small = small_faults(seen)
     beside = None if small is None else small.about_the_fit
     bounds = with_small_faults(bounds, fit, forward, small)
     constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer, beside)

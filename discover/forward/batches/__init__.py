@@ -8,6 +8,7 @@ from discover.forward.batches.mixed import (
     Part,
     as_loaded,
     as_predicted,
+    deviation_of_loadings,
     loadings_of,
     make_batch,
 )
@@ -30,6 +31,7 @@ __all__ = [
     "as_loaded",
     "as_predicted",
     "data_scales",
+    "deviation_of_loadings",
     "even",
     "loadings_of",
     "make_batch",

@@ -53,6 +53,12 @@ def loadings_of(batch: Batch) -> Loadings | None:
     return batch.loadings if isinstance(batch, MixedBatch) else None
 
 
+def deviation_of_loadings(batch: Batch) -> float:
+    """Return the standard deviation of the factors of loadings; zero where there are none."""
+    own = loadings_of(batch)
+    return 0.0 if own is None else own.deviation
+
+
 def as_predicted(batch: Batch) -> Batch:
     """Return a batch whose residuals are those of predictions, without factors of loadings."""
     if not isinstance(batch, MixedBatch) or batch.loadings is None:

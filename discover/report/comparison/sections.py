@@ -14,7 +14,7 @@ from discover.report.comparison.table_of_laws import law_rows
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
 from discover.report.told_by import told_by_table
-from discover.report.wording import readable
+from discover.report.wording import SMALL_FAULTS, readable
 from discover.statistics import Told
 
 Content = Mapping[str, Any]
@@ -26,9 +26,8 @@ _STANDING = {
     "no_signal": "The records hold no signal, so no law is reported.",
 }
 _CONDITION = {
-    True: "The intervals hold if the law is in the library. Of measured runs they allow for noise "
-    "and for small faults of reading, of 0.5 to 2 %: in filling, zero and course of each run, and "
-    "in the ranges of the torque.",
+    True: "The intervals hold if the law is in the library. Of measured runs they allow "
+    f"{SMALL_FAULTS}.",
     False: "The intervals would hold if the law were in the library, and no law that was tried "
     "explains these data.",
 }

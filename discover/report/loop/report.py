@@ -21,7 +21,7 @@ from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.told_by import told_by_table
-from discover.report.wording import QUESTIONS
+from discover.report.wording import QUESTIONS, SMALL_FAULTS
 from discover.study.run_folder import RunFolder
 
 
@@ -100,6 +100,7 @@ def write_loop(
         law=tables.law(result),
         remaining=tables.remaining_rows(result),
         loadings=tables.loadings(result),
+        small_faults=SMALL_FAULTS,
         readings=[
             (f"Of the {name} model", reading.sentences)
             for name, reading in zip(("declared", "augmented"), result.readings, strict=True)

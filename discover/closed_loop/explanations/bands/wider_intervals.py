@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from scipy.optimize import brentq
 from scipy.stats import norm
 
@@ -12,9 +13,9 @@ from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.other_times import OtherTimes
 from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
-from discover.forward import AugmentedModel, FreeParameter
+from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
-from discover.inference.constants import ConstantByMode, ModeConstant
+from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree
 from discover.inference.varying_constant import varying_constants
 
@@ -67,13 +68,10 @@ def over_explanations(
             for one, odds in other
             if at in own and own[at] in one.effects
         ]
-        value = float(fit.theta[at])
-        if having and low < value < high and np.isfinite([low, high]).all():
+        if having:
             values, weights = np.array(having, dtype=float).T
-            ends = _ends(values, weights / np.sum(weights), value - low, high - value)
-            least, largest = float(model.low[at]), float(model.high[at])
-            # half a normal distribution may reach beyond the range that is physical
-            found[at] = (min(low, max(ends[0], least)), max(high, min(ends[1], largest)))
+            within = float(model.low[at]), float(model.high[at])
+            found[at] = _over(float(fit.theta[at]), (low, high), values, weights, within)
     return found
 
 
@@ -108,9 +106,11 @@ def modes_over_explanations(
             continue
         values = np.array([constant.of_modes(one.fit) for one, _ in having])
         weights = np.array([weight for _, weight in having])
-        weights /= np.sum(weights)
+        within = constant.law.low, constant.law.high
         modes = tuple(
-            _over(mode, column, weights, constant.law)
+            mode
+            if mode.ci95 is None
+            else replace(mode, ci95=_over(mode.value, mode.ci95, column, weights, within))
             for mode, column in zip(by_mode[name].modes, values.T, strict=True)
         )
         found[name] = replace(by_mode[name], modes=modes)
@@ -118,14 +118,19 @@ def modes_over_explanations(
 
 
 def _over(
-    mode: ModeConstant, values: np.ndarray, weights: np.ndarray, law: FreeParameter
-) -> ModeConstant:
-    if mode.ci95 is None or not mode.ci95[0] < mode.value < mode.ci95[1]:
-        return mode
-    low, high = mode.ci95
-    ends = _ends(values, weights, mode.value - low, high - mode.value)
-    held = min(low, max(ends[0], law.low)), max(high, min(ends[1], law.high))
-    return replace(mode, ci95=held)
+    value: float,
+    interval: tuple[float, float],
+    values: Float[np.ndarray, " e"],
+    weights: Float[np.ndarray, " e"],
+    within: tuple[float, float],
+) -> tuple[float, float]:
+    """Return an interval over explanations with other values, each as wide as the one given."""
+    low, high = interval
+    if not (low < value < high and np.isfinite([low, high]).all()):
+        return interval
+    ends = _ends(values, weights / np.sum(weights), value - low, high - value)
+    # half a normal distribution may reach beyond the range that is physical
+    return min(low, max(ends[0], within[0])), max(high, min(ends[1], within[1]))
 
 
 def _ends(values, weights, below: float, above: float) -> tuple[float, float]:
