@@ -17,7 +17,7 @@ from discover.closed_loop.judging.between_samples import (
 from discover.closed_loop.judging.finer_steps import on_finer_steps
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.held_out import held_out as predict_held_out
-from discover.closed_loop.judging.loadings import LoadingFound, factors_of_loadings
+from discover.closed_loop.judging.loadings import factors_of_loadings
 from discover.closed_loop.judging.misread_runs import holding_misreading
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.own_noise import weighed_like
@@ -38,6 +38,7 @@ from discover.inference.profile import profiled
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
+from discover.statistics.loadings import LoadingFound
 from discover.statistics.misread import Misread, not_ruled_out
 from discover.statistics.reading_faults import Reading
 from discover.statistics.small_faults import small_faults

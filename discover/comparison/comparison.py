@@ -12,6 +12,7 @@ from discover.comparison.fitting.classical import ClassicalFit
 from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
+from discover.comparison.judging.loadings import OwnLoadings
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.room_left import room_left
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
@@ -105,6 +106,8 @@ class Comparison(PageView, NotebookView):
     by_mode
         The best law whose constants differ from mode to mode; None where none was asked for, or
         one constant for all modes does as well.
+    loadings
+        The factors on the records of runs that are loadings of their own; None where all are one.
     known_of
         The same for a learner, with the constants that were fitted along with it.
     known_effects
@@ -142,6 +145,7 @@ class Comparison(PageView, NotebookView):
     stood_for: tuple[str, ...] = ()
     conditions: str = ""
     by_mode: LawByMode | None = None
+    loadings: OwnLoadings | None = None
 
     _page = "discover.report.in_memory:comparison_page"
 
@@ -344,6 +348,7 @@ class Comparison(PageView, NotebookView):
             "classical": {fit.law: fit for fit in self.classical},
             "by_mode": None if self.by_mode is None else self._by_mode(self.by_mode),
             "range": {flow.name: self.placement(flow) for flow in self.judged},
+            "loading": None if self.loadings is None else self.loadings.to_json(),
             "rivals": self.rivals,
             "undetermined": self.undetermined,
             "room_left": self.room_left,

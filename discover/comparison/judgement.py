@@ -30,6 +30,7 @@ from discover.comparison.judging.disagreement import contested, disagreements, o
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.identifiability import Rival, find_rivals, structure_of
 from discover.comparison.judging.late_answers import hold_against_late_answers
+from discover.comparison.judging.loadings import OwnLoadings
 from discover.comparison.judging.misread_runs import hold_against_misreading
 from discover.comparison.judging.modes_apart import (
     holding_modes_apart,
@@ -114,6 +115,7 @@ def judge(
     seed: int,
     say: Callable[[str], None],
     undated: StudyData | None = None,
+    loadings: OwnLoadings | None = None,
 ) -> Judgement:
     """Return what is to be believed of what each learner found.
 
@@ -127,12 +129,17 @@ def judge(
         Called with what is going on.
     undated
         The data before instants of steps of the rate were fitted; by default those at hand.
+    loadings
+        The factors on the records of runs that are loadings of their own, which are taken out of
+        `known`; None where all are one loading.
     """
     flows, normal = known.flows, study.compare.use_normal_stresses
     outcomes = {name: frames[name].outcome(outcome) for name, outcome in own.items()}
     repeats = repeats_among(list(known.before.data.dataset))
     expectation = expectation_of(study, known.before.model, repeats)
     at_first = explain(outcomes, flows, expectation, normal, repeats)
+    if loadings is not None:
+        at_first = loadings.held_against(at_first)
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     law = None if chosen is None else law_with_fitted(chosen, frame.model, known.fitted)
     is_silent = at_first.verdict == "no_signal"
@@ -166,7 +173,8 @@ def judge(
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
     outcomes = with_gain_in_dense(outcomes, tested.others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
-    if DENSE in outcomes and not (is_silent or normal or study.compare.quick):
+    behind_instrument = DENSE in frames and bool(known.effects and frames[DENSE].made)
+    if DENSE in outcomes and not (is_silent or normal or study.compare.quick or behind_instrument):
         say("effects with a name beside the dense library")
         # what a known instrument did is taken out of the data at hand alone
         data = None if known.effects else undated
@@ -205,9 +213,9 @@ def _beside_named(
 ) -> dict[str, LearnerOutcome]:
     """Return the outcomes, the dense library's bands beside what explains the runs and has a name.
 
-    Of a law that does not relax by itself, and behind a known instrument, nothing is tried.
+    Of a law that does not relax by itself nothing is tried.
     """
-    if frame.made or not frame.model.law.linear_relaxation:
+    if not frame.model.law.linear_relaxation:
         return dict(outcomes)
     data = frame.data if data is None else data
     runs = data.fit.runs, data.held_out.runs

@@ -22,6 +22,12 @@ from discover.comparison.judgement import judge
 from discover.comparison.learning import Learning, distilled, require_teacher, sweep_studies
 from discover.comparison.outcomes.flows import comparison_flows
 from discover.comparison.outcomes.truth import TrueTerm, true_terms
+from discover.comparison.own_loadings import (
+    as_recorded,
+    loadings_of,
+    with_own_loadings,
+    with_records_of_unseen,
+)
 from discover.comparison.own_noise import learned_by_noise
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
@@ -82,6 +88,7 @@ def compare(
     if made is None:  # estimators that are fitted already saw every sample
         data, of_spikes = without_spikes_in_fit(data)
         data = thinned_to(data, options.most_samples)
+        data = with_own_loadings(data, options.loading)
     require_teacher(study)
     sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
@@ -129,13 +136,24 @@ def compare(
             done += 1
         assert options.sweep is not None
         points.append(SweepPoint(law, options.sweep.parameter, value, flow, at_point))
+    loadings = None
+    if made is None and options.loading is not None:
+        loadings = loadings_of(known, own, options.loading)
+        data, undated = loadings.taken_out(data), loadings.taken_out(undated)
+        recorded, known = known.flows, known_in(data)
     # with constants fitted along, each is a correction of all the data
     frames = {name: known.frame(one) for name, one in own.items()}
+    if loadings is not None:
+        frames = {name: loadings.frame(name, frame) for name, frame in frames.items()}
 
     def say(text: str) -> None:
         progress(text, done / n_parts)
 
-    found = judge(study, known, library, own, frames, learning.seed, say, undated)
+    found = judge(study, known, library, own, frames, learning.seed, say, undated, loadings)
+    flows, before = known.flows, known.alone()
+    if loadings is not None:
+        flows = with_records_of_unseen(flows, recorded)
+        found = as_recorded(found, loadings, flows)
     distillations = distilled(study, data.truth, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(
@@ -143,10 +161,11 @@ def compare(
         data_summary=data_in_words(data, study)
         + (_TAKEN_OUT if known.along is None and known.effects else "")
         + "".join(f". {text}" for text in (of_steps, of_spikes) if text)
+        + (_BY_LOADING if loadings is not None else "")
         + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
         known_part=known_in_words(declared, known, study),
-        flows=known.flows,
-        before=known.alone(),
+        flows=flows,
+        before=before,
         outcomes=found.outcomes,
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
@@ -166,10 +185,12 @@ def compare(
         classical=found.classical,
         warnings=found.warnings,
         by_mode=found.by_mode,
+        loadings=loadings,
     )
 
 
 _BY_NOISE = ". Records differ in noise, and each weighs by its own"
+_BY_LOADING = ". The fitted records are shown without the factor of their loading"
 _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 
 

@@ -8,6 +8,7 @@ from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import (
     Batch,
     RunBatch,
+    relative_noise,
     as_loaded,
     as_predicted,
     data_scales,
@@ -26,6 +27,7 @@ __all__ = [
     "DeclaredModel",
     "FreeParameter",
     "RunBatch",
+    "relative_noise",
     "as_loaded",
     "as_predicted",
     "data_scales",

@@ -71,8 +71,9 @@ def fingerprint(study: Study, *extra: object) -> str:
     """
     # a page without overlays is what it was before there were any
     left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}
-    if study.loop.loading is None:  # and so is a loop without loadings of its own
-        left_out["loop"] = {"loading"}
+    for part in ("loop", "compare"):  # and so is a task without loadings of its own
+        if getattr(study, part).loading is None:
+            left_out[part] = {"loading"}
     digest = hashlib.sha256(study.model_dump_json(exclude=left_out).encode())
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())

@@ -252,6 +252,7 @@ class Compare(Section):
     distillation: bool = False
     next: NextExperiment = NextExperiment()
     laws: tuple[SyntheticLaw, ...] = ()
+    loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
 
     @model_validator(mode="after")
     def _at_least_one(self):

@@ -7,7 +7,7 @@ import pytest
 
 import discover as dc
 from discover.forward import make_batch
-from discover.learners.tbnn_ude.least_squares import data_scale
+from discover.learners.tbnn_ude.problem import data_scale
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.learners.trajectories.problem import make_problem
 from tensor_library.library import build_library

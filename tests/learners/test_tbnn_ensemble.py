@@ -18,7 +18,8 @@ from discover.learners.tbnn_ude.ensemble import (
     train_others,
 )
 from discover.learners.tbnn_ude.initial_law import initial_law, invariant_sizes
-from discover.learners.tbnn_ude.least_squares import Stopping, data_scale
+from discover.learners.tbnn_ude.least_squares import Stopping
+from discover.learners.tbnn_ude.problem import data_scale
 from discover.learners.tbnn_ude.prior import sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.recipe import Trained

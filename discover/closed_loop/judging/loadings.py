@@ -5,47 +5,17 @@ loadings differ by would stand for a law that is missing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
 
 from discover.closed_loop.judging.judgement import Judgement
 from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, uncertainty, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.independent_samples import independent_samples
-from discover.words import percent_of
-
-TOO_FAR = 1e-3
-"""Probability of factors so large, among loadings that differ as is said, up to which the model is
-refuted. What is said is a guess, so that one in a hundred does not do."""
-
-
-@dataclass(frozen=True)
-class LoadingFound:
-    """The factor of one loading.
-
-    Attributes
-    ----------
-    run
-        Name of the run.
-    held_out
-        Whether no fit saw it; the factor is fitted to it all the same.
-    factor, ci95
-        On its record, and the 95 % interval.
-    deviations
-        By how many standard deviations of loadings, noise and constants together the factor that
-        fits best differs from one.
-    """
-
-    run: str
-    held_out: bool
-    factor: float
-    ci95: tuple[float, float]
-    deviations: float
-
+from discover.statistics.loadings import ADVICE, LoadingFound, as_too_far, too_far
 
 def factors_of_loadings(
     model: AugmentedModel, fitted: tuple[Batch, Fit], batch: Batch, held_out: bool
@@ -111,27 +81,21 @@ def judged_by_loadings(
     deviation
         Standard deviation by which loadings are said to differ.
     """
-    sets = [[one for one in found if one.held_out is held] for held in (False, True)]
-    chances = [chi2.sf(sum(one.deviations**2 for one in s), len(s)) for s in sets if s]
-    silent = judgement.verdict == "no_signal"
-    if silent or not chances or len(chances) * min(chances) > TOO_FAR:
+    worst = too_far(found)
+    if worst is None or judgement.verdict == "no_signal":
         return judgement
-    worst = max(found, key=lambda one: one.deviations)
     refuted = judgement.verdict != "unexplained"
     text = (
-        f"{judgement.description} {'But the' if refuted else 'The'} loadings would have to differ "
-        f"by more than they are said to, {percent_of(deviation)}: {worst.run} is read as "
-        f"{worst.factor:.3g} times the model. What differs so from run to run may be the law"
-        f"{', so nothing is explained' if refuted else ''}."
+        f"{judgement.description} {'But the' if refuted else 'The'} "
+        f"{as_too_far(worst, deviation)}{', so nothing is explained' if refuted else ''}."
     )
     if not refuted:
         return replace(judgement, description=text)
-    advice = "repeat a run on a new loading, which tells by how much loadings differ"
     return replace(
         judgement,
         verdict="unexplained",
         structured=True,
-        left=judgement.left.refuted(judgement.left.reason, advice),
+        left=judgement.left.refuted(judgement.left.reason, ADVICE),
         description=text,
     )
 

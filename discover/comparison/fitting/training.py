@@ -127,13 +127,13 @@ def _surely_unexplained(
     problem = sparse.search_.problem
     fit = sparse.path_[sparse.result_.details["chosen"]]
     weight = np.asarray(problem.weight)[..., 0]
-    predicted = fit.predicted.reshape(problem.target.shape)[..., 0]
+    apart = (fit.predicted - problem.weighted_target).reshape(problem.target.shape)[..., 0]
     residuals, records = [], []
-    for row, weights, run in zip(predicted, weight, runs, strict=True):
+    for row, weights, run in zip(apart, weight, runs, strict=True):
         seen = weights[: len(run)] > 0
         size = run.sizes(run.recorded)[seen]
         records.append(run.recorded[seen] / size)
-        residuals.append(row[: len(run)][seen] / weights[: len(run)][seen] / size - records[-1])
+        residuals.append(row[: len(run)][seen] / weights[: len(run)][seen] / size)
     left = what_is_left(residuals, records, expectation)
     return left.verdict == "unexplained" and left.misfit > _SURELY * left.expected
 

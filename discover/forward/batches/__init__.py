@@ -1,7 +1,7 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
 from discover.forward.batches.imposed_stress import StressBatch
-from discover.forward.batches.loadings import Loadings
+from discover.forward.batches.loadings import Loadings, relative_noise
 from discover.forward.batches.mixed import (
     Batch,
     MixedBatch,
@@ -31,6 +31,7 @@ __all__ = [
     "as_loaded",
     "as_predicted",
     "data_scales",
+    "relative_noise",
     "deviation_of_loadings",
     "even",
     "loadings_of",

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
+from discover.dataset.loading import Loading
 from discover.statistics.residual import FEWEST_FAST, fast_part
 
 _LEAST = 1e-3
@@ -120,9 +121,14 @@ def _noise_of(run: Run) -> float:
     """Return the standard deviation of a run's weighted residuals that is noise."""
     if run.loading is None:
         return 1.0
-    noise = run.loading.noise
+    return relative_noise(run, run.loading) * run.weight / float(np.sqrt(len(run)))
+
+
+def relative_noise(run: Run, loading: Loading) -> float:
+    """Return the noise of a run that is a loading of its own, relative to its size."""
+    noise = loading.noise
     if noise is None:
-        most = _MOST * run.loading.deviation
+        most = _MOST * loading.deviation
         fast = fast_part(run.recorded / run.sizes(run.recorded))
         noise = float(np.clip(fast, _LEAST, most)) if len(run) >= FEWEST_FAST else most
-    return max(noise, _LEAST) * run.weight / float(np.sqrt(len(run)))
+    return max(noise, _LEAST)

@@ -211,7 +211,7 @@ def _in_time_order(problem, seen):
     shape = problem.target.shape
     index = np.arange(int(np.prod(shape))).reshape(shape).transpose(0, 2, 1).reshape(-1)
     rows = index[seen[index]]
-    return rows, np.asarray(problem.weight * problem.target).reshape(-1)[rows]
+    return rows, problem.weighted_target[rows]
 
 
 def _polish(search: SupportSearch, fits: list[Fit], chosen: Fit) -> list[Fit]:

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Literal
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
@@ -260,9 +259,8 @@ def _unit_weights(problem: TrajectoryProblem) -> TrajectoryProblem:
     """Return the problem with every sample of σ12, N1 and N2 observed with weight one."""
     sampled = jnp.isfinite(problem.order_of_time)[..., None]
     weight = jnp.broadcast_to(jnp.where(sampled, 1.0, 0.0), problem.weight.shape)
-    return eqx.tree_at(
-        lambda p: (p.target, p.weight), problem, (jnp.zeros_like(problem.target), weight)
-    )
+    # what is recorded of each, whatever the loading
+    return replace(problem, target=jnp.zeros_like(problem.target), weight=weight, loading=None)
 
 
 def _at(problem, library, base, name, law, seen) -> LawStructure | None:

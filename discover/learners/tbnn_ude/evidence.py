@@ -18,9 +18,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import data_scale, relative_misses
+from discover.learners.tbnn_ude.least_squares import relative_misses
 from discover.learners.tbnn_ude.prior import cloud_of
-from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.problem import TrainingProblem, data_scale
 from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 
@@ -128,7 +128,8 @@ def _sensitivities(
     rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
     _, jacobian = side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
-    columns = np.asarray(data_scale(problem)[..., None] * jacobian)[..., acts]
+    missed = problem.missed_by(along.recorded)
+    columns = np.asarray(problem.columns(missed, data_scale(problem), jacobian))[..., acts]
     return rebuild, acts, columns.reshape(-1, int(np.sum(acts)))
 
 

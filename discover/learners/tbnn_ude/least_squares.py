@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
-from discover.learners.tbnn_ude.problem import TrainingProblem
+from discover.learners.tbnn_ude.problem import TrainingProblem, data_scale
 from discover.learners.tbnn_ude.variational import (
     Along,
     side_by_side,
@@ -61,18 +61,6 @@ class Objective(eqx.Module):
     prior: PriorWeights
 
 
-def data_scale(problem: TrainingProblem) -> Float[Array, "runs n"]:
-    """Return the factor that turns residuals into parts of the mean relative misfit."""
-    mask = problem.sample_mask
-    # a run of which nothing is seen has no sample to count
-    count = jnp.maximum(jnp.sum(mask, axis=1), 1)
-    mean_square = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1) / count
-    # A run at rest has no scale of its own; unit modulus serves
-    mean_square = jnp.where(mean_square > 0.0, mean_square, 1.0)
-    size = jnp.where(problem.size > 0.0, problem.size, jnp.sqrt(mean_square)[:, None])
-    return 1.0 / (size * jnp.sqrt(count * mask.shape[0])[:, None])
-
-
 class Linearised(eqx.Module):
     """An objective and its derivative at one set of weights.
 
@@ -112,13 +100,14 @@ def linearise(
 @partial(compiled, runs_long=True)
 def _with_prior(weights, objective, along, jacobian):
     scale = data_scale(objective.problem)
-    misses = scale * objective.problem.missed_by(along.recorded)
+    missed = objective.problem.missed_by(along.recorded)
+    misses = objective.problem.less_factors(missed, scale)
 
     def prior(weights):
         return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
 
     rows = jnp.concatenate([misses.ravel(), prior(weights)])
-    data = (scale[..., None] * jacobian).reshape(-1, weights.shape[0])
+    data = objective.problem.columns(missed, scale, jacobian).reshape(-1, weights.shape[0])
     matrix = jnp.concatenate([data, jax.jacfwd(prior)(weights)])
     return Linearised(weights, _AMPLIFICATION * rows, _AMPLIFICATION * matrix)
 
@@ -196,7 +185,7 @@ def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array
 @compiled
 def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "runs n"]:
     """Return the data's residuals, whose norm is the relative misfit, from what is recorded."""
-    return problem.missed_by(along.recorded) * data_scale(problem)
+    return problem.less_factors(problem.missed_by(along.recorded), data_scale(problem))
 
 
 def minimise(

@@ -6,6 +6,7 @@ from typing import Any
 
 import diffrax
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -14,6 +15,7 @@ from discover.dataset.run import Run
 from discover.forward.fluids import observed_on_grid
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
+from discover.learners.own_loadings import signals_of, with_likely_factors
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES
 from discover.protocols.protocol import FlowProtocol
@@ -47,6 +49,11 @@ class TrainingProblem(eqx.Module):
         Of each mode, shape (k,); the moduli sum to one.
     solvent_viscosity
         Over the sum of the moduli, in s; taken off every record but a strain.
+    loading
+        Of runs that are loadings of their own, as `signals_of` returns it in parts of the mean
+        relative misfit, shape (runs,); None where none is.
+    record
+        What was recorded then, with the solvent's part, as `target` is; None where none is.
     """
 
     flows: FlowBatch
@@ -57,6 +64,38 @@ class TrainingProblem(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
+    loading: Float[Array, " runs"] | None = None
+    record: Float[Array, "runs n"] | None = None
+
+    def less_factors(
+        self, missed: Float[Array, "runs n"], scale: Float[Array, "runs n"] | float = 1.0
+    ) -> Float[Array, "runs n"]:
+        """Return what the likely factors of loadings leave of residuals.
+
+        Parameters
+        ----------
+        missed
+            What is predicted minus what was recorded.
+        scale
+            By what both are multiplied.
+        """
+        if self.loading is None or self.record is None:
+            return scale * missed
+        recorded = jnp.where(self.sample_mask, scale * self.record, 0.0)
+        predicted = recorded + scale * missed
+        return with_likely_factors(predicted, recorded, self.loading) - recorded
+
+    def columns(
+        self,
+        missed: Float[Array, "runs n"],
+        scale: Float[Array, "runs n"],
+        jacobian: Float[Array, "runs n p"],
+    ) -> Float[Array, "runs n p"]:
+        """Return what weights change of `less_factors`, from what they change of predictions."""
+        if self.loading is None:
+            return scale[..., None] * jacobian
+        _, change = jax.linearize(lambda some: self.less_factors(some, scale), missed)
+        return jax.vmap(change, in_axes=-1, out_axes=-1)(jacobian)
 
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
         """Return the fluid of a trial law, in units of the total modulus."""
@@ -96,7 +135,22 @@ class TrainingProblem(eqx.Module):
         (``benchmarks/adjoints.py``: 51, 94 and 481 ms for the paper's network).
         """
         residual = self.residual(law, adjoint)
+        if self.loading is not None:
+            scale = data_scale(self)
+            residual = self.less_factors(residual, scale) / scale
         return jnp.sum(residual**2, axis=1) / jnp.sum(self.sample_mask, axis=1)
+
+
+def data_scale(problem: TrainingProblem) -> Float[Array, "runs n"]:
+    """Return the factor that turns residuals into parts of the mean relative misfit."""
+    mask = problem.sample_mask
+    # a run of which nothing is seen has no sample to count
+    count = jnp.maximum(jnp.sum(mask, axis=1), 1)
+    mean_square = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1) / count
+    # A run at rest has no scale of its own; unit modulus serves
+    mean_square = jnp.where(mean_square > 0.0, mean_square, 1.0)
+    size = jnp.where(problem.size > 0.0, problem.size, jnp.sqrt(mean_square)[:, None])
+    return 1.0 / (size * jnp.sqrt(count * mask.shape[0])[:, None])
 
 
 def make_problem(
@@ -149,6 +203,9 @@ def make_problem(
     unit = np.array([1.0 if run.quantity == "strain" else total for run in runs])[:, None]
     records = [run.recorded - solvent_viscosity * _viscous(run) for run in runs]
     target = np.stack([np.pad(record, (0, n - len(record)), mode="edge") for record in records])
+    whole = np.stack([np.pad(run.recorded, (0, n - len(run))) for run in runs])
+    shares = np.array([run.weight / np.sqrt(len(run) * len(runs)) for run in runs])
+    loading = signals_of(runs, shares)
     # a transient has the size of its record, unless it weighs more or less than others
     told = [run.protocol.control in STATES or run.weight != 1.0 for run in runs]
     sized = zip(runs, told, strict=True)
@@ -163,6 +220,8 @@ def make_problem(
         on_device(modulus / total),
         on_device(relaxation_time),
         jnp.asarray(solvent_viscosity / total),
+        loading,
+        None if loading is None else on_device(whole / unit),
     )
 
 

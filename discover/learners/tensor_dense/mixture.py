@@ -332,7 +332,7 @@ def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "row
 
 
 def _residuals(problem, optimum: Optimum, coefficients, moduli=None) -> Float[np.ndarray, "m rows"]:
-    target = np.asarray(problem.weight * problem.target).reshape(-1)
+    target = problem.weighted_target
     at = with_reference(problem, optimum.constants)
     places, inner = jnp.arange(coefficients.shape[1]), jnp.zeros((len(coefficients), 0))
     own = None if moduli is None else jnp.asarray(moduli)

@@ -40,10 +40,8 @@ def _rows(unit, layout: _Layout):
     problem = layout.problem
     everything = jnp.arange(unit.shape[0])
     predicted, sensitivity = observe(problem, everything, layout.scale * unit, jnp.zeros(0))
-    seen = problem.weight > 0
-    residual = jnp.where(seen, problem.weight * (predicted - problem.target), 0.0)
-    columns = jnp.where(seen[..., None], problem.weight[..., None] * sensitivity, 0.0)
-    columns = columns * layout.scale
+    residual = problem.weighted(predicted) - problem.weight * problem.target
+    columns = problem.weighted_columns(predicted, sensitivity) * layout.scale
     sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
     # a constant residual of runaway size is an increase, which the solver rejects
     residual = jnp.where(sane, residual, _RUNAWAY / jnp.sqrt(1.0 * residual.size)).reshape(-1)

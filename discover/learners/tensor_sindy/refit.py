@@ -97,16 +97,14 @@ def _residual_and_jacobian(parameters, problem: TrajectoryProblem, layout: _Layo
     inner, slope = jax.jvp(lambda u: inner_from_free(problem, u), (free,), (jnp.ones_like(free),))
     scale = jnp.where(layout.occupied, layout.scale, 0.0)
     predicted, sensitivity = observe(problem, layout.active, scale * scaled, inner)
-    weight = _AMPLIFICATION * jnp.where(layout.keep[..., None], problem.weight, 0.0)
-    seen = weight > 0
-    residual = jnp.where(seen, weight * (predicted - problem.target), 0.0)
+    recorded = jnp.where(layout.keep[..., None], problem.weight * problem.target, 0.0)
+    residual = _AMPLIFICATION * (problem.weighted(predicted, layout.keep) - recorded)
     columns = sensitivity * jnp.concatenate([scale, slope])
-    columns = jnp.where(seen[..., None], weight[..., None] * columns, 0.0)
+    columns = _AMPLIFICATION * problem.weighted_columns(predicted, columns, layout.keep)
     sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
     # A constant residual of runaway size is an increase, which the solver rejects.
     size = _AMPLIFICATION * _RUNAWAY / jnp.sqrt(1.0 * residual.size)
-    everywhere = jnp.where(problem.weight > 0, problem.weight * predicted, 0.0)
-    everywhere = jnp.where(sane, everywhere, size)
+    everywhere = jnp.where(sane, problem.weighted(predicted), size)
     residual = jnp.where(sane, residual, size)
     columns = jnp.where(sane, columns, 0.0)
     return residual.reshape(-1), columns.reshape(residual.size, -1), everywhere.reshape(-1)
@@ -202,7 +200,7 @@ def refit(
     about 1000, which no search accepts.
     """
     require_wanted()
-    target = np.asarray(problem.weight * problem.target).reshape(-1)
+    target = problem.weighted_target
     observed = np.asarray(problem.weight).reshape(-1) > 0
 
     def one(support, begin, keep) -> Fit:

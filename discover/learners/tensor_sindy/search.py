@@ -242,7 +242,7 @@ class SupportSearch:
     def _independent_in(self, fit: Fit) -> float:
         if fit.misfit <= self.floor:
             return float(self.problem.n_observations)
-        left = np.asarray(self.problem.target * self.problem.weight).ravel() - fit.predicted
+        left = self.problem.weighted_target - fit.predicted
         rows = self.problem.sequences()
         return noise_model([left[row] for row in rows], len(fit.support)).effective_samples
 

@@ -47,7 +47,7 @@ def held_out_misfits(
         [np.repeat((folds != fold)[:, None], samples, axis=1) for _, fold in pairs],
         tolerance=SCREENING**2,
     )
-    target = np.asarray(problem.weight * problem.target).reshape(-1)
+    target = problem.weighted_target
     observed = np.asarray(problem.weight).reshape(-1) > 0
     fold_of_row = folds[problem.run_of_row]
     by_fold = np.empty((len(path), n_folds))

@@ -4,14 +4,16 @@ from collections.abc import Iterable
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.learners.own_loadings import signals_of, with_likely_factors
 from discover.learners.runs import as_runs
 from discover.programs import on_device
 from discover.simulate.enough_steps import in_enough_steps
@@ -53,6 +55,9 @@ class TrajectoryProblem(eqx.Module):
         equal to the relative misfit.
     order_of_time
         Time over the duration of the run, shape (runs, n).
+    loading
+        Of runs that are loadings of their own, as `signals_of` returns it in units of the misfit,
+        shape (runs,); None where none is.
     """
 
     library: TermLibrary = eqx.field(static=True)
@@ -65,6 +70,58 @@ class TrajectoryProblem(eqx.Module):
     target: Float[Array, "runs n 3"]
     weight: Float[Array, "runs n 3"]
     order_of_time: Float[Array, "runs n"]
+    loading: Float[Array, " runs"] | None = None
+
+    def weighted(
+        self, predicted: Float[Array, "runs n 3"], keep: Bool[Array, "runs n"] | None = None
+    ) -> Float[Array, "runs n 3"]:
+        """Return predictions in units of the misfit; zero where nothing was observed.
+
+        Of runs that are loadings of their own with the factors that their records suggest.
+
+        Parameters
+        ----------
+        predicted
+            Of σ12, N1 and N2, in Pa.
+        keep
+            Which samples are looked at; all by default.
+        """
+        weight = self._kept(keep)
+        found = jnp.where(weight > 0, weight * predicted, 0.0)
+        if self.loading is None:
+            return found
+        recorded = (weight * self.target)[..., 0]
+        stress = with_likely_factors(found[..., 0], recorded, self.loading)
+        return found.at[..., 0].set(stress)
+
+    def weighted_columns(
+        self,
+        predicted: Float[Array, "runs n 3"],
+        columns: Float[Array, "runs n 3 q"],
+        keep: Bool[Array, "runs n"] | None = None,
+    ) -> Float[Array, "runs n 3 q"]:
+        """Return what parameters change of the `weighted` predictions.
+
+        Parameters
+        ----------
+        predicted, keep
+            As in `weighted`.
+        columns
+            What they change of the predictions.
+        """
+        weight = self._kept(keep)[..., None]
+        if self.loading is None:
+            return jnp.where(weight > 0, weight * columns, 0.0)
+        _, change = jax.linearize(lambda p: self.weighted(p, keep), predicted)
+        return jax.vmap(change, in_axes=-1, out_axes=-1)(columns)
+
+    def _kept(self, keep):
+        return self.weight if keep is None else jnp.where(keep[..., None], self.weight, 0.0)
+
+    @property
+    def weighted_target(self) -> Float[np.ndarray, " rows"]:
+        """What was observed, in units of the misfit, in one vector."""
+        return np.asarray(self.weight * self.target).reshape(-1)
 
     @property
     def n_observations(self) -> int:
@@ -167,6 +224,7 @@ def make_problem(
                 continue  # a normal stress difference may vanish in truth, but sets no scale
             target[i, : len(run), kind] = values
             weight[i, : len(run), kind] = share[kind] / run.sizes(values)
+    shares = np.array([run.weight for run in runs])
     base = UpperConvectedMaxwell(known_relaxation) if base is None else base
     fluid = Fluid(base, modulus, relaxation_time)
     flows = lay_out(
@@ -188,6 +246,7 @@ def make_problem(
         target=on_device(target),
         weight=on_device(weight / np.sqrt(np.sum(weight > 0))),
         order_of_time=on_device(order),
+        loading=signals_of(runs, shares / np.sqrt(np.sum(weight > 0))),
     )
 
 

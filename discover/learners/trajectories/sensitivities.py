@@ -272,7 +272,7 @@ def predict_many(
         coefficients, inner, modulus = numbers
         at = problem if modulus is None else eqx.tree_at(lambda p: p.modulus, problem, modulus)
         predicted = problem.flows.over(partial(run, at, coefficients, inner))
-        return jnp.where(problem.weight > 0, problem.weight * predicted, 0.0).reshape(-1)
+        return problem.weighted(predicted).reshape(-1)
 
     # side by side, a law that is given up at once would cost as much as the slowest beside it
     followed = all(protocols.control in FOLLOWED for protocols, _ in problem.flows.parts)
@@ -292,7 +292,6 @@ def linearise(
     """
     everything = jnp.arange(len(problem.library))
     predicted, sensitivity = observe(problem, everything, coefficients, inner)
-    seen = problem.weight > 0
-    residual = jnp.where(seen, problem.weight * (problem.target - predicted), 0.0)
-    columns = jnp.where(seen[..., None], problem.weight[..., None] * sensitivity, 0.0)
+    residual = problem.weight * problem.target - problem.weighted(predicted)
+    columns = problem.weighted_columns(predicted, sensitivity)
     return residual.reshape(-1), columns.reshape(residual.size, -1)
