@@ -295,7 +295,7 @@ def _of_loadings(final: FinalFit, structured: bool) -> dict[str, Any]:
     found = {}
     for one in final.loadings:
         # beside a law that is missing no interval is claimed
-        ci95 = None if structured else [*one.ci95]
+        ci95 = None if structured or one.ci95 is None else [*one.ci95]
         found[one.run] = {"factor": one.factor, "ci95": ci95, "held_out": one.held_out}
     return {"loading_deviation": final.loading, "loading": found}
 

@@ -1,7 +1,6 @@
 """The runs that a closed loop fits, and those that judge it: without spikes, cut and thinned."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 

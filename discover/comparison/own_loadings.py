@@ -30,9 +30,7 @@ def with_own_loadings(data: StudyData, deviation: float | None) -> StudyData:
     return replace(data, **parts)
 
 
-def loadings_of(
-    known: Known, own: Mapping[str, LearnerOutcome], deviation: float
-) -> OwnLoadings:
+def loadings_of(known: Known, own: Mapping[str, LearnerOutcome], deviation: float) -> OwnLoadings:
     """Return the factors on the records, by the law of each learner."""
     frames = {name: known.frame(one) for name, one in own.items()}
     seen = {name: frames[name].outcome(one) for name, one in own.items()}
@@ -48,9 +46,7 @@ def with_records_of_unseen(flows: Sequence[Flow], recorded: Sequence[Flow]) -> l
     return [before.get(flow.key, flow) for flow in flows]
 
 
-def as_recorded(
-    judgement: Judgement, loadings: OwnLoadings, flows: Sequence[Flow]
-) -> Judgement:
+def as_recorded(judgement: Judgement, loadings: OwnLoadings, flows: Sequence[Flow]) -> Judgement:
     """Return a judgement whose predictions and bands of runs held out are those of the records."""
     following, law = judgement.next_measurement, judgement.by_mode
     if law is not None:

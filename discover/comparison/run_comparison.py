@@ -154,6 +154,8 @@ def compare(
     if loadings is not None:
         flows = with_records_of_unseen(flows, recorded)
         found = as_recorded(found, loadings, flows)
+        if not found.explanation.in_library:
+            loadings = loadings.without_intervals()
     distillations = distilled(study, data.truth, store, step("distillation"))
     progress("done", 1.0)
     return Comparison(

@@ -8,7 +8,6 @@ from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import (
     Batch,
     RunBatch,
-    relative_noise,
     as_loaded,
     as_predicted,
     data_scales,
@@ -16,6 +15,7 @@ from discover.forward.batches import (
     even,
     loadings_of,
     make_batch,
+    relative_noise,
 )
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 
@@ -27,7 +27,6 @@ __all__ = [
     "DeclaredModel",
     "FreeParameter",
     "RunBatch",
-    "relative_noise",
     "as_loaded",
     "as_predicted",
     "data_scales",
@@ -35,4 +34,5 @@ __all__ = [
     "even",
     "loadings_of",
     "make_batch",
+    "relative_noise",
 ]

@@ -43,7 +43,9 @@ def signals_of(
 
 
 def with_likely_factors(
-    predicted: Float[Array, "runs n"], recorded: Float[Array, "runs n"], signal: Float[Array, " runs"]
+    predicted: Float[Array, "runs n"],
+    recorded: Float[Array, "runs n"],
+    signal: Float[Array, " runs"],
 ) -> Float[Array, "runs n"]:
     """Return predictions p' of records, each run by a factor of its own that its prior holds back.
 

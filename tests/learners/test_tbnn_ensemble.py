@@ -19,9 +19,8 @@ from discover.learners.tbnn_ude.ensemble import (
 )
 from discover.learners.tbnn_ude.initial_law import initial_law, invariant_sizes
 from discover.learners.tbnn_ude.least_squares import Stopping
-from discover.learners.tbnn_ude.problem import data_scale
 from discover.learners.tbnn_ude.prior import sample_states
-from discover.learners.tbnn_ude.problem import make_problem
+from discover.learners.tbnn_ude.problem import data_scale, make_problem
 from discover.learners.tbnn_ude.recipe import Trained
 from discover.learners.tbnn_ude.spread import coefficient_spread, member_predictions
 from discover.protocols import oscillatory_shear, start_up

@@ -17,6 +17,7 @@ from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.loadings import ADVICE, LoadingFound, as_too_far, too_far
 
+
 def factors_of_loadings(
     model: AugmentedModel, fitted: tuple[Batch, Fit], batch: Batch, held_out: bool
 ) -> list[LoadingFound]:

@@ -78,6 +78,13 @@ class OwnLoadings:
             found[name] = [one for one in told if one is not None]
         return cls(deviation, found, SPARSE if SPARSE in found else next(iter(found)))
 
+    def without_intervals(self) -> "OwnLoadings":
+        """Return the factors beside laws that explain nothing: of these no interval is claimed."""
+        found = {
+            name: [replace(one, ci95=None) for one in told] for name, told in self.found.items()
+        }
+        return replace(self, found=found)
+
     def to_json(self) -> dict[str, Any]:
         """Return the factors as ``comparison.json`` holds them."""
         return {

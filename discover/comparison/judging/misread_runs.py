@@ -67,7 +67,10 @@ def hold_against_misreading(
 
 def as_misread(found: Misread) -> Refutation:
     """Return what refutes a law that describes the records clearly better as read otherwise."""
-    return Refutation(f"the records follow the law clearly better {reads(found)}", advice(found))
+    advised = advice(found)
+    if found.kind == "factor":
+        advised += ", or let each run be a loading of its own ([compare] loading)"
+    return Refutation(f"the records follow the law clearly better {reads(found)}", advised)
 
 
 def _described_better(

@@ -31,9 +31,9 @@ __all__ = [
     "as_loaded",
     "as_predicted",
     "data_scales",
-    "relative_noise",
     "deviation_of_loadings",
     "even",
     "loadings_of",
     "make_batch",
+    "relative_noise",
 ]

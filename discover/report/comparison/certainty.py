@@ -22,6 +22,12 @@ def how_sure(comparison: Comparison) -> str:
     parts = [part for name in comparison.outcomes for part in _unseen(comparison, name)]
     if not parts:
         parts.append("nothing was held out, so no prediction was put to the test")
+    if comparison.loadings is not None and comparison.verdict == "explained":
+        parts.append(
+            "this holds if each run is a loading of its own, "
+            f"{percent(comparison.loadings.deviation)}: its factor is left open, that of a run "
+            "held out too, whose error is told without"
+        )
     if (coarse := coarse_rates(comparison)) is not None:
         parts.append(coarse.sentence.rstrip("."))
     parts += _determined(comparison)

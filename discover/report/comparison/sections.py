@@ -142,6 +142,9 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         searched = f"Not searched, since the constants stand for it: {twins}." if twins else ""
         return {"constant_rows": rows, "searched": searched} if rows else None
 
+    def loadings() -> Content | None:
+        return None if comparison.loadings is None else tables.loadings(comparison.loadings)
+
     def told_by() -> Content | None:
         table = told_by_table([Told.from_json(row) for row in comparison.told_by])
         return (
@@ -169,7 +172,10 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             "errors",
             "Errors in test flows",
             "Errors",
-            [Part("The table of errors", "errors", errors)],
+            [
+                Part("The table of errors", "errors", errors),
+                Part("The table of loadings", "loadings", loadings),
+            ],
         ),
         (
             "law",

@@ -8,6 +8,7 @@ import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.identifiability import EXACT, Rival
+from discover.comparison.judging.loadings import OwnLoadings
 from discover.comparison.outcomes.constant import in_words as constant_in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -16,6 +17,7 @@ from discover.equations.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY, learner_title
+from discover.report.comparison.asked import within_a_sentence
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
     FIGURE_SYMBOLS,
@@ -118,6 +120,21 @@ def network_interval(comparison: Comparison) -> bool:
     """Return whether the terms of the network have intervals; True without a network."""
     network = comparison.outcomes.get("tbnn_ude")
     return network is None or any(term.ci95 for term in network.terms)
+
+
+def loadings(found: OwnLoadings) -> dict[str, Any]:
+    """Return the factors on the records of runs, with a column for each learner."""
+    runs = {one.run: one.held_out for told in found.found.values() for one in told}
+    by_learner = [{one.run: one for one in told} for told in found.found.values()]
+    return {
+        "deviation": found.deviation,
+        "leading": within_a_sentence(found.leading),
+        "titles": [learner_title(name) for name in found.found],
+        "rows": [
+            {"run": run, "held_out": held, "factors": [told.get(run) for told in by_learner]}
+            for run, held in runs.items()
+        ],
+    }
 
 
 def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:

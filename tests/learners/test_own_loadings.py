@@ -1,0 +1,124 @@
+"""Learners on runs with a factor of its own on each record, by scipy and by closed forms."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import Giesekus, start_up
+from scipy.optimize import minimize_scalar
+
+import discover as dc
+from discover.dataset import Run
+from discover.dataset.loading import Loading
+from discover.learners.own_loadings import signals_of, with_likely_factors
+from discover.learners.tbnn_ude.problem import data_scale
+from discover.learners.tbnn_ude.problem import make_problem as network_problem
+from discover.learners.trajectories.problem import make_problem
+from discover.learners.trajectories.sensitivities import linearise
+from discover.protocols import start_up as protocol
+from tensor_library.library import build_library
+
+TIMES = np.linspace(0.1, 8.0, 60)
+FACTORS = {0.5: 1.03, 1.0: 0.98, 2.0: 0.965, 3.0: 1.02}
+MOBILITY = 0.3
+
+
+OWN = Loading(0.03)
+
+
+def runs_of(factors, noise=0.01, loading: Loading | None = OWN):
+    lot, found = np.random.default_rng(11), []
+    for rate, factor in factors.items():
+        exact = Giesekus(MOBILITY, 100.0).respond(start_up(rate), TIMES).sigma12
+        error = noise * np.sqrt(np.mean(exact**2)) * lot.standard_normal(len(TIMES))
+        rates = np.full(len(TIMES), rate)
+        own = factor * exact + error
+        found.append(Run(f"{rate:g}.csv", TIMES, protocol(rate), rates, own, loading=loading))
+    return found
+
+
+def test_what_is_left_is_the_least_over_all_factors_that_the_prior_allows():
+    lot = np.random.default_rng(1)
+    predicted = 5.0 + lot.standard_normal(40)
+    recorded = 1.06 * predicted + 0.2 * lot.standard_normal(40)
+    noise, deviation = 0.2, 0.03
+    told = with_likely_factors(
+        jnp.asarray(predicted[None] / noise),
+        jnp.asarray(recorded[None] / noise),
+        jnp.asarray([deviation**2]),
+    )
+
+    def penalised(f):
+        off = ((1.0 + f) * predicted - recorded) / noise
+        return float(off @ off) + f**2 / deviation**2
+
+    best = minimize_scalar(penalised, bracket=(-0.1, 0.1)).fun
+    left = float(np.sum((np.asarray(told)[0] - recorded / noise) ** 2))
+    assert left == pytest.approx(best, rel=1e-9)
+    # without a factor far more is left
+    assert np.sum(((predicted - recorded) / noise) ** 2) > 2.0 * left
+
+
+def test_runs_of_one_loading_have_no_factor():
+    assert signals_of(runs_of(FACTORS, loading=None), np.ones(4)) is None
+    some = [replace(runs_of({0.5: 1.0})[0], loading=None), *runs_of({1.0: 1.0})]
+    first, second = np.asarray(signals_of(some, np.ones(2)))
+    assert first == 0.0
+    assert second > 0.0
+
+
+def test_sensitivities_are_those_with_the_factors_let_go():
+    problem = make_problem(runs_of(FACTORS), build_library(), 100.0, 1.0)
+    at, step = 0.3 * np.eye(len(problem.library))[3], 1e-5
+    _, columns = linearise(problem, jnp.asarray(at), jnp.zeros(0))
+    ends = []
+    for sign in (1.0, -1.0):
+        moved = at.copy()
+        moved[3] += sign * step
+        ends.append(np.asarray(linearise(problem, jnp.asarray(moved), jnp.zeros(0))[0]))
+    # residuals are data minus prediction
+    slope = -(ends[0] - ends[1]) / (2.0 * step)
+    assert np.asarray(columns)[:, 3] == pytest.approx(slope, abs=1e-6 * np.max(np.abs(slope)))
+
+
+def test_sparse_regression_holds_the_mobility_whatever_the_loadings():
+    found = dc.TensorSINDy(modulus=100.0).fit(runs_of(FACTORS)).result_
+    assert [term.term for term in found.terms] == ["sigma.sigma"]
+    low, high = found.terms[0].ci95
+    assert low < MOBILITY < high
+    assert high - low < 0.04  # some 5 % of a mobility, as beside exact loadings and 1 % of noise
+
+
+@pytest.mark.slow
+def test_sparse_regression_takes_factors_for_a_law_where_all_are_one_loading():
+    found = dc.TensorSINDy(modulus=100.0).fit(runs_of(FACTORS, loading=None)).result_
+    told = [term for term in found.terms if term.term == "sigma.sigma"]
+    held = bool(told) and told[0].ci95[0] < MOBILITY < told[0].ci95[1]
+    assert len(found.terms) > 1 or not held
+
+
+def test_a_network_sees_no_misfit_in_the_factor_of_a_loading():
+    def left(loading):
+        runs = runs_of({0.5: 1.03, 2.0: 0.97}, noise=0.0, loading=loading)
+        problem = network_problem(runs, np.array([100.0]), np.array([1.0]))
+        exact = [runs[0].stress / 103.0, runs[1].stress / 97.0]
+        missed = problem.missed_by(jnp.asarray(np.stack(exact)))
+        return float(jnp.linalg.norm(problem.less_factors(missed, data_scale(problem))))
+
+    unaware = left(None)
+    assert unaware == pytest.approx(0.03, rel=0.05)
+    # what is left is what the prior holds back: 3 % to a noise of 0.1 %
+    assert left(OWN) < 0.01 * unaware
+
+
+def test_derivatives_of_a_network_are_those_with_the_factors_let_go():
+    problem = network_problem(runs_of(FACTORS), np.array([100.0]), np.array([1.0]))
+    change = jax.random.normal(jax.random.key(0), (*problem.target.shape, 1))
+    missed, scale = 0.01 * problem.target, jnp.full(problem.target.shape, 0.1)
+    ends = [problem.less_factors(missed + s * 1e-6 * change[..., 0], scale) for s in (1.0, -1.0)]
+    slope = np.asarray(ends[0] - ends[1]) / 2e-6
+    told = np.asarray(problem.columns(missed, scale, change))[..., 0]
+    assert told == pytest.approx(slope, abs=1e-7)
+    assert np.max(np.abs(told - 0.1 * np.asarray(change[..., 0]))) > 0.01
