@@ -93,7 +93,8 @@ def corrected(
             f"time, and {other.name} is none. Leave it out of [data], leave the effects out, or "
             "use discover close-loop."
         )
-    batch = make_batch(runs)
+    # an instrument is the same, whatever the loading
+    batch = make_batch([replace(run, loading=None) for run in runs])
     assert isinstance(batch, RunBatch)  # at a rate alone
     values = [jnp.asarray(known.values, dtype=float) for known in effects]
     felt, gain, offset, missed = (

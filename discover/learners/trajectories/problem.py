@@ -90,9 +90,11 @@ class TrajectoryProblem(eqx.Module):
         found = jnp.where(weight > 0, weight * predicted, 0.0)
         if self.loading is None:
             return found
-        recorded = (weight * self.target)[..., 0]
-        stress = with_likely_factors(found[..., 0], recorded, self.loading)
-        return found.at[..., 0].set(stress)
+        # one loading has one factor, on σ12, N1 and N2
+        rows = (found.shape[0], -1)
+        recorded = (weight * self.target).reshape(rows)
+        told = with_likely_factors(found.reshape(rows), recorded, self.loading)
+        return told.reshape(found.shape)
 
     def weighted_columns(
         self,
