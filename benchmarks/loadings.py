@@ -1,12 +1,14 @@
-"""Runs that are loadings of their own: how often a loop that is told so is right.
+"""Runs that are loadings of their own: how often a command that is told so is right.
 
 Three start-ups and an oscillation are fitted and a faster start-up judges, by scipy, with 1 % of
 noise and a factor of its own on each run. Each draw has other factors and another noise.
 
     python benchmarks/loadings.py --draws 100 --differ 0.03
+    python benchmarks/loadings.py --task compare --draws 100
 """
 
 import argparse
+from typing import NamedTuple
 
 import numpy as np
 from independent import Giesekus, oscillation, start_up
@@ -50,9 +52,45 @@ def drawn(exact, seed: int, differ: float, correlation: float) -> tuple[Dataset,
     return Dataset("runs", tuple(runs)), factors
 
 
+class Answer(NamedTuple):
+    """Whether a command explains the runs, the mobility if that is all it finds, the factors."""
+
+    explained: bool
+    mobility: tuple[float, float] | None
+    factors: dict[str, tuple[float, float]]
+
+
+def of_loop(data: Dataset, base: dc.Fluid, loading: float | None) -> Answer:
+    """Return what a closed loop answers."""
+    options = {"effects": EFFECTS, "max_effects": 2, "loading": loading}
+    loop = dc.close_loop(data, base, held_out=["held.csv"], **options)
+    mobility = None
+    if [stage.effect for stage in loop.stages] == ["giesekus_mobility"]:
+        mobility = loop.stages[0].parameters["alpha"].ci95
+    told = loop.remaining.get("loading", {})
+    factors = {name: one["ci95"] for name, one in told.items() if one["ci95"] is not None}
+    return Answer(loop.verdict != "unexplained", mobility, factors)
+
+
+def of_comparison(data: Dataset, base: dc.Fluid, loading: float | None) -> Answer:
+    """Return what sparse regression answers."""
+    options = {"learners": ["tensor_sindy"], "quick": True, "loading": loading}
+    found = dc.compare(data, base, held_out=["held.csv"], **options)
+    terms, mobility = found.outcomes["tensor_sindy"].terms, None
+    if [term.term for term in terms] == ["sigma.sigma"]:
+        mobility = terms[0].ci95
+    told = [] if found.loadings is None else found.loadings.found["tensor_sindy"]
+    factors = {one.run: one.ci95 for one in told if one.ci95 is not None}
+    return Answer(found.verdict == "explained", mobility, factors)
+
+
+ANSWERS = {"loop": of_loop, "compare": of_comparison}
+
+
 def main() -> None:
     """Print the shares of draws."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--task", choices=ANSWERS, default="loop")
     parser.add_argument("--fluid", choices=FLUIDS, default="giesekus")
     parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--seed", type=int, default=5000)
@@ -66,19 +104,15 @@ def main() -> None:
     explained = named = held = factors_held = factors_told = 0
     for seed in range(asked.seed, asked.seed + asked.draws):
         data, factors = drawn(exact, seed, asked.differ, asked.correlation)
-        loop = dc.close_loop(
-            data, base, held_out=["held.csv"], effects=EFFECTS, max_effects=2,
-            loading=asked.told or None,
-        )  # fmt: skip
-        explained += loop.verdict != "unexplained"
-        if [stage.effect for stage in loop.stages] == ["giesekus_mobility"]:
+        answer = ANSWERS[asked.task](data, base, asked.told or None)
+        explained += answer.explained
+        if answer.mobility is not None:
             named += 1
-            low, high = loop.stages[0].parameters["alpha"].ci95
+            low, high = answer.mobility
             held += low < MOBILITY < high
-        for name, one in loop.remaining.get("loading", {}).items():
-            if one["ci95"] is not None:
-                factors_told += 1
-                factors_held += one["ci95"][0] < factors[name] < one["ci95"][1]
+        for name, (low, high) in answer.factors.items():
+            factors_told += 1
+            factors_held += low < factors[name] < high
     print(f"{asked.fluid}: {explained} of {asked.draws} explained; mobility alone in {named}, its")
     print(f"interval holds {MOBILITY} in {held}; {factors_held} of {factors_told} factors held")
 

@@ -43,6 +43,11 @@ A_TRANSIENT = (
 )
 """What to measure where nothing but states was."""
 
+IF_LOADINGS = (
+    "If each run is a loading of its own, say so: [{}] loading = 0.03 lets loadings differ by 3 %."
+)
+"""What to say of runs that nothing explains, of which nobody said it; for a section of a study."""
+
 _LEARNERS = {
     "tensor_sindy": "Sparse regression",
     "tbnn_ude": "The neural network",

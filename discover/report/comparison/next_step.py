@@ -7,6 +7,7 @@ from discover.dataset.coarse_rates import MORE_SAMPLES
 from discover.report.comparison.asked import coarse_rates, left_open
 from discover.report.wording import (
     A_TRANSIENT,
+    IF_LOADINGS,
     SYMBOLS,
     percent,
     sentence,
@@ -38,7 +39,7 @@ def what_to_measure_next(comparison: Comparison) -> str:
         return (
             "Before measuring more, find what the law lacks: discover close-loop tries effects of "
             "the instrument and of the flow on the same runs, and [compare] library and max_terms "
-            "allow more terms."
+            f"allow more terms.{_loadings(comparison)}"
         )
     following = comparison.next_measurement
     if only_states(comparison.flows):
@@ -55,6 +56,15 @@ def what_to_measure_next(comparison: Comparison) -> str:
         "No rival law is known, so what tests this one hardest is a flow unlike those fitted: "
         f"a shear rate above {significant(max(rates), 3)}{unit}."
     )
+
+
+def _loadings(comparison: Comparison) -> str:
+    """Return that runs may be loadings of their own, where nobody said so of several."""
+    runs = comparison.flows_of("training")
+    several_told = comparison.loadings is None and len(runs) > 1
+    if not several_told or any(run.is_truth or run.protocol.control == "stress" for run in runs):
+        return ""
+    return f" {IF_LOADINGS.format('compare')}"
 
 
 def _proposal(following: NextMeasurement) -> str:

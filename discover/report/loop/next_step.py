@@ -11,6 +11,7 @@ from discover.report.loop.asked import EXPLAINED, coarse_rates, several, unteste
 from discover.report.wording import (
     A_TRANSIENT,
     FIGURE_SYMBOLS,
+    IF_LOADINGS,
     effect_title,
     effects_title,
     percent,
@@ -59,7 +60,7 @@ def what_to_measure_next(result: LoopResult) -> str:
     if result.verdict == "unexplained":
         return (
             "Repeat one run with another geometry or instrument: what changes is the instrument's, "
-            "what stays is the fluid's."
+            f"what stays is the fluid's.{_loadings(result)}"
         )
     hidden = max(
         result.noise_floor,
@@ -69,6 +70,15 @@ def what_to_measure_next(result: LoopResult) -> str:
         f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
         f"tests the model hardest is a faster flow: {faster}."
     )
+
+
+def _loadings(result: LoopResult) -> str:
+    """Return that runs may be loadings of their own, where nobody said so of several."""
+    runs = [record for record in result.records if not record.held_out]
+    told = "loading_deviation" in result.remaining
+    if told or len(runs) < 2 or any(run.control == "stress" for run in runs):
+        return ""
+    return f" {IF_LOADINGS.format('loop')}"
 
 
 def _telling_test(result: LoopResult) -> str:
