@@ -12,6 +12,7 @@ from discover.comparison.learning import Learning
 from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.own_loadings import loadings_of
 from discover.dataset.repeats import repeats_among
 from discover.dataset.run import Run
 from discover.dataset.run_table import kind_of_record
@@ -53,11 +54,19 @@ def learned_by_noise(
     progress
         Called with what is going on and the fraction done.
     """
-    known, own = learnt
+    own = learnt[1]
     if _BY_ITS_LAW not in own:
         return learnt
-    seen = _seen(study, known, own)
-    weights = _weights(seen, data.fit.runs, study.compare.use_normal_stresses)
+
+    def seen_in(some: StudyData, learnt: Learnt) -> tuple[_Seen, StudyData]:
+        known, own = learnt
+        if study.compare.loading is not None:  # what a loading owes its factor is no noise
+            some = loadings_of(known, own, study.compare.loading).taken_out(some)
+            known = known_in(some)
+        return _seen(study, known, own), some
+
+    seen, shown = seen_in(data, learnt)
+    weights = _weights(seen, shown.fit.runs, study.compare.use_normal_stresses)
     if weights is None:
         return learnt
     progress("records differ in noise: once more, each weighed by its own", 1.0)
@@ -65,7 +74,7 @@ def learned_by_noise(
     there = known_in(weighed)
     again = replace(learning, prefix="by_noise_").outcomes(list(own), there, progress)
     before, after = ({t.term for t in of[_BY_ITS_LAW].terms} for of in (own, again))
-    if after <= before and _seen(study, there, again).explained:
+    if after <= before and seen_in(weighed, (there, again))[0].explained:
         return there, again
     return learnt
 
