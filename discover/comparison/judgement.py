@@ -2,14 +2,12 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
 
-from discover.comparison.at_once import at_once
-from discover.comparison.fitting.classical import CLASSICAL, ClassicalFit, fit_classical_laws
-from discover.comparison.fitting.further_laws import fit_further_laws
+from discover.comparison.beside import Beside, look_beside
+from discover.comparison.fitting.classical import ClassicalFit
 from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.fitting.named_effects import fit_named_effects
-from discover.comparison.instrument import Frame, classical_along
+from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
 from discover.comparison.judging.beside_other_constants import with_other_coefficients
@@ -28,7 +26,7 @@ from discover.comparison.judging.dense_library import (
 )
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.explanation import Explanation, explain
-from discover.comparison.judging.identifiability import Rival, find_rivals, structure_of
+from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.late_answers import hold_against_late_answers
 from discover.comparison.judging.loadings import OwnLoadings
 from discover.comparison.judging.misread_runs import hold_against_misreading
@@ -62,7 +60,6 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
-from discover.progress import Progress
 from discover.protocols.kinematics import ONLY_STATES
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData
@@ -143,9 +140,9 @@ def judge(
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     law = None if chosen is None else law_with_fitted(chosen, frame.model, known.fitted)
     is_silent = at_first.verdict == "no_signal"
-    beside = _Beside((), None, ())
+    beside = Beside((), None, ())
     if not is_silent:
-        beside = _beside(study, known, library, chosen, frame, say)
+        beside = look_beside(study, known, library, chosen, frame, say)
     tested = _tested(study, known, chosen, law, frame, outcomes, at_first, beside.rivals, seed)
     explanation = tested.explanation
     of_modes = OfModes()
@@ -295,7 +292,7 @@ def _statements(
     frame: Frame,
     outcomes: Mapping[str, LearnerOutcome],
     tested: _Tested,
-    beside: "_Beside",
+    beside: Beside,
     of_modes: OfModes,
 ) -> list[Statement]:
     """Return what is determined, quantity by quantity."""
@@ -318,48 +315,6 @@ def _statements(
     return list(found)
 
 
-class _Beside(NamedTuple):
-    """What is looked at beside the laws found, for the fields of `Judgement` of the same names."""
-
-    rivals: Sequence[Rival]
-    structure: Structure | None
-    classical: Sequence[ClassicalFit]
-
-
-def _beside(
-    study: Study,
-    known: Known,
-    library: TermLibrary,
-    chosen: LearnerOutcome | None,
-    frame: Frame,
-    say: Callable[[str], None],
-) -> _Beside:
-    """Return rivals, structure and classical laws, which need nothing of one another."""
-
-    def classical(tell: Progress) -> Sequence[ClassicalFit]:
-        tell("fitted to the same runs", 0.0)
-        # the criterion of the sparse law counts these, and both stand in one column
-        return _classical(study, known, chosen and chosen.details.get("n_independent"))
-
-    def rivals(tell: Progress) -> Sequence[Rival]:
-        assert chosen is not None
-        tell("simulating laws that the data do not rule out", 0.0)
-        met, model = chosen.details.get("rivals", ()), frame.model
-        return find_rivals(chosen.terms, met, model, frame.flows, library, chosen.predictions)
-
-    def structure(tell: Progress) -> Structure:
-        assert chosen is not None
-        tell("what the runs can tell of it", 0.0)
-        runs, normal = frame.data.fit.runs, study.compare.use_normal_stresses
-        return structure_of(chosen.terms, runs, library, frame.model, normal)
-
-    parts: dict[str, Callable[[Progress], Any]] = {"the classical laws": classical}
-    if chosen is not None:
-        parts |= {"rivals": rivals, "the library": structure}
-    found = at_once(parts, lambda text, _: say(text))
-    return _Beside(found.get("rivals", ()), found.get("the library"), found["the classical laws"])
-
-
 def _of_modes(
     outcomes: Mapping[str, LearnerOutcome], explanation: Explanation, expectation: Expectation
 ) -> tuple[str, ...]:
@@ -373,26 +328,6 @@ def _of_modes(
     error = expectation.linear_error
     said = left_open_by_modes(path, len(chosen.terms), misfit, error, network)
     return (said,) if said else ()
-
-
-def _classical(study: Study, known: Known, independent: float | None) -> Sequence[ClassicalFit]:
-    """Return the classical laws, with the same constants fitted along as the learners have.
-
-    Behind them those that the study names, with the constants that the known part alone has.
-    """
-    before = known.before
-    further = [name for name in study.compare.laws if name not in CLASSICAL]
-    fits = fit_further_laws(
-        further, before.model, before.data.fit.runs, before.flows, before.recorded, independent
-    )
-    if known.along is None:
-        relaxes = study.model.known_relaxation
-        return [*fit_classical_laws(before.model, known.flows, relaxes, independent), *fits]
-    each = [
-        known.frame_of(known.along.constants.raw(known.along.before.classical[law].theta))
-        for law in CLASSICAL
-    ]
-    return [*classical_along(known.along, each, known.flows, independent), *fits]
 
 
 def _told(outcome: LearnerOutcome, explanation: Explanation) -> LearnerOutcome:
