@@ -173,8 +173,8 @@ def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:
     from discover.comparison import judgement, learning
     from discover.comparison.judging.next_measurement import NextMeasurement
 
-    nothing = judgement._Beside((), None, ())
-    patch.setattr(judgement, "_beside", lambda *_: nothing)
+    nothing = judgement.Beside((), None, ())
+    patch.setattr(judgement, "look_beside", lambda *_: nothing)
     patch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
     patch.setattr(learning, "physics_of", lambda *_: {"checks": []})
 

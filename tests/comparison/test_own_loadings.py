@@ -52,8 +52,10 @@ def compared(data, **options):
 
 
 @pytest.fixture(scope="module")
-def loaded(exact):
-    return compared(data_of(exact, FACTORS), loading=0.03)
+def loaded(exact, left_to_the_verdict):
+    with pytest.MonkeyPatch.context() as patch:
+        left_to_the_verdict(patch)
+        return compared(data_of(exact, FACTORS), loading=0.03)
 
 
 def test_mobility_is_found_in_runs_of_different_loadings(loaded):
