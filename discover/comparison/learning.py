@@ -15,7 +15,6 @@ from discover.comparison.judging.identifiability import (
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, make_law
 from discover.learners.registry import BUILT_IN
 from discover.learners.result import LearnerResult
 from discover.progress import Progress
@@ -127,31 +126,6 @@ def _told_of_constants(found: Learned) -> LearnerResult:
         message=f"{message}; it learned {times} with constants fitted along, which {ended}.",
         details={**found.result.details, "rounds": found.rounds, "settled": found.settled},
     )
-
-
-def sweep_studies(study: Study) -> list[tuple[str, float, Study]]:
-    """Return the law, the value and the study of each point of a sweep."""
-    sweep, synthetic = study.compare.sweep, study.data.synthetic
-    if sweep is None:
-        return []
-    if synthetic is None:
-        raise InputError(
-            "compare.sweep makes synthetic data, so [data] must say synthetic = {...} too."
-        )
-    studies = []
-    for law in sweep.laws:
-        if sweep.parameter not in LAWS[law].parameters:
-            wanted = ", ".join(LAWS[law].parameters) or "none"
-            raise InputError(
-                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}. "
-                f"Write one of its parameters: {wanted}."
-            )
-        for value in sweep.values:
-            make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
-            made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
-            data = study.data.model_copy(update={"synthetic": made})
-            studies.append((law, value, study.model_copy(update={"data": data})))
-    return studies
 
 
 def require_teacher(study: Study) -> None:

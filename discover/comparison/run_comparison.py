@@ -2,9 +2,8 @@
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
-from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.comparison import Comparison
 from discover.comparison.description import data_in_words, known_in_words
 from discover.comparison.equations import known_equation
 from discover.comparison.fitting.prepared import (
@@ -16,19 +15,12 @@ from discover.comparison.fitting.prepared import (
 )
 from discover.comparison.fitting.step_instants import with_step_instants
 from discover.comparison.fitting.training import study_library
-from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known, known_part
-from discover.comparison.judgement import judge
-from discover.comparison.learning import Learning, distilled, require_teacher, sweep_studies
-from discover.comparison.outcomes.flows import comparison_flows
+from discover.comparison.learning import Learning, distilled, require_teacher
 from discover.comparison.outcomes.truth import TrueTerm, true_terms
-from discover.comparison.own_loadings import (
-    as_recorded,
-    loadings_of,
-    with_own_loadings,
-    with_records_of_unseen,
-)
+from discover.comparison.own_loadings import judged, with_own_loadings
 from discover.comparison.own_noise import learned_by_noise
+from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
@@ -112,10 +104,6 @@ def compare(
         )
     learning = Learning(study, options.seed if seed is None else seed, store, made)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
-    done = 0
-
-    def step(title: str) -> Progress:
-        return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
 
     def learn(text: str, fraction: float) -> None:
         progress(text, fraction * len(options.learners) / n_parts)
@@ -123,51 +111,34 @@ def compare(
     own = learning.outcomes(options.learners, known, learn)
     if made is None:
         known, own = learned_by_noise(study, learning, data, (known, own), known_in, learn)
-    done += len(own)
-    points, model = [], known.before.model
-    for law, value, other in sweep:
-        other_data = thinned_to(load_study_data(other, seed), options.most_samples)
-        flow = comparison_flows(other_data, ())[len(other_data.fit)]
-        alone = Known(Frame(model, other_data, [flow]), None, [flow])
-        elsewhere, at_point = replace(learning, study=other, made=None), {}
-        for learner in options.learners:
-            part = f"sweep_{law}_{value:g}_{learner}"
-            at_point[learner] = elsewhere.outcome(learner, alone, step(part), part)
-            done += 1
-        assert options.sweep is not None
-        points.append(SweepPoint(law, options.sweep.parameter, value, flow, at_point))
-    loadings = None
-    if made is None and options.loading is not None:
-        loadings = loadings_of(known, own, options.loading)
-        data, undated = loadings.taken_out(data), loadings.taken_out(undated)
-        recorded, known = known.flows, known_in(data)
-    # with constants fitted along, each is a correction of all the data
-    frames = {name: known.frame(one) for name, one in own.items()}
-    if loadings is not None:
-        frames = {name: loadings.frame(name, frame) for name, frame in frames.items()}
+    model = known.before.model
+
+    def at(done: int, title: str) -> Progress:
+        return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
+
+    points = sweep_points(sweep, learning, model, seed, lambda i, title: at(len(own) + i, title))
+    done = (1 + len(sweep)) * len(options.learners)
 
     def say(text: str) -> None:
         progress(text, done / n_parts)
 
-    found = judge(study, known, library, own, frames, learning.seed, say, undated, loadings)
-    flows, before = known.flows, known.alone()
-    if loadings is not None:
-        flows = with_records_of_unseen(flows, recorded)
-        found = as_recorded(found, loadings, flows)
-        if not found.explanation.in_library:
-            loadings = loadings.without_intervals()
-    distillations = distilled(study, data.truth, store, step("distillation"))
+    deviation = options.loading if made is None else None
+    seen = judged(
+        study, (known, own), (data, undated), known_in, library, learning.seed, say, deviation
+    )
+    known, found = seen.known, seen.judgement
+    distillations = distilled(study, data.truth, store, at(done, "distillation"))
     progress("done", 1.0)
     return Comparison(
         name=study.name,
         data_summary=data_in_words(data, study)
         + (_TAKEN_OUT if known.along is None and known.effects else "")
         + "".join(f". {text}" for text in (of_steps, of_spikes) if text)
-        + (_BY_LOADING if loadings is not None else "")
+        + (_BY_LOADING if seen.loadings is not None else "")
         + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
         known_part=known_in_words(declared, known, study),
-        flows=flows,
-        before=before,
+        flows=seen.flows,
+        before=known.alone(),
         outcomes=found.outcomes,
         truth=_truth(study, model),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
@@ -179,7 +150,7 @@ def compare(
         next_measurement=found.next_measurement,
         seed=learning.seed,
         known=known_equation(model),
-        known_of={name: known_equation(frame.model) for name, frame in frames.items()},
+        known_of={name: known_equation(frame.model) for name, frame in seen.frames.items()},
         known_effects=known.effects,
         conditions=material_and_temperature(data.dataset, study.data.material),
         stood_for=() if known.along is None else known.along.twins,
@@ -187,7 +158,7 @@ def compare(
         classical=found.classical,
         warnings=found.warnings,
         by_mode=found.by_mode,
-        loadings=loadings,
+        loadings=seen.loadings,
     )
 
 
