@@ -1,4 +1,4 @@
-"""A comparison of runs that are loadings of their own: before it is judged, and as it is shown."""
+"""What was learned, judged and shown: where runs are loadings of their own, without factors."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
