@@ -29,6 +29,7 @@ from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Dataset, Run
+from discover.dataset.loading import Loading
 from discover.effects import make_effect
 from discover.inference.constants import ConstantByMode
 from discover.inference.draws_by_mode import ConstantsDrawn
@@ -265,6 +266,19 @@ def test_control_runs_that_stretch_every_mode_determine_that_of_each():
     found = coefficients_in_modes(known_part(), [term], runs).constants["sigma.sigma"]
     assert found.degree == 0
     assert all(mode.ci95[1] - mode.ci95[0] < 0.1 for mode in found.modes)
+
+
+def test_coefficients_of_equal_modes_hold_whatever_the_loadings():
+    term = RecoveredTerm("sigma.sigma", 0.25)
+    loaded = [
+        replace(run, stress=factor * run.stress, loading=Loading(0.03))
+        for run, factor in zip(
+            records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0)), (1.03, 0.98, 1.02), strict=True
+        )
+    ]
+    found = coefficients_in_modes(known_part(), [term], loaded).constants["sigma.sigma"]
+    assert found.degree == 0
+    assert all(mode.ci95[0] < 0.25 < mode.ci95[1] for mode in found.modes)
 
 
 def test_a_term_that_the_sweep_tells_is_only_said_to_be_the_same_in_all_modes():

@@ -19,7 +19,7 @@ from discover.inference.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.readings import fitted_readings, unseen_readings
+from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
@@ -273,7 +273,8 @@ def _misread(
     sets = [seen]
     if held_out:
         unseen = unseen_readings(model, make_batch(held_out), held_out, fit, fit.theta)
-        sets.append([*seen, *unseen])
+        own, others = beside_one_another(seen, unseen, len(fit.free))
+        sets.append([*own, *others])
     return clear_misreading(sets, expectation, _ARITHMETIC)
 
 
@@ -290,7 +291,8 @@ def _told(
     freer = freer_fits(forward, problem.batch, fit, degrees)
     bounds = intervals(forward, problem.batch, fit)
     small = small_faults(seen)
-    beside = None if small is None else small.about_the_fit
+    count = len(fit.free)  # factors of loadings come after the constants
+    beside = None if small is None else small.about_the_fit[:count, :count]
     bounds = with_small_faults(bounds, fit, forward, small)
     constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer, beside)
     drawn = draw_constants(problem, fit, degrees, freer, _DRAWS, beside=beside)
