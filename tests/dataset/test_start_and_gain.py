@@ -215,6 +215,20 @@ def test_no_gain_is_said_of_runs_that_agree_with_the_sweep(tmp_path):
     assert about(write(tmp_path, *runs), "gain") == []
 
 
+def test_fillings_that_differ_from_run_to_run_are_noted_with_their_spread(tmp_path):
+    runs = start_ups((0.02, 0.06, 0.2, 0.5))
+    for run, factor in zip(runs, (1.05, 0.96, 1.03, 0.95), strict=True):
+        run["stress_Pa"] = factor * run["stress_Pa"]
+    (said,) = about(write(tmp_path, *runs), "loading")
+    assert "stand at 0.954 to 1.05 times" in said
+    assert "loading = 0.05 in [loop] and in [compare]" in said
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.9])
+def test_no_loadings_are_said_of_runs_that_stand_alike(tmp_path, gain):
+    assert about(write(tmp_path, *start_ups((0.02, 0.06, 0.2, 2.0), gain)), "loading") == []
+
+
 def test_no_gain_is_said_of_runs_that_start_slowly(tmp_path):
     """A rate that rises within 1 s lowers the early stress, less and less."""
     runs = []

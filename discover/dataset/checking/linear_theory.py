@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
 
 from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
@@ -11,6 +12,7 @@ from discover.dataset.checking.one_run import stress_noise
 from discover.dataset.checking.sweep_inertia import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
+from discover.dataset.loading import LARGEST
 from discover.dataset.run import Run
 from discover.words import percent_of
 
@@ -29,6 +31,9 @@ _STEADY_RATIO = 0.05
 _FEWEST_GAINS = 3
 # Where the stress passes through zero its ratio says nothing
 _CLEAR_OF_ZERO = 0.3
+# Of gains that differ: what a law that thins leaves of linear theory at small strain, and chance
+_STILL_LINEAR = 0.01
+_UNLIKELY = 1e-3
 # Below a Weissenberg number of one the Cox–Merz rule holds to some ten per cent for simple fluids;
 # above it laws differ, and it is theirs to say
 _COX_MERZ_FACTOR = 1.3
@@ -213,6 +218,7 @@ def _shared_gain(
     if not found:
         return
     gains, errors = np.array(found).T
+    yield from _unlike_gains(gains, errors)
     shared = float(np.median(gains))
     scatter = 1.4826 * float(np.median(np.abs(gains - shared))) / np.sqrt(len(gains))
     warned = abs(shared) >= np.log1p(_SHARED_TOLERANCE)
@@ -240,6 +246,30 @@ def _shared_gain(
         f"In {which} it, the stress at small strain is {np.exp(shared):.3g} times what "
         f"{SWEEP_FILE} foretells: {why}. Correct it, or let the study fit it: [model] modes = "
         '"lve" with modulus_Pa = "fit".',
+    )
+
+
+def _unlike_gains(
+    gains: Float[np.ndarray, " k"], errors: Float[np.ndarray, " k"]
+) -> Iterator[Finding]:
+    """Yield by how much the gains of runs differ, if by more than their errors leave open."""
+    if len(gains) < _FEWEST_GAINS:
+        return
+    errors = np.hypot(errors, _STILL_LINEAR)
+    weights = errors**-2.0
+    off = (gains - np.sum(weights * gains) / np.sum(weights)) / errors
+    spread = float(np.sqrt(max(np.var(gains, ddof=1) - np.mean(errors**2), 0.0)))
+    if chi2.sf(float(off @ off), len(gains) - 1) > _UNLIKELY or spread > LARGEST:
+        return
+    low, high = np.exp(np.min(gains)), np.exp(np.max(gains))
+    yield Finding(
+        "note",
+        "loading",
+        "",
+        f"At small strain the runs stand at {low:.3g} to {high:.3g} times what {SWEEP_FILE} "
+        f"foretells, so they differ among themselves by {percent_of(spread)}, standard deviation, "
+        "as fillings of one sample do. If each run is a loading of its own, say so in the study: "
+        f"loading = {spread:.1g} in [loop] and in [compare].",
     )
 
 
