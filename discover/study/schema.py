@@ -1,7 +1,7 @@
 """The study file: what may be written in it, and nothing else."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
@@ -215,13 +215,25 @@ class Sweep(Section):
     values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
 
 
+NextFlow = Literal[
+    "laos",
+    "start_up",
+    "cessation",
+    "steps",
+    "superposed",
+    "step_strain",
+    "flow_curve",
+    "creep",
+    "uniaxial",
+    "planar",
+    "biaxial",
+]
+
+
 class NextExperiment(Section):
     """What the user could measure next."""
 
-    flows: Annotated[
-        tuple[Literal["laos", "start_up", "cessation", "steps", "superposed"], ...],
-        Field(min_length=1),
-    ] = ("laos", "start_up", "cessation", "steps", "superposed")
+    flows: Annotated[tuple[NextFlow, ...], Field(min_length=1)] = get_args(NextFlow)
     observe: Annotated[tuple[Literal["sigma12", "N1", "N2"], ...], Field(min_length=1)] = (
         "sigma12",
         "N1",

@@ -1,11 +1,13 @@
 """Bands, proposed experiments, and what happens when they are run."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from discover.errors import InputError
 from discover.identify.design.experiment_outcome import judge_laws
-from discover.identify.design.experiments import candidate_experiments
+from discover.identify.design.experiments import FLOW_CLASSES, candidate_experiments
 from discover.identify.design.next_experiment import DECISIVE, propose_experiments, squared_distance
 from discover.identify.rivals.bands import bands_of_predictions, prediction_bands
 from discover.identify.side_by_side.many_laws import (
@@ -16,6 +18,7 @@ from discover.identify.side_by_side.many_laws import (
 )
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.simulate import simulate
+from discover.study.schema import NextFlow
 
 MAXWELL = Fluid.dimensionless(UpperConvectedMaxwell())
 SMALL = np.array([[1e-3**2]])
@@ -53,6 +56,29 @@ def test_laws_in_one_library_are_simulated_as_each_alone():
         np.testing.assert_allclose(
             together[i, 0, :, 1], alone.first_normal_stress_difference, atol=2e-6
         )
+
+
+def test_extension_separates_the_slip_twin_before_a_second_normal_stress_difference():
+    some = candidate_experiments(1.0, ("start_up", "uniaxial"), (1.0,))
+    best, *_ = propose_experiments(JOHNSON_SEGALMAN, [TWIN], MAXWELL, some, NOISE, n_draws=8)
+    assert best.observed == ("tensile_stress",)
+    assert best.falling == ("twin",)
+    assert best.experiment.title == "uniaxial extension at Wi = 1"
+
+
+def test_a_maxwell_fluid_relaxes_flows_and_creeps_in_the_experiments_as_on_paper():
+    some = candidate_experiments(0.5, ("step_strain", "flow_curve", "creep"), (2.0,), modulus=3.0)
+    fluids = fluid_of([Contender("none", {})], Fluid(UpperConvectedMaxwell(), 3.0, 0.5))
+    told = predict_laws(fluids, [e.protocol for e in some], [e.times for e in some])
+    step, curve, creep = (told[0, i, : len(e.times), 0] for i, e in enumerate(some))
+    np.testing.assert_allclose(step, 6.0 * np.exp(-some[0].times / 0.5), rtol=2e-3)
+    np.testing.assert_allclose(curve, 1.5 * np.geomspace(0.2, 2.0, 10) / 0.5, rtol=1e-6)
+    np.testing.assert_allclose(creep, 2.0 * (1.0 + some[2].times / 0.5), rtol=2e-3)
+    assert [e.protocol.quantity for e in some] == ["sigma12", "sigma12", "strain"]
+
+
+def test_a_study_may_name_every_class_of_experiment():
+    assert get_args(NextFlow) == FLOW_CLASSES
 
 
 def test_only_a_second_normal_stress_difference_separates_the_slip_twin(about_the_twin):

@@ -184,6 +184,7 @@ def next_measurement(
             options.flows,
             options.weissenberg_numbers,
             options.deborah_numbers,
+            float(np.sum(declared.modulus)),
         )
         proposals = propose_experiments(
             chosen, others, declared, experiments, noise, options.observe, seed=seed

@@ -2,28 +2,49 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.protocols.control import imposed_stress, steady_rates
+from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import (
     FlowProtocol,
+    in_flow,
     measured_rate,
     oscillatory_shear,
     start_up,
     step_rates,
 )
 
-FlowClass = Literal["laos", "start_up", "cessation", "steps", "superposed"]
-FLOW_CLASSES: tuple[FlowClass, ...] = ("laos", "start_up", "cessation", "steps", "superposed")
+FlowClass = Literal[
+    "laos",
+    "start_up",
+    "cessation",
+    "steps",
+    "superposed",
+    "step_strain",
+    "flow_curve",
+    "creep",
+    "uniaxial",
+    "planar",
+    "biaxial",
+]
+FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)
 
 Observed = Literal["sigma12", "N1", "N2"]
 OBSERVED: tuple[Observed, ...] = ("sigma12", "N1", "N2")
 """What may be measured, the easiest first: torque, axial force, and what needs special plates."""
 
 N_SAMPLES = 101
+
+_FIRST = 1e-2
+"""Of a relaxation time: the first sample after a step of strain, and of creep."""
+
+_STATES = 10
+_HENCKY_STRAIN = 3.0
 
 
 @dataclass(frozen=True)
@@ -50,12 +71,18 @@ class Experiment:
     times: Float[np.ndarray, " n"]
     pipkin: tuple[float, float] | None = None
 
+    @property
+    def in_shear(self) -> bool:
+        """Whether N1 and N2 may be measured beside what is recorded."""
+        return self.protocol.flow == "shear"
+
 
 def candidate_experiments(
     relaxation_time: float,
     classes: Sequence[str] = FLOW_CLASSES,
     weissenberg_numbers: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
     deborah_numbers: Sequence[float] = (0.25, 0.5, 1.0, 2.0),
+    modulus: float = 1.0,
 ) -> list[Experiment]:
     """Return experiments of the classes that a user allows.
 
@@ -66,9 +93,11 @@ def candidate_experiments(
     classes
         Of `FLOW_CLASSES`.
     weissenberg_numbers
-        λ times the largest shear rate.
+        λ times the largest rate; in creep the stress over the modulus, of a step the strain.
     deborah_numbers
         λ times the frequency of oscillation.
+    modulus
+        In Pa, of all modes together.
 
     Raises
     ------
@@ -85,9 +114,11 @@ def candidate_experiments(
             raise InputError(f"{label} must be positive numbers; got {list(values)}.")
     unit = 1.0 / relaxation_time
     found = []
-    for name in FLOW_CLASSES:
+    for name in _MAKERS:
         if name in classes:
             found += _MAKERS[name](unit, weissenberg_numbers, deborah_numbers)
+    if "creep" in classes:
+        found += _creep(unit, weissenberg_numbers, modulus)
     return found
 
 
@@ -161,10 +192,68 @@ def _superposed(unit, weissenberg, deborah):
     return found
 
 
+def _step_strain(unit, strains, deborah):
+    del deborah
+    times = np.geomspace(_FIRST, 10.0, N_SAMPLES) / unit
+    return [
+        Experiment(
+            f"relaxation after a step strain of {strain:g}",
+            "step_strain",
+            after_step_strain(start_up(0.0), strain, times[0]),
+            times,
+        )
+        for strain in strains
+    ]
+
+
+def _flow_curve(unit, weissenberg, deborah):
+    del deborah
+    low, high = min(weissenberg), max(weissenberg)
+    title = f"a flow curve from Wi = {0.1 * low:g} to {high:g}"
+    rates = np.geomspace(0.1 * low, high, _STATES) * unit
+    counted = np.arange(1.0, _STATES + 1.0)
+    return [Experiment(title, "flow_curve", steady_rates(rates), counted)]
+
+
+def _creep(unit, stresses, modulus):
+    times = np.geomspace(_FIRST, 10.0, N_SAMPLES) / unit
+    return [
+        Experiment(
+            f"creep at a stress of {stress:g} times the modulus",
+            "creep",
+            imposed_stress(times, np.full(N_SAMPLES, stress * modulus)),
+            times,
+        )
+        for stress in stresses
+    ]
+
+
+def _extension(kind):
+    def make(unit, weissenberg, deborah):
+        del deborah
+        return [
+            _experiment(
+                f"{kind} extension at Wi = {wi:g}",
+                kind,
+                in_flow(start_up(wi * unit), kind),
+                _HENCKY_STRAIN / wi,
+                unit,
+            )
+            for wi in weissenberg
+        ]
+
+    return make
+
+
 _MAKERS = {
     "laos": _laos,
     "start_up": _start_up,
     "cessation": _cessation,
     "steps": _steps,
     "superposed": _superposed,
+    "step_strain": _step_strain,
+    "flow_curve": _flow_curve,
+    "uniaxial": _extension("uniaxial"),
+    "planar": _extension("planar"),
+    "biaxial": _extension("biaxial"),
 }

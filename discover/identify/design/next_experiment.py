@@ -33,6 +33,9 @@ MOST_EVIDENCE = 1e6
 _HIDDEN = 1e-3
 """Of the noise: a deviation of the prediction that changes no evidence by more than its square."""
 
+_EFFORT = ("sigma12", "strain", "N1", "tensile_stress", "N2")
+"""What is measured, the easiest first: N2 needs special plates, extension another instrument."""
+
 # an error of 1e-5 is nothing beside the noise that a measurement is given here
 _LIMITS = {"strain_step": 0.2, "phase_step": 0.3}
 
@@ -44,7 +47,8 @@ class Proposal:
     Attributes
     ----------
     observed
-        What has to be measured: ``sigma12``, with ``N1``, with ``N2``.
+        What has to be measured: ``sigma12``, in creep the ``strain``, in extension the
+        ``tensile_stress``; in shear with ``N1``, with ``N2``.
     evidence
         Expected log-likelihood ratio of the chosen law over each rival, by the rival's name.
     weakest
@@ -129,12 +133,13 @@ def propose_experiments(
         runs = [predicted[a:b, place, :n] for a, b in itertools.pairwise(starts)]
         if not np.all(np.isfinite(runs[0][0])):
             continue  # not an experiment that the chosen law survives
-        for kinds in _measurements(observed):
+        recorded = experiment.protocol.quantity
+        for kinds in _measurements(observed) if experiment.in_shear else [(0,)]:
             evidence = _evidence(runs, kinds, noise)
             proposals.append(
                 Proposal(
                     experiment,
-                    tuple(OBSERVED[k] for k in kinds),
+                    tuple(OBSERVED[k] if k else recorded for k in kinds),
                     {law.name: float(evidence[0, j]) for j, law in enumerate(laws) if j > 0},
                     float(np.min(evidence[np.triu_indices(len(laws), 1)], initial=MOST_EVIDENCE)),
                     np.stack([run[0] for run in runs]),
@@ -146,7 +151,7 @@ def propose_experiments(
 def _rank(proposal: Proposal) -> tuple:
     enough = min(proposal.weakest, OVERWHELMING)
     total = sum(min(value, OVERWHELMING) for value in proposal.evidence.values())
-    hardest = max(OBSERVED.index(name) for name in proposal.observed)
+    hardest = max(map(_EFFORT.index, proposal.observed))
     return (-len(proposal.falling), hardest, -enough, -total)
 
 

@@ -4,15 +4,16 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.statements import only_states
 from discover.dataset.coarse_rates import MORE_SAMPLES
+from discover.protocols.kinematics import in_words
 from discover.report.comparison.asked import coarse_rates, left_open
 from discover.report.wording import (
     A_TRANSIENT,
     IF_LOADINGS,
-    SYMBOLS,
     percent,
     sentence,
     significant,
 )
+from discover.words import listed
 
 
 def what_to_measure_next(comparison: Comparison) -> str:
@@ -74,7 +75,7 @@ def _proposal(following: NextMeasurement) -> str:
     leave = f"{laws} that these data leave in the library"
     if not best.falling:
         return f"None of the experiments allowed is expected to rule out {leave}."
-    what = " and ".join(SYMBOLS[name] for name in best.observed)
+    what = listed([in_words([name]) for name in best.observed])
     fall = len(best.falling)
     outcome = leave if fall == n_rivals else f"{fall} of {leave}"
     return (

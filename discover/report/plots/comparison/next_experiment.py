@@ -1,5 +1,7 @@
 """What to measure next: predictions of the laws that remain, in the experiment proposed."""
 
+import numpy as np
+
 from discover.comparison.comparison import Comparison
 from discover.identify.design.experiments import OBSERVED
 from discover.report.plots.comparison.flows import units
@@ -13,6 +15,8 @@ from discover.report.plots.style import (
 )
 from discover.report.wording import FIGURE_SYMBOLS, readable
 
+_OVER_DECADES = ("step_strain", "flow_curve", "creep")
+
 
 def next_picture(comparison: Comparison) -> Picture | None:
     """Return what the chosen law and its rivals predict in the best experiment."""
@@ -20,12 +24,16 @@ def next_picture(comparison: Comparison) -> Picture | None:
     if not following.proposals:
         return None
     best = following.proposals[0]
-    stress_unit, time_label, _ = units(comparison)
+    stress_unit, time_label, rate_label = units(comparison)
+    protocol, along = best.experiment.protocol, best.experiment.times
+    if protocol.control == "steady":
+        along, time_label = np.asarray(protocol.table_rates), rate_label
     with figure(1, len(best.observed), height=3.0) as (drawing, axes):
         for panel, quantity in zip(axes[0], best.observed, strict=True):
-            column = OBSERVED.index(quantity)
+            # the first column is what is recorded
+            column = OBSERVED.index(quantity) if quantity in OBSERVED else 0
             panel.plot(
-                best.experiment.times,
+                along,
                 best.curves[0, :, column],
                 **CHOSEN_STYLE,
                 linewidth=2.2,
@@ -34,7 +42,7 @@ def next_picture(comparison: Comparison) -> Picture | None:
             rivals = zip(following.laws[1:], best.curves[1:], strict=True)
             for i, (name, curve) in enumerate(rivals):
                 panel.plot(
-                    best.experiment.times,
+                    along,
                     curve[:, column],
                     **RIVAL_STYLES[i % len(RIVAL_STYLES)],
                     label=_typeset(name),
@@ -43,7 +51,11 @@ def next_picture(comparison: Comparison) -> Picture | None:
             low, high = best.curves[0, :, column].min(), best.curves[0, :, column].max()
             margin = 0.6 * (high - low) or 0.5
             panel.set_ylim(low - margin, high + margin)
-            panel.set_ylabel(FIGURE_SYMBOLS[quantity] + stress_unit)
+            if best.experiment.kind in _OVER_DECADES:
+                panel.set_xscale("log")
+            panel.set_ylabel(
+                FIGURE_SYMBOLS[quantity] + ("" if quantity == "strain" else stress_unit)
+            )
             panel.set_xlabel(time_label)
         legend_above(drawing, axes, columns=2)
         return picture(
