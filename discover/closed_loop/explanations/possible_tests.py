@@ -109,14 +109,15 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Possible
     found.append(
         PossibleTest(f"N1 in start-up of shear at {fastest:.3g} 1/s", normal.observing("N1"))
     )
-    for rate in sorted({slowest, fastest}):
-        found.append(
-            _test(
-                f"start-up of uniaxial extension at {rate:.3g} 1/s",
-                in_flow(start_up(rate), "uniaxial"),
-                np.linspace(0.0, _HENCKY / rate, _SAMPLES),
+    for kind in ("uniaxial", "planar", "biaxial"):
+        for rate in sorted({slowest, fastest}):
+            found.append(
+                _test(
+                    f"start-up of {kind} extension at {rate:.3g} 1/s",
+                    in_flow(start_up(rate), kind),
+                    np.linspace(0.0, _HENCKY / rate, _SAMPLES),
+                )
             )
-        )
     return found
 
 
