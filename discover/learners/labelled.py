@@ -9,12 +9,12 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.labelled_arrays import xarray_module
 from discover.learners.runs import as_runs
+from discover.statistics import HALF_BAND
 
 if TYPE_CHECKING:
     import xarray
 
 N_DRAWS = 1000
-_FACTOR = 1.96  # of a normal distribution, where intervals have Student's
 
 
 def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
@@ -93,7 +93,7 @@ def _of_a_sparse_law(
     centre = np.append(coefficients, estimator.inner_[places])
     values = draws.values
     if draws.method == "linear":
-        covariance = uncertainty.total_covariance * (uncertainty.factor / _FACTOR) ** 2
+        covariance = uncertainty.total_covariance * (uncertainty.factor / HALF_BAND) ** 2
         values = rng.multivariate_normal(centre, covariance, N_DRAWS)
     size = len(terms)
     names = [estimator.library_.inner_names[i] for i in places]

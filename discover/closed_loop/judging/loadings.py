@@ -14,6 +14,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, uncertainty, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
+from discover.statistics import HALF_BAND
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.loadings import ADVICE, LoadingFound, as_too_far, too_far
 
@@ -44,7 +45,7 @@ def factors_of_loadings(
     best, size = factors[0], precision[0]
     by_noise = _excess(model, fit.theta, batch) / np.where(size > 0.0, size, 1e-12)
     by_constants = np.zeros(len(best))
-    quantile = 1.96
+    quantile = HALF_BAND
     if fit.free:
         slopes = (factors[1:] - best) / widths[:, None]
         covariance, quantile = uncertainty(fitted[0], fit.residual, fit.jacobian)

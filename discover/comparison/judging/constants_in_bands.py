@@ -15,10 +15,8 @@ from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.statistics import least_squares_covariance, root_of
+from discover.statistics import HALF_BAND, least_squares_covariance, root_of
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
-
-_HALF_BAND = 1.96
 
 
 def with_fitted_constants(
@@ -90,7 +88,7 @@ def _root(training: Sequence[Flow], told: Mapping[str, tuple | None]) -> np.ndar
 
 def _wider(band: PredictionBand, directions: Float[np.ndarray, "r n 3"]) -> PredictionBand:
     """Return a band that holds what moves along all of these directions, each of unit variance."""
-    half = _HALF_BAND * np.sqrt(np.sum(directions**2, axis=0))
+    half = HALF_BAND * np.sqrt(np.sum(directions**2, axis=0))
     low, high = band.chosen - half, band.chosen + half
     # np.minimum keeps what is not a number: no band stays no band
     return replace(

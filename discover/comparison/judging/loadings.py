@@ -24,11 +24,10 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.dataset import Run
 from discover.identify.rivals.bands import PredictionBand
+from discover.statistics import HALF_BAND
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.loadings import ADVICE, LoadingFound, as_too_far, too_far
 from discover.study.data import StudyData
-
-_HALF_BAND = 1.96
 
 
 @dataclass(frozen=True)
@@ -194,7 +193,7 @@ class OwnLoadings:
         self, low: Float[np.ndarray, " n"], high: Float[np.ndarray, " n"]
     ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         middle = 0.5 * (low + high)
-        half = np.hypot(0.5 * (high - low), _HALF_BAND * self.deviation * middle)
+        half = np.hypot(0.5 * (high - low), HALF_BAND * self.deviation * middle)
         return middle - half, middle + half
 
 
@@ -229,7 +228,7 @@ def _factor(
     far = np.sqrt(prior + by_noise + ((by_law or 0.0) if flow.kind == "held_out" else 0.0))
     factor, ci95 = 1.0 + shrunk * best, None
     if by_law is not None:
-        half = _HALF_BAND * float(np.sqrt(shrunk * by_noise + shrunk**2 * by_law))
+        half = HALF_BAND * float(np.sqrt(shrunk * by_noise + shrunk**2 * by_law))
         ci95 = factor - half, factor + half
     return LoadingFound(flow.name, flow.kind == "held_out", factor, ci95, float(abs(best) / far))
 

@@ -11,13 +11,11 @@ from discover.comparison.judging.statements import IN_NOISE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import PredictionBand
-from discover.statistics import LackOfFit, noise_model
+from discover.statistics import HALF_BAND, LackOfFit, noise_model
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.words import percent_of
-
-_HALF_BAND = 1.96  # standard deviations
 
 _OUTSIDE = 0.1
 """Of a 95 % band so many of a run's samples may not lie outside, knocks among them."""
@@ -211,7 +209,7 @@ def changes_along(
     if limits is None:
         return np.zeros((0, len(flow.times)))
     low, high = limits["sigma12"]
-    return (high - low)[None] / (2.0 * _HALF_BAND)
+    return (high - low)[None] / (2.0 * HALF_BAND)
 
 
 def _size(values: np.ndarray) -> float:

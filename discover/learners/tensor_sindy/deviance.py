@@ -14,6 +14,7 @@ from discover.learners.tensor_sindy.weighed_draws import (
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from discover.programs import on_device
+from discover.statistics import HALF_BAND
 
 
 def draws_of_fit(
@@ -62,7 +63,7 @@ def _deviance(problem, fit, uncertainty, residual, columns, inner, slots) -> Dev
     imitate = np.linalg.pinv(columns * scale, rcond=1e-13).T * scale
     free = max(problem.n_observations - columns.shape[1], 1)
     remembered = problem.n_observations / max(uncertainty.noise.effective_samples, 1.0)
-    size = np.sum(residual**2) / free * max(remembered, 1.0) + (uncertainty.floor / 1.96) ** 2
+    size = np.sum(residual**2) / free * max(remembered, 1.0) + (uncertainty.floor / HALF_BAND) ** 2
     forms = problem.library.inner_bounds
     bounds = np.array([forms[i] for i in inner], dtype=float).reshape(-1, 2)
 

@@ -11,9 +11,7 @@ from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.trajectories.modulus_errors import ModulusErrors, modulus_columns
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import linearise
-from discover.statistics import NoiseModel, least_squares_covariance
-
-_FACTOR = 1.96  # an error of this many standard deviations is as rare as 5 %
+from discover.statistics import HALF_BAND, NoiseModel, least_squares_covariance
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class ParameterUncertainty:
 
         The second has the shape of the fit: constants that exchange each other do so in it too.
         """
-        return self.covariance + self.inverse * (self.floor / _FACTOR) ** 2
+        return self.covariance + self.inverse * (self.floor / HALF_BAND) ** 2
 
     @property
     def half_widths(self) -> Float[np.ndarray, " p"]:
