@@ -201,7 +201,7 @@ def test_the_verdict_says_what_was_found_and_what_is_not_known(comparison):
     found, sure, following = comparison_verdict(comparison)
     assert "exactly the terms" in found
     assert "Not determined by these data: N2" in sure
-    assert following.startswith("Measure σ12 and N2 in ")
+    assert following.startswith("Measure tensile stress in uniaxial extension at Wi = 0.5: ")
     assert "rule out the one rival law" in following
     wrong = replace(comparison, truth=())
     assert "superfluous: σ·σ" in comparison_verdict(wrong)[0]

@@ -41,7 +41,7 @@ OBSERVED: tuple[Observed, ...] = ("sigma12", "N1", "N2")
 N_SAMPLES = 101
 
 _FIRST = 1e-2
-"""Of a relaxation time: the first sample after a step of strain, and of creep."""
+"""Of a relaxation time: the first sample after a strain was put on."""
 
 _STATES = 10
 _HENCKY_STRAIN = 3.0
@@ -76,6 +76,11 @@ class Experiment:
         """Whether N1 and N2 may be measured beside what is recorded."""
         return self.protocol.flow == "shear"
 
+    @property
+    def in_transient_shear(self) -> bool:
+        """Whether the shear rate is given in time."""
+        return self.in_shear and self.protocol.control == "rate"
+
 
 def candidate_experiments(
     relaxation_time: float,
@@ -93,7 +98,8 @@ def candidate_experiments(
     classes
         Of `FLOW_CLASSES`.
     weissenberg_numbers
-        λ times the largest rate; in creep the stress over the modulus, of a step the strain.
+        λ times the largest rate; in creep also the stress over the modulus, and the strain after
+        which stress relaxes.
     deborah_numbers
         λ times the frequency of oscillation.
     modulus
@@ -192,18 +198,21 @@ def _superposed(unit, weissenberg, deborah):
     return found
 
 
-def _step_strain(unit, strains, deborah):
+def _step_strain(unit, weissenberg, deborah):
+    """Return strains put on at the largest rate.
+
+    None at once: no tool does that, and the stress of many a law has no bound then.
+    """
     del deborah
+    fastest = max(weissenberg)
     times = np.geomspace(_FIRST, 10.0, N_SAMPLES) / unit
-    return [
-        Experiment(
-            f"relaxation after a step strain of {strain:g}",
-            "step_strain",
-            after_step_strain(start_up(0.0), strain, times[0]),
-            times,
-        )
-        for strain in strains
-    ]
+    found = []
+    for strain in weissenberg:
+        lasts = strain / fastest / unit
+        begun = after_step_strain(start_up(0.0), strain, first=times[0], duration=lasts)
+        title = f"relaxation after a strain of {strain:g} at Wi = {fastest:g}"
+        found.append(Experiment(title, "step_strain", begun, times))
+    return found
 
 
 def _flow_curve(unit, weissenberg, deborah):
@@ -215,17 +224,15 @@ def _flow_curve(unit, weissenberg, deborah):
     return [Experiment(title, "flow_curve", steady_rates(rates), counted)]
 
 
-def _creep(unit, stresses, modulus):
-    times = np.geomspace(_FIRST, 10.0, N_SAMPLES) / unit
-    return [
-        Experiment(
-            f"creep at a stress of {stress:g} times the modulus",
-            "creep",
-            imposed_stress(times, np.full(N_SAMPLES, stress * modulus)),
-            times,
-        )
-        for stress in stresses
-    ]
+def _creep(unit, weissenberg, modulus):
+    """Return stresses that rise as fast as an elastic solid follows at the largest rate."""
+    times = np.linspace(0.0, 10.0, N_SAMPLES) / unit
+    fastest, found = max(weissenberg) * unit, []
+    for level in weissenberg:
+        stress = modulus * np.minimum(fastest * times, level)
+        title = f"creep at a stress of {level:g} times the modulus"
+        found.append(Experiment(title, "creep", imposed_stress(times, stress), times))
+    return found
 
 
 def _extension(kind):

@@ -11,8 +11,8 @@ discrimination of models: Box & Hill 1967, Technometrics 9, 57].
 """
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,9 @@ _HIDDEN = 1e-3
 
 _EFFORT = ("sigma12", "strain", "N1", "tensile_stress", "N2")
 """What is measured, the easiest first: N2 needs special plates, extension another instrument."""
+
+_FEWEST = 5
+"""Samples of an experiment that every law must reach."""
 
 # an error of 1e-5 is nothing beside the noise that a measurement is given here
 _LIMITS = {"strain_step": 0.2, "phase_step": 0.3}
@@ -121,17 +124,12 @@ def propose_experiments(
     groups = [sigma_points(law, n_draws, rng) for law in laws]
     flat = [law for group in groups for law in group]
     starts = np.cumsum([0, *(len(group) for group in groups)])
-    predicted = predict_laws(
-        fluid_of(flat, declared),
-        [e.protocol for e in experiments],
-        [e.times for e in experiments],
-        **_LIMITS,
-    )
-    proposals = []
-    for place, experiment in enumerate(experiments):
-        n = len(experiment.times)
-        runs = [predicted[a:b, place, :n] for a, b in itertools.pairwise(starts)]
-        if not np.all(np.isfinite(runs[0][0])):
+    fluids, proposals = fluid_of(flat, declared), []
+    for experiment, predicted in _predicted(fluids, experiments):
+        runs = [predicted[a:b] for a, b in itertools.pairwise(starts)]
+        if not experiment.in_transient_shear:
+            runs, experiment = _followed_by_all(runs, experiment)
+        if not len(experiment.times) or not np.all(np.isfinite(runs[0][0])):
             continue  # not an experiment that the chosen law survives
         recorded = experiment.protocol.quantity
         for kinds in _measurements(observed) if experiment.in_shear else [(0,)]:
@@ -146,6 +144,38 @@ def propose_experiments(
                 )
             )
     return sorted(proposals, key=_rank)
+
+
+def _predicted(
+    fluids: Fluid, experiments: Sequence[Experiment]
+) -> Iterator[tuple[Experiment, Float[np.ndarray, "laws n 3"]]]:
+    """Yield each experiment with what laws predict in it.
+
+    Shear by itself: beside extension all components of a stress are followed together, and a law
+    may run away in one that shear leaves alone.
+    """
+    for in_shear in (True, False):
+        some = [one for one in experiments if one.in_shear is in_shear]
+        if some:
+            protocols, times = [e.protocol for e in some], [e.times for e in some]
+            found = predict_laws(fluids, protocols, times, **_LIMITS)
+            for place, one in enumerate(some):
+                yield one, found[:, place, : len(one.times)]
+
+
+def _followed_by_all(
+    runs: Sequence[Float[np.ndarray, "draws n 3"]], experiment: Experiment
+) -> tuple[list[Float[np.ndarray, "draws n 3"]], Experiment]:
+    """Return an experiment as far as every law can be followed.
+
+    A law without a steady state, or one that has run away in extension, is no curve to measure.
+    """
+    finite = np.all([np.all(np.isfinite(run[0]), axis=1) for run in runs], axis=0)
+    kept = int(np.argmin(np.append(finite, False)))
+    if kept < _FEWEST:
+        kept = 0
+    shorter = replace(experiment, times=experiment.times[:kept])
+    return [run[:, :kept] for run in runs], shorter
 
 
 def _rank(proposal: Proposal) -> tuple:
