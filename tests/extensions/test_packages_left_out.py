@@ -49,22 +49,16 @@ def test_of_two_packages_with_the_same_name_the_second_is_left_out(workplace):
     assert "'ours' is known already" in said
 
 
-def test_a_sound_package_gives_no_warning(workplace):
+def test_a_sound_package_is_loaded_once_where_laws_are_asked_for_without_a_warning(workplace):
     # negative control of the tests above; two laws of one module are one import
     code = LOUD + LAW.format(name="one") + LAW.format(name="two")
     install(workplace.packages, "mine", code, project("laws", one="mine", two="mine"))
     done = workplace.run("laws")
     assert done.stderr == "imported\n"
     assert len(done.stdout.splitlines()) == BUILT_IN + 2
-
-
-def test_help_loads_no_package(workplace):
-    install(
-        workplace.packages, "mine", LOUD + LAW.format(name="mine"), project("laws", mine="mine")
-    )
+    # nor is it loaded where no law is asked for
     assert workplace.run("--help").stderr == ""
     assert workplace.run("effects").stderr == ""
-    assert workplace.run("laws").stderr == "imported\n"
 
 
 def test_a_package_that_the_program_has_imported_itself_is_registered_once(workplace):
