@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
+from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError
 from discover.learners import LearnerResult, RecoveredTerm
 
@@ -314,13 +315,17 @@ def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
     assert read == [tmp_path / "s.toml"]
 
 
-@pytest.mark.parametrize("kept", [True, False])
-def test_commands_keep_compiled_programs_in_the_users_cache_unless_told_not_to(tmp_path, kept):
+def test_commands_keep_compiled_programs_in_the_users_cache(tmp_path):
     code = "from discover.cli import main; main()"
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
-    environment |= {} if kept else {"DISCOVER_NO_CACHE": "1"}
     command = [sys.executable, "-c", code, "compare", str(tmp_path / "none.toml"), "--out", "x"]
     done = subprocess.run(command, capture_output=True, env=environment, cwd=tmp_path, timeout=120)
     assert done.returncode == 2  # no such study; the cache is made ready before it is read
-    assert (tmp_path / "cache" / "discover" / "compiled").is_dir() == kept
+    assert (tmp_path / "cache" / "discover" / "compiled").is_dir()
+
+
+def test_nothing_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
+    monkeypatch.setenv("DISCOVER_NO_CACHE", "1")
+    assert enable_compilation_cache(tmp_path / "compiled") is None
+    assert not (tmp_path / "compiled").exists()
