@@ -1,6 +1,6 @@
 """What residuals say of noise, and noise of parameters."""
 
-from discover.statistics.covariance import least_squares_covariance, root_of
+from discover.statistics.covariance import HALF_BAND, least_squares_covariance, root_of
 from discover.statistics.dead_records import holds_signal
 from discover.statistics.independent_samples import independent_samples
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
@@ -9,6 +9,7 @@ from discover.statistics.outliers import isolated
 from discover.statistics.told_by_tests import Sized, Told, told_by_tests
 
 __all__ = [
+    "HALF_BAND",
     "FitVerdict",
     "LackOfFit",
     "NoiseModel",

@@ -19,6 +19,9 @@ from jaxtyping import Float, Int
 
 from discover.statistics.noise_model import NoiseModel, noise_model
 
+HALF_BAND = 1.96
+"""Standard deviations of half of a 95 % band."""
+
 _UNSEEN = 1e-14
 """Of the largest eigenvalue of SᵀS, its columns made of length one: below it is only rounding."""
 

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from discover.statistics.covariance import HALF_BAND
 from discover.statistics.reading_faults import FaultKind, Reading, Session
-
-HALF_BAND = 1.96
-"""Standard deviations of half of a 95 % band."""
 
 WIDTHS = (0.005, 0.01, 0.02)
 """Standard deviations of the sizes, of the stress or the modulus. A choice: from what a calibrated

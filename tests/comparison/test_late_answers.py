@@ -78,7 +78,7 @@ def test_means_over_half_a_second_are_no_explanation(drawn):
     assert found.by == ()
     left = found.lack_of_fit["tensor_sindy"]
     assert "told means over 0.5" in left.reason
-    assert "averaging of the instrument's software" in left.likeness
+    assert "averaging of the instrument's software" in left.advice
 
 
 def test_records_of_single_moments_are(drawn):

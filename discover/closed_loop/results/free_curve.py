@@ -10,6 +10,7 @@ from jaxtyping import Float
 from scipy.optimize import OptimizeWarning, curve_fit
 
 from discover.closed_loop.results.error_pair import ErrorPair
+from discover.statistics import HALF_BAND
 
 Slot = Literal["recorded_stress", "drift", "network", "rate", "relaxation", "slip"]
 
@@ -96,8 +97,8 @@ def drawn_form(
         tuple(beside),
         grid,
         value,
-        value - 1.96 * deviation,
-        value + 1.96 * deviation,
+        value - HALF_BAND * deviation,
+        value + HALF_BAND * deviation,
         nearest,
         evidence,
         explains,

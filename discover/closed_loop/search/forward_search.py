@@ -23,6 +23,7 @@ from discover.effects import AbstractEffect
 from discover.forward import make_batch
 from discover.forward.least_squares import intervals
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.statistics import HALF_BAND
 from discover.statistics.residual import STRUCTURE
 
 _ROUNDS = 3
@@ -176,7 +177,7 @@ class Search(CurrentModel):
         bounds = intervals(other.model, other.batch, other.fit)
         for name in other.active:
             for at in self.model.positions(name):
-                deviation = (bounds[at][1] - bounds[at][0]) / (2.0 * 1.96)
+                deviation = (bounds[at][1] - bounds[at][0]) / (2.0 * HALF_BAND)
                 if deviation > 0.0:
                     self.known[at] = (float(other.fit.theta[at]), deviation)
         values = other.fit.theta.copy()

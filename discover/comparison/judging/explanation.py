@@ -99,7 +99,7 @@ class Explanation:
                     "verdict": one.verdict,
                     "outliers": one.outliers,
                     "reason": one.reason,
-                    "likeness": one.likeness,
+                    "likeness": one.likeness or one.advice,
                 }
                 for name, one in self.lack_of_fit.items()
             },

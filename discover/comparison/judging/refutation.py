@@ -17,7 +17,7 @@ class Refutation:
 
     def of(self, left: LackOfFit) -> LackOfFit:
         """Return what a law leaves that this refutes."""
-        return replace(left.refuted(self.reason, self.advice), likeness=self.advice)
+        return left.refuted(self.reason, self.advice)
 
 
 def hold_against(

@@ -12,6 +12,7 @@ from discover.dataset.checking.sweep_inertia import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.run import Run
+from discover.statistics import HALF_BAND
 from discover.words import percent_of
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
@@ -89,7 +90,8 @@ def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
         "warning",
         "sweep",
         SWEEP_FILE,
-        f"G' in {SWEEP_FILE} holds {-found.inertia:.3g} Pa s2 (± {1.96 * found.deviation:.2g}) "
+        f"G' in {SWEEP_FILE} holds {-found.inertia:.3g} Pa s2 "
+        f"(± {HALF_BAND * found.deviation:.2g}) "
         "times frequency squared, which no fluid has: a tool's inertia, or a correction for it "
         f"that is off. It makes {100 * np.max(share):.0f} % of the modulus at the highest "
         f"frequency; Maxwell modes alone miss by {percent_of(found.error_before)}, with it by "

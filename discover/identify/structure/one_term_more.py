@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-_HALF_BAND = 1.96  # standard deviations
+from discover.statistics import HALF_BAND
+
 _UNSEEN = 1e-7
 """Share of a combination that is seen, below which it is an exact direction: those are judged by
 themselves, in exact arithmetic."""
@@ -72,7 +73,7 @@ def one_term_more(
             continue
         # a column of the root is a combination of the constants that varies by one deviation
         root = (turned.T / seen) / sizes[:, None]
-        width = _HALF_BAND * float(np.linalg.norm(quantity[:, columns] @ root)) / np.sqrt(samples)
+        width = HALF_BAND * float(np.linalg.norm(quantity[:, columns] @ root)) / np.sqrt(samples)
         if worst is None or width > worst.per_noise:
             worst = OneTermMore(name, width)
     return worst

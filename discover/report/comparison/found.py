@@ -172,8 +172,7 @@ def _left(one: LackOfFit) -> str:
     elif one.misfit <= STRUCTURE * one.noise:
         # else it would seem that nothing is missing
         text += f", but {one.reason}"
-    # what to do is said beside what to measure
-    return f"{text}; {one.likeness}" if one.likeness and not one.advice else text
+    return f"{text}; {one.likeness}" if one.likeness else text
 
 
 _MOST_TERMS = 4

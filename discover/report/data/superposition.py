@@ -13,6 +13,7 @@ from discover.report.page import render
 from discover.report.parts import attempt
 from discover.report.plots.superposition import superposition_pictures
 from discover.report.wording import percent
+from discover.statistics import HALF_BAND
 
 _DESCRIBES = 0.1
 """Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
@@ -96,7 +97,7 @@ def _own_words(found: Superposition, own: Superposition, kind: str) -> str:
         if not len(j) or degrees == found.reference:
             continue
         apart = abs(own.log_shift[j[0]] - found.log_shift[i])
-        if apart > 1.96 * float(np.hypot(own.error[j[0], 0], found.error[i, 0])):
+        if apart > HALF_BAND * float(np.hypot(own.error[j[0], 0], found.error[i, 0])):
             theirs, ours = own.factors(int(j[0]))[0], found.factors(i)[0]
             other.append(f"at {degrees:g} °C {_factor(theirs)} and not {_factor(ours)}")
     if not other:

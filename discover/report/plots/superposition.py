@@ -17,6 +17,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
+from discover.statistics import HALF_BAND
 
 _MARKERS = "os^vD<>ph*"
 _POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.8}
@@ -124,7 +125,7 @@ def _shifts(found: Superposition) -> Picture:
     with figure(1, 1, width=10.0, height=3.2) as (drawing, axes):
         panel = axes[0, 0]
         style = {"ms": 5, "mfc": "none", "mew": 0.8, "marker": "o", "color": BEFORE}
-        half = 1.96 * found.error[:, 0]
+        half = HALF_BAND * found.error[:, 0]
         panel.errorbar(found.celsius, found.log_shift, half, label="a_T", lw=1.0, ls="", **style)
         dense = np.linspace(found.celsius[0], found.celsius[-1], 200)
         for law in found.laws:
