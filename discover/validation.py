@@ -5,6 +5,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from discover.errors import InputError
+from discover.words import counted
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -98,7 +99,7 @@ def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
         if len(got) <= _LONGEST and first["type"] != "value_error":
             text += f"; got {got}"
     more = len(set(places)) - 1
-    tail = f" (and {more} more problem{'s' if more > 1 else ''} in this file)" if more else ""
+    tail = f" (and {counted(more, 'more problem')} in this file)" if more else ""
     return f"{where}: {text}.{tail}"
 
 

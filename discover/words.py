@@ -13,9 +13,9 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
-def plainly(value: float, digits: int = 3) -> str:
-    """Return a number with so many digits, without a power of ten below a million."""
-    return f"{float(f'{value:.{digits}g}'):g}"
+def plainly(value: float) -> str:
+    """Return a number with three digits, without a power of ten below a million."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def percent_of(share: float) -> str:

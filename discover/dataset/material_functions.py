@@ -149,12 +149,12 @@ def _amplitude_sweep(table: Table) -> Run:
     )
 
 
-def linear_sweep_as_run(sweep: LinearSweep, name: str = "lve.csv") -> Run:
+def linear_sweep_as_run(sweep: LinearSweep) -> Run:
     """Return a linear sweep as a run: oscillations of a strain of `LINEAR_STRAIN`."""
     strain = np.full(len(sweep), LINEAR_STRAIN)
     moduli = sweep.storage_modulus, sweep.loss_modulus
     what = f"linear sweep, at a strain of {LINEAR_STRAIN:g}"
-    return _oscillations(name, what, strain, sweep.angular_frequency, *moduli)
+    return _oscillations("lve.csv", what, strain, sweep.angular_frequency, *moduli)
 
 
 def _oscillations(name, what, strain, frequency, storage, loss) -> Run:

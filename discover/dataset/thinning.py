@@ -29,7 +29,6 @@ def thin(
     time: Float[np.ndarray, " n"],
     shear_rate: Float[np.ndarray, " n"],
     shear_stress: Float[np.ndarray, " n"],
-    most: int = MOST_SAMPLES,
 ) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which samples to keep, and a word on what was kept.
 
@@ -46,16 +45,14 @@ def thin(
         In 1/s.
     shear_stress
         In Pa.
-    most
-        How many samples may stay.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
-    if n <= most:
+    if n <= MOST_SAMPLES:
         keep[:] = True
         return keep, f"kept all {n:,} samples"
     keep[[0, -1]] = True
-    half = (most - 6) // 2
+    half = (MOST_SAMPLES - 6) // 2
     positive = time[time > 0]
     keep[_nearest(time, np.geomspace(positive[0], positive[-1], half))] = True
     keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
@@ -75,7 +72,7 @@ def thin(
 
 
 def thin_sweep(
-    angular_frequency: Float[np.ndarray, " n"], most: int = MOST_FREQUENCIES
+    angular_frequency: Float[np.ndarray, " n"],
 ) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
 
@@ -86,16 +83,16 @@ def thin_sweep(
     ----------
     angular_frequency
         In rad/s, positive and increasing; some may be repeated.
-    most
-        How many may stay.
     """
     n = len(angular_frequency)
-    if n <= most:
+    if n <= MOST_FREQUENCIES:
         return np.ones(n, dtype=bool), ""
     position = np.log(angular_frequency)
     keep = np.zeros(n, dtype=bool)
     if position[-1] > position[0]:
-        keep[_nearest(position, np.linspace(position[0], position[-1], most - 2))] = True
+        keep[_nearest(position, np.linspace(position[0], position[-1], MOST_FREQUENCIES - 2))] = (
+            True
+        )
     keep[[0, -1]] = True
     note = f"kept {int(keep.sum()):,} of {n:,} frequencies, evenly in log frequency"
     return keep, note

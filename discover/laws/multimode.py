@@ -14,6 +14,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.words import counted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
 
 
@@ -103,7 +104,7 @@ class Fluid(eqx.Module):
                 raise InputError(f"{label} of a fluid must be {wanted}; got {numbers.tolist()}.")
 
     def __repr__(self) -> str:
-        modes = f"{self.n_modes} mode{'s' if self.n_modes > 1 else ''}"
+        modes = counted(self.n_modes, "mode")
         if not isinstance(self.relaxation_time, Tracer) and self.n_modes:
             times = np.asarray(self.relaxation_time)
             low, high = f"{times.min():.3g}", f"{times.max():.3g}"

@@ -121,7 +121,7 @@ def _probability(
     products, variances = _products(white)
     tests = [
         _portmanteau(np.sum(products, axis=0), np.sum(variances, axis=0)),
-        _each(products, variances),
+        _portmanteau(products, variances),
         _fast_part(np.sum(products, axis=0), np.sum(variances, axis=0)),
     ]
     if len(rows) > 1:
@@ -268,10 +268,6 @@ def _chi_square(value: float, freedom: int | float) -> float:
 
 def _portmanteau(products: np.ndarray, variances: np.ndarray) -> float:
     # one degree of freedom is the correlation's
-    return _chi_square(float(np.sum(products**2 / variances)), products.size - 1)
-
-
-def _each(products: np.ndarray, variances: np.ndarray) -> float:
     return _chi_square(float(np.sum(products**2 / variances)), products.size - 1)
 
 

@@ -16,6 +16,7 @@ from discover.equations.read import COMPARISON, LOOP, read_json
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.study.run_folder import STATE_FILE, STATE_FOLDER
+from discover.words import counted
 
 _SPARSE = "tensor_sindy"
 _AGAIN = "Run the command that made it again with --overwrite."
@@ -265,10 +266,11 @@ def _text(
         below = LAWS[named.law].described(named.constants[0])
         if named.differing:
             below = f"{LAWS[named.law].title}, {', '.join(named.differing)} by mode"
-    terms = f"{n} term{'s' if n != 1 else ''} beside {below}" if n else below
+    terms = f"{counted(n, 'term')} beside {below}" if n else below
     terms = terms if n or named else "upper convected Maxwell"
-    text = f"Taken from {file.parent.name}: {law} ({terms}) with {modes} relaxation mode"
-    text += "s" if modes != 1 else ""
+    text = (
+        f"Taken from {file.parent.name}: {law} ({terms}) with {counted(modes, 'relaxation mode')}"
+    )
     times = equation.relaxation_time
     for of in of_modes:
         ends = (

@@ -22,6 +22,7 @@ _WAVES = 6
 _DURATION = 8.0
 _SAMPLES = 65
 _AMPLITUDES = (0.3, 1.0, 2.0, 3.0)
+_EACH = 3  # histories at each
 _STRAIN_STEP = 0.1
 _OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
 _START_UPS = (1.0, 3.0)
@@ -54,7 +55,7 @@ class Histories:
 
 
 @lru_cache(maxsize=4)
-def random_histories(each: int = 3, seed: int = 0, max_step: float = np.inf) -> Histories:
+def random_histories(max_step: float = np.inf) -> Histories:
     """Return band-limited random shear rates at several amplitudes.
 
     γ̇(t) is a sum of six cosines with frequencies from 0.1 to 3 and random phases, for eight
@@ -63,17 +64,13 @@ def random_histories(each: int = 3, seed: int = 0, max_step: float = np.inf) -> 
 
     Parameters
     ----------
-    each
-        Histories at each amplitude.
-    seed
-        Of the generator.
     max_step
         Longest step, in relaxation times, as from `longest_step`.
     """
-    generator = np.random.default_rng(seed)
+    generator = np.random.default_rng(0)
     protocols, amplitudes = [], []
     for amplitude in _AMPLITUDES:
-        for _ in range(each):
+        for _ in range(_EACH):
             weights = generator.normal(size=_WAVES)
             weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
             protocols.append(
@@ -100,7 +97,7 @@ def random_histories(each: int = 3, seed: int = 0, max_step: float = np.inf) -> 
 
 def histories_for(law: AbstractConstitutiveLaw | None) -> Histories:
     """Return `random_histories()` in steps that a law allows; none is UCM."""
-    return random_histories() if law is None else random_histories(max_step=longest_step(law))
+    return random_histories() if law is None else random_histories(longest_step(law))
 
 
 @dataclass(frozen=True)

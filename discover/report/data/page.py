@@ -16,8 +16,9 @@ from discover.dataset.toml_file import toml_string
 from discover.errors import InputError
 from discover.report.page import render
 from discover.report.parts import attempt
-from discover.report.plots.data import counted, data_pictures, linear_function
+from discover.report.plots.data import data_pictures, linear_function
 from discover.report.wording import significant
+from discover.words import counted
 
 # From so many runs on one can be spared to judge
 _ENOUGH_TO_HOLD_OUT = 3

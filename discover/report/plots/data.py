@@ -27,6 +27,7 @@ from discover.report.plots.style import (
     runs_through_decades,
 )
 from discover.report.wording import FIGURE_SYMBOLS, percent
+from discover.words import counted
 
 _MOST_RUNS = 24
 """Panels of runs, beyond which a page is too long to look through."""
@@ -213,11 +214,6 @@ def linear_function(run: Run) -> tuple[str, Float[np.ndarray, " n"], str]:
     if run.quantity == "strain":
         return "J", run.recorded / run.stress, "1/Pa"
     return "G", run.recorded / np.asarray(run.strain), "Pa"
-
-
-def counted(number: int, what: str) -> str:
-    """Return a number of things in words."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _over_time(runs: Sequence[Run]) -> Picture:
