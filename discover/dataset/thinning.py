@@ -90,9 +90,8 @@ def thin_sweep(
     position = np.log(angular_frequency)
     keep = np.zeros(n, dtype=bool)
     if position[-1] > position[0]:
-        keep[_nearest(position, np.linspace(position[0], position[-1], MOST_FREQUENCIES - 2))] = (
-            True
-        )
+        even = np.linspace(position[0], position[-1], MOST_FREQUENCIES - 2)
+        keep[_nearest(position, even)] = True
     keep[[0, -1]] = True
     note = f"kept {int(keep.sum()):,} of {n:,} frequencies, evenly in log frequency"
     return keep, note

@@ -268,9 +268,8 @@ def _text(
             below = f"{LAWS[named.law].title}, {', '.join(named.differing)} by mode"
     terms = f"{counted(n, 'term')} beside {below}" if n else below
     terms = terms if n or named else "upper convected Maxwell"
-    text = (
-        f"Taken from {file.parent.name}: {law} ({terms}) with {counted(modes, 'relaxation mode')}"
-    )
+    text = f"Taken from {file.parent.name}: {law} ({terms}) with "
+    text += counted(modes, "relaxation mode")
     times = equation.relaxation_time
     for of in of_modes:
         ends = (

@@ -1,0 +1,71 @@
+"""Exports of one Maxwell element in closed form, and their import.
+
+What is compared went through text and units.
+"""
+
+import csv
+
+import numpy as np
+from typer.testing import CliRunner
+
+from discover.cli import app
+
+EXACT = 1e-12  # text of 17 digits; a unit costs a rounding or two
+G, LAMBDA = 100.0, 2.0
+OMEGA = np.geomspace(0.1, 100.0, 13)
+STRAINS = np.geomspace(0.001, 1.0, 9)
+TIMES = np.geomspace(0.01, 10.0, 30)
+RATES = np.geomspace(0.01, 100.0, 11)
+
+
+def moduli(omega, shift=1.0):
+    x = omega * shift * LAMBDA
+    return G * x**2 / (1 + x**2), G * x / (1 + x**2)
+
+
+def softening(strain, omega=10.0):
+    return tuple(m / (1 + strain**2) for m in moduli(np.full_like(strain, omega)))
+
+
+def lines(*columns, mark="\t", comma=False, before=""):
+    rows = [
+        mark.join([before, *row] if before else row)
+        for row in (map(repr, row) for row in zip(*(c.tolist() for c in columns), strict=True))
+    ]
+    return [row.replace(".", ",") for row in rows] if comma else rows
+
+
+def imported(tmp_path, name, rows, *options, encoding="utf-8", code=0):
+    path = tmp_path / name
+    path.write_bytes("\r\n".join(rows).encode(encoding))
+    return run(tmp_path, path, *options, code=code)
+
+
+def run(tmp_path, *arguments, code=0):
+    out = tmp_path / "data"
+    words = ["data", "import", *map(str, arguments), "--out", str(out), "--no-page"]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == code, result.output
+    return out, result
+
+
+def table(path):
+    with path.open() as stream:
+        rows = list(csv.reader(stream))
+    return {name: np.array([row[i] for row in rows[1:]], float) for i, name in enumerate(rows[0])}
+
+
+def assert_sweep(path, omega=OMEGA, shift=1.0):
+    found = table(path)
+    order = np.argsort(found["omega_rad_s"])
+    np.testing.assert_allclose(found["omega_rad_s"][order], omega, rtol=EXACT)
+    for key, wanted in zip(("Gp_Pa", "Gpp_Pa"), moduli(omega, shift), strict=True):
+        np.testing.assert_allclose(found[key][order], wanted, rtol=EXACT)
+
+
+def assert_softening(path):
+    found = table(path)
+    np.testing.assert_allclose(found["strain"], STRAINS, rtol=EXACT)
+    np.testing.assert_allclose(found["omega_rad_s"], 10.0, rtol=EXACT)
+    np.testing.assert_allclose(found["Gp_Pa"], softening(STRAINS)[0], rtol=EXACT)
+    np.testing.assert_allclose(found["Gpp_Pa"], softening(STRAINS)[1], rtol=EXACT)
