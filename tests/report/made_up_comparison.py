@@ -1,0 +1,92 @@
+"""Comparisons that nothing computed, and their page."""
+
+import html
+
+import numpy as np
+
+from discover.comparison import Comparison, Flow, LearnerOutcome
+from discover.comparison.judging.explanation import Explanation
+from discover.comparison.judging.identifiability import Rival
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
+from discover.learners import RecoveredTerm
+from discover.protocols.protocol import oscillatory_shear
+from discover.report.comparison.report import write_comparison
+from discover.statistics import LackOfFit
+from discover.study import RunFolder
+
+NOT_THERE = (None, float("nan"), float("inf"))
+TIMES = np.linspace(0.0, 10.0, 41)
+ROW = {"size": 1, "support": ["sigma.sigma"], "inner": {}, "misfit": 0.02, "held_out": 0.03}
+
+
+def flow(name, kind):
+    protocol = oscillatory_shear(1.0, 1.0)
+    stress = np.sin(TIMES)
+    return Flow(
+        name,
+        kind,
+        protocol,
+        TIMES,
+        np.cos(TIMES),
+        {"sigma12": stress},
+        stress if kind == "training" else None,
+        oscillatory=True,
+    )
+
+
+def outcome(learner, number, predicted):
+    """Return an outcome in which every number that may be missing is `number`."""
+    ends = None if number is None else (number, number)
+    term = RecoveredTerm("sigma.sigma", 0.2, number, ends, {"epsilon": 0.1})
+    path = [{**ROW, "size": 0, "support": [], "bic": number, "misfit": 0.4}, {**ROW, "bic": number}]
+    for row in path:
+        row["held_out"] = number
+        row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
+    details = {
+        "path": path,
+        "selectors": {"chosen": {"bic": ["sigma.sigma"], "held_out": None or []}},
+        "selection_frequency": [{"term": "sigma.sigma", "frequency": 0.5, "with_twins": 1.0}],
+        "misfit": number,
+        "coefficients": {"sigma": {"mean": number, "spread": number}},
+        "rivals_text": "",
+    }
+    stresses = {q: np.sin(TIMES) for q in ("sigma12", "N1", "N2")} if predicted else None
+    keys = ("training/a", "held_out/b")
+    loss = (np.arange(3), np.array([1.0, np.nan, np.inf]))
+    return LearnerOutcome(
+        learner, (term,), 1.0, loss, details, "ended", dict.fromkeys(keys, stresses)
+    )
+
+
+def left(verdict, misfit=0.01, correlation=0.0):
+    return LackOfFit(verdict, misfit, 0.01, correlation, 0.5, reason="made up")
+
+
+def made_up(number=0.01, predicted=True, sparse="explained", network="explained", **changes):
+    """Return a comparison that nothing computed."""
+    flows = [flow("a", "training"), flow("b", "held_out")]
+    learners = {"tensor_sindy": sparse, "tbnn_ude": network}
+    learners = {name: verdict for name, verdict in learners.items() if verdict}
+    rival = Rival({"sigma": 0.1}, {}, "A twin.", dict.fromkeys(("sigma12", "N1", "N2"), number))
+    content = {
+        "name": "made up",
+        "data_summary": "none",
+        "known_part": "Maxwell",
+        "flows": flows,
+        "before": {f.key: None for f in flows},
+        "outcomes": {name: outcome(name, number, predicted) for name in learners},
+        "truth": None,
+        "noise": None,
+        "rivals": [rival],
+        "statements": [
+            Statement("N1", IN_LIBRARY, "If the law is in the library, σ12 gives N1."),
+            Statement("N2", "no", "No."),
+        ],
+        "explanation": Explanation({name: left(verdict) for name, verdict in learners.items()}),
+    }
+    return Comparison(**{**content, **changes})
+
+
+def page_of(comparison, folder):
+    write_comparison(comparison, RunFolder(folder, "x"), True)
+    return html.unescape((folder / "report.html").read_text("utf-8"))
