@@ -51,7 +51,7 @@ def beyond_the_search(
         return Beyond(final.records)
     forms = _free_functions(final, constants, judgement)
     tests = next_tests(
-        final.model, final.batch, final.carried, explanations, final.fitted, judgement
+        final.model, final.batch, final.beside_benches, explanations, final.fitted, judgement
     )
     tried = [effect.name for effect in candidates if final.search.admitted(effect)]
     return Beyond(_with_bands(final, constants, judgement, explanations, tried), forms, tests)
@@ -96,7 +96,7 @@ def _with_bands(
     """Return all runs with bands, which allow for what the rate did between its samples."""
     parts = [(final.batch, final.records_fitted), (final.held_as_noisy, final.records_held_out)]
     records = with_band(
-        final.model, final.batch, final.carried, explanations, parts, judgement, tried
+        final.model, final.batch, final.beside_benches, explanations, parts, judgement, tried
     )
     count = len(final.records_fitted)
     wider = wider_bands(records[:count], final.batch, constants.unknown)

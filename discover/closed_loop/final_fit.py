@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop.explanations import Carried
+from discover.closed_loop.explanations import Carried, OtherBench, other_benches
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.between_samples import (
     Bounds,
@@ -100,6 +100,16 @@ class FinalFit:
     def active(self) -> list[str]:
         """Names of the effects that were found."""
         return self.search.active
+
+    @cached_property
+    def benches(self) -> list[OtherBench]:
+        """Sets of fewer effects that explain the records as well on a bench a little off."""
+        return other_benches(self.search, self.carried)
+
+    @property
+    def beside_benches(self) -> list[Carried]:
+        """What explains the records: the sets carried, and those beside faults of the bench."""
+        return [*self.carried, *(one.carried for one in self.benches)]
 
     @property
     def present(self) -> list[str]:

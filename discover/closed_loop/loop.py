@@ -174,12 +174,15 @@ def run_loop(
     side_by_side = Explanations()
     if final.carried:
         side_by_side = explain(
-            final.model, final.batch, final.carried, final.fit, tested,
+            final.model, final.batch, final.beside_benches, final.fit, tested,
             final.held_batch, judgement,
             min((one.criterion for one in verdict.other_times), default=np.inf),
         )  # fmt: skip
     beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
-    bounds, seen = constants.bounds, (final.model, final.fit, final.carried, side_by_side)
+    bounds, seen = (
+        constants.bounds,
+        (final.model, final.fit, final.beside_benches, side_by_side),
+    )
     by_mode = modes_over_explanations(constants.by_mode, *seen)
     times = weighed_times(verdict.other_times, final.carried, final.active)
     over_all = over_explanations(bounds, *seen, times)

@@ -1,9 +1,10 @@
 """The verdict on a final model, with what takes the place of effects that were found."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from discover.closed_loop.explanations.limits import names_of_limits
+from discover.closed_loop.explanations.other_benches import BENCH, OtherBench, instead_of
 from discover.closed_loop.explanations.other_times import (
     FACTOR,
     OtherTimes,
@@ -76,11 +77,21 @@ def verdict_on(
     judgement = judged_by_loadings(judgement, final.loadings, final.loading)
     times = other_times(search, final.carried, judgement) if final.carried else []
     judgement, instead = compared_with_times(judgement, active, final.carried, times)
-    aliases = [(name, FACTOR) for name in instead]
+    benches = instead_of(final.benches, final.carried, active)
+    judgement = _with_benches(judgement, benches.values())
+    aliases = [(name, FACTOR) for name in instead] + [(name, BENCH) for name in benches]
     aliases += names_of_limits(final.model, final.batch, final.fitted, final.fit, active).items()
     for name, other in aliases:
         search.aliases[name] = (*search.aliases.get(name, ()), other)
     return FinalVerdict(judgement, silence, times)
+
+
+def _with_benches(judgement: Judgement, benches: Iterable[OtherBench]) -> Judgement:
+    """Return a judgement with what small faults of the bench do in the place of effects."""
+    said = " ".join(one.sentence for one in benches)
+    if judgement.structured or not said:
+        return judgement
+    return replace(judgement, description=f"{judgement.description} {said}")
 
 
 def _silence(final: FinalFit, silent: bool) -> Silence | None:

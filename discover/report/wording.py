@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
@@ -162,9 +162,10 @@ def effect_title(name: str) -> str:
     return _EFFECTS.get(name, name.replace("_", " "))
 
 
-def effects_title(names: Sequence[str]) -> str:
-    """Return a set of effects as readers know it."""
-    return " + ".join(map(effect_title, names)) or "the declared model alone"
+def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
+    """Return a set of effects as readers know it, and whether a bench is off beside it."""
+    title = " + ".join(map(effect_title, names)) or "the declared model alone"
+    return f"{title}, on a bench that is a little off" if bench else title
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:

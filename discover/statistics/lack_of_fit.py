@@ -24,6 +24,14 @@ ONLY_NOISE = 0.9
 
 PATTERN = "a pattern that noise has not"
 
+_CORRELATED = 0.6
+"""Correlation from sample to sample from which on no test tells noise from a smooth misfit that is
+less than some three times as large."""
+
+_IF_CORRELATED = (
+    "is noise if that is correlated to {:.2g} from sample to sample, and a misfit if not"
+)
+
 _PATTERN_OF_SHORT = (
     "a pattern that independent noise has not (runs of fewer than "
     f"{FEWEST_TESTED} samples do not tell correlated noise from a misfit)"
@@ -176,7 +184,11 @@ def what_is_left(
     long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
     pattern = PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
+    summary = summarise(residual, weight)
+    correlation = float(np.mean(summary.autocorrelation))
     rest = "is noise"
+    if correlation >= _CORRELATED and expectation.noise is None and not expectation.repeat_error:
+        rest = _IF_CORRELATED.format(correlation)
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
         reason = f"what is left ({percent_of(misfit)} of the records) is noise, and nearly all"
@@ -201,12 +213,11 @@ def what_is_left(
     count = sum(len(where) for where in outliers)
     if count:
         reason += f"; outliers that do not count: {count}"
-    summary = summarise(residual, weight)
     return LackOfFit(
         verdict,
         misfit,
         floor,
-        float(np.mean(summary.autocorrelation)),
+        correlation,
         probability,
         count,
         reason,

@@ -34,6 +34,7 @@ _ADVICE: dict[FaultKind, str] = {
     "first run last",
     "above": _RANGES,
     "below": _RANGES,
+    "bent": "calibrate the transducer at several stresses",
     "modes": "measure the linear moduli again, on the same sample",
 }
 
@@ -131,6 +132,9 @@ def reads(found: Misread) -> str:
             f"as if the transducer read {1 + found.sizes[0]:.4g} times the stress {found.kind} "
             f"{found.level:.2g} Pa"
         )
+    if found.kind == "bent":
+        more = f"{100 * abs(low):.2g} % {'more' if low > 0 else 'less'}"
+        return f"as if the transducer read {more} at the largest stress than in proportion"
     if found.kind == "zero":
         return f"as if each run had been read from a zero of its own ({low:.2g} to {high:.2g} Pa)"
     if found.kind == "growth":

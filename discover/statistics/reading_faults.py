@@ -16,9 +16,10 @@ from jaxtyping import Float, Int
 from discover.statistics.covariance import least_squares_covariance
 from discover.statistics.projection import rms, without
 
-FaultKind = Literal["factor", "zero", "growth", "above", "below", "modes"]
-"""A factor, a zero or a factor that grows in time, of each run; a factor above or below a level;
-and a factor on the modulus of each mode, of a spectrum that was told wrong."""
+FaultKind = Literal["factor", "zero", "growth", "above", "below", "bent", "modes"]
+"""A factor, a zero and a factor that grows in time, of each run; a factor above or below a level;
+a factor that grows with the stress, as of a transducer that is not quite linear; and a factor on
+the modulus of each mode, of a spectrum that was told wrong."""
 
 KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
@@ -168,6 +169,8 @@ class Session:
         """
         if kind in ("above", "below"):
             yield from self._of_level(kind)
+        elif kind == "bent":
+            yield from self._bent()
         elif kind == "modes":  # of one the factor is a modulus
             if self.modes is not None and len(self.modes) >= 2:
                 yield Fault(kind, self.modes)
@@ -203,6 +206,17 @@ class Session:
             with np.errstate(invalid="ignore"):
                 beyond = size > level if kind == "above" else size <= level
             yield Fault(kind, (self.predicted * beyond)[None], float(level), len(levels))
+
+    def _bent(self) -> Iterator[Fault]:
+        """Yield σ|σ| over the largest stress, in whose unit its size is."""
+        sizes = [float(np.max(np.abs(run.predicted))) for run in self.runs if run.has_level]
+        if not sizes:
+            return
+        own = np.zeros(len(self.residual))
+        for run, rows, weight in zip(self.runs, self.rows, self.weights, strict=True):
+            if run.has_level:
+                own[rows] = weight * run.predicted * np.abs(run.predicted) / max(sizes)
+        yield Fault("bent", own[None])
 
     def estimate(
         self, own: Float[np.ndarray, "sizes m"], beside: Float[np.ndarray, "q m"]

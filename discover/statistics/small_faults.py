@@ -104,7 +104,7 @@ def _of_a_session(
     With it the least width of each size. A factor below a level is one above it, and one of all
     runs.
     """
-    kinds: tuple[FaultKind, ...] = ("zero", "growth")
+    kinds: tuple[FaultKind, ...] = ("zero", "growth", "bent")
     if session.shared is None or not len(session.shared):  # else the sweep tells how far they err
         kinds = (*kinds, "modes")
     factors = [fault.own for fault in session.faults("factor")]

@@ -16,7 +16,7 @@ from discover.effects import make_effect
 from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.report.loop import report
 from discover.report.loop.report import write_loop
-from discover.report.loop.tables import noise_range
+from discover.report.loop.tables import explanations, noise_range
 from discover.report.loop.verdict import loop_verdict
 from discover.report.page import render
 from discover.report.plots.cycles import in_last_cycle
@@ -412,6 +412,16 @@ def several_explanations():
         0.2,
     )
     return replace(result, records=records, explanations=told)
+
+
+@pytest.mark.parametrize("bench", [{}, {"rates": 0.02}])
+def test_a_bench_that_is_off_is_told_beside_an_explanation(bench):
+    result = several_explanations()
+    first, second = result.explanations.likeliest_first
+    told = replace(result.explanations, likeliest_first=(first, replace(second, bench=bench)))
+    lines = explanations(replace(result, explanations=told))
+    assert "bench" not in lines[0]["effects"]
+    assert ("on a bench that is a little off" in lines[1]["effects"]) == bool(bench)
 
 
 def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found():

@@ -41,6 +41,15 @@ def test_noise_with_a_loud_start_is_noise(correlation):
     assert verdicts.count("explained") >= 19
 
 
+@pytest.mark.parametrize(("correlation", "doubted"), [(0.0, False), (0.85, True)])
+def test_noise_that_may_as_well_be_a_smooth_misfit_is_told_so(correlation, doubted):
+    left = lack_of_fit([0.3 * correlated(correlation, 3)], [WAVE])
+    assert left.verdict == "explained"
+    assert ("a misfit if not" in left.reason) == doubted
+    given = lack_of_fit([0.3 * correlated(correlation, 3)], [WAVE], Expectation(noise=0.05))
+    assert "a misfit if not" not in given.reason
+
+
 def test_spikes_once_a_cycle_are_found_by_the_cycle():
     generator = np.random.default_rng(0)
     once = np.zeros(SAMPLES)

@@ -52,6 +52,7 @@ def fitted(told, change=lambda name, time, stress: stress, seed=0, correlation=0
 
 
 CHANGES = {
+    "bent": lambda name, time, stress: stress * (1 - 0.02 * np.abs(stress) / 100.0),
     "above": lambda name, time, stress: stress * (1 + 0.015 * (np.abs(stress) > 50.0)),
     "factor": lambda name, time, stress: stress * {"slow": 1.01, "fast": 0.99, "wave": 1.0}[name],
     "zero": lambda name, time, stress: stress + {"slow": 0.6, "fast": -0.6, "wave": 0.0}[name],

@@ -5,8 +5,8 @@ paths: those that explain the records nearly as well are followed too, the likel
 none is left within reach or as many stages are spent as explanations were asked for.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -41,11 +41,17 @@ class Carried:
         Of the set.
     criterion
         Twice the negative logarithm of its weight, but for a constant.
+    bench
+        Small faults that all runs share and that the fit holds, by what is off, relative.
+    left_open
+        Standard deviation that these leave open of constants, beside noise, by their position.
     """
 
     effects: tuple[str, ...]
     fit: Fit
     criterion: float
+    bench: Mapping[str, float] = field(default_factory=dict)
+    left_open: Mapping[int, float] = field(default_factory=dict)
 
 
 def search_and_carry(

@@ -76,6 +76,7 @@ def explanations_of(
                 errors[members[0]],
                 _parameters(model, first),
                 tuple(spelled[1:]),
+                first.bench,
             )
         )
     found.sort(key=lambda one: -one.probability)

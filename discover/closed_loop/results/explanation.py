@@ -23,6 +23,10 @@ class Explanation:
         Values of the parameters of each effect.
     twins
         Other sets that predict these records alike. The probability is theirs together.
+    bench
+        Small faults that all runs share, beside which it is one: by how much more than told rates,
+        relaxation times and stresses are, and the strain of the tool over that of the fluid. Empty
+        where the bench is taken for right.
     """
 
     effects: tuple[str, ...]
@@ -30,6 +34,7 @@ class Explanation:
     error: ErrorPair
     parameters: Mapping[str, Mapping[str, float]]
     twins: tuple[tuple[str, ...], ...] = ()
+    bench: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def members(self) -> tuple[tuple[str, ...], ...]:

@@ -21,7 +21,8 @@ class Stage:
         Its parameters in the final model.
     aliases
         Effects that these data cannot tell from it, `relaxation_time_factor` where one factor on
-        all declared times does as well, and what it is in the limit that is all they show of it.
+        all declared times does as well, `small_bench_faults` where what all runs share of small
+        faults does, and what it is in the limit that is all they show of it.
     error
         Errors after this stage.
     evidence

@@ -42,6 +42,33 @@ def intervals_of_either(
     return {**outcomes, SPARSE: replace(sparse, terms=tuple(terms))}
 
 
+def intervals_of_other(
+    outcomes: Mapping[str, LearnerOutcome],
+    coefficients: Mapping[str, tuple[float, float, float]],
+) -> dict[str, LearnerOutcome]:
+    """Return the outcomes, intervals of the sparse law holding those of another law, too.
+
+    Parameters
+    ----------
+    outcomes
+        By learner.
+    coefficients
+        Of the other law: value, and ends of the interval, by the spelling of the term; a term that
+        it lacks is zero.
+    """
+    sparse = outcomes.get(SPARSE)
+    if sparse is None:
+        return dict(outcomes)
+    terms = []
+    for term in sparse.terms:
+        one = term
+        if term.ci95 is not None:
+            _, low, high = coefficients.get(term.term, (0.0, 0.0, 0.0))
+            one = replace(term, ci95=(min(term.ci95[0], low), max(term.ci95[1], high)))
+        terms.append(one)
+    return {**outcomes, SPARSE: replace(sparse, terms=tuple(terms))}
+
+
 def bands_of_either(
     bands: Mapping[str, PredictionBand], predictions: Mapping[str, Mapping[str, np.ndarray] | None]
 ) -> dict[str, PredictionBand]:
@@ -65,4 +92,28 @@ def bands_of_either(
                 rivals_low=np.minimum(band.rivals_low, band.rivals_low + moved),
                 rivals_high=np.maximum(band.rivals_high, band.rivals_high + moved),
             )
+    return wider
+
+
+def bands_within(
+    bands: Mapping[str, PredictionBand],
+    limits: Mapping[str, tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]],
+) -> dict[str, PredictionBand]:
+    """Return bands of the sparse law that hold all between other limits, too.
+
+    Parameters
+    ----------
+    bands
+        By the key of the flow.
+    limits
+        Lowest and highest σ12, N1 and N2 of another law, by the same key.
+    """
+    wider = {}
+    for key, band in bands.items():
+        low, high = limits.get(key, (band.rivals_low, band.rivals_high))
+        wider[key] = replace(
+            band,
+            rivals_low=np.minimum(band.rivals_low, low),
+            rivals_high=np.maximum(band.rivals_high, high),
+        )
     return wider

@@ -15,6 +15,7 @@ from discover.comparison.judging.either_law import bands_of_either, intervals_of
 from discover.comparison.judging.explanation import Explanation, least_seen
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.refutation import Refutation, hold_against
+from discover.comparison.judging.smaller_laws import hold_against_smaller_laws
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
@@ -62,7 +63,8 @@ def hold_against_misreading(
         found = _described_better(explanation, name, outcomes[name], flows, bands, own)
         return None if found is None else as_misread(found)
 
-    return hold_against(explanation, refutation_of)
+    held = hold_against(explanation, refutation_of)
+    return hold_against_smaller_laws(held, outcomes, flows, law)
 
 
 def as_misread(found: Misread) -> Refutation:

@@ -6,6 +6,7 @@ from discover.comparison.judging.filters_for_terms import holding_filters
 from discover.comparison.judging.misread_runs import holding_misreading, readings_of
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.small_faults import holding_small_faults
+from discover.comparison.judging.smaller_laws import holding_smaller_laws
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
@@ -41,6 +42,9 @@ def holding_other_records(
         seen = wider, held, chosen, law, flows, fitted
         wider, held, of_readings = holding_misreading(*seen, expectation)
         said = (*of_filters, *of_readings)
+        if not computed:
+            wider, held, of_benches = holding_smaller_laws(wider, held, law, flows)
+            said = (*said, *of_benches)
     if not computed:
         wider, held = holding_small_faults(
             wider, held, law, flows, fitted, expectation.repeat_error

@@ -126,6 +126,7 @@ def _alternatives(result: LoopResult) -> str:
     if share > _SETTLED:
         return ""
     names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
+    names += " on a bench that is a little off" if others[0].bench else ""
     rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
     return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
 

@@ -151,7 +151,7 @@ def explanations(result: LoopResult) -> list[dict[str, Any]]:
     chosen = result.explanations.holding([stage.effect for stage in result.stages])
     return [
         {
-            "effects": effects_title(one.effects),
+            "effects": effects_title(one.effects, one.bench),
             "twins": "; ".join(map(effects_title, one.twins)),
             "probability": one.probability,
             "error": one.error,

@@ -24,6 +24,10 @@ Bounds = Mapping[int, tuple[float, float]]
 _LEVELS = (0.025, 0.975)
 _HALF = float(norm.ppf(_LEVELS[1]))
 
+_EXACT = ((0.0, 1.0),)
+_NORMAL = ((-(3.0**0.5), 1 / 6), (0.0, 2 / 3), (3.0**0.5, 1 / 6))
+"""Deviations of a normal distribution and their weights, by Gauss's and Hermite's rule."""
+
 
 def over_explanations(
     bounds: Bounds,
@@ -37,8 +41,8 @@ def over_explanations(
 
     An interval beside one set of effects takes that set for granted. With another, or with a twin
     of one effect that leaves these records alike, the same constant often has another value. Each
-    explanation counts with its probability, and with the width of the interval that is given; the
-    given interval always lies within.
+    explanation counts with its probability, and with the width of the interval that is given and
+    what faults of a bench leave open beside it; the given interval always lies within.
 
     Parameters
     ----------
@@ -57,9 +61,10 @@ def over_explanations(
     own = {at: effect.name for effect in model.effects for at in model.positions(effect.name)}
     for at, (low, high) in bounds.items():
         having = [
-            (one.fit.theta[at], weight)
+            (one.fit.theta[at] + off * one.left_open.get(at, 0.0), weight * share)
             for one, weight in weighed
             if at not in own or own[at] in one.effects
+            for off, share in (_NORMAL if at in one.left_open else _EXACT)
         ]
         # of what was found the weight is the largest, or another would have been found
         most = max((weight for _, weight in having), default=0.0)
