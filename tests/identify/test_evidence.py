@@ -94,6 +94,10 @@ class FakeProblem:
     weight: np.ndarray
     run_of_row: np.ndarray
 
+    @property
+    def weighted_target(self):
+        return (self.weight * self.target).reshape(-1)
+
 
 @dataclass
 class FakeSearch(SupportSearch):
