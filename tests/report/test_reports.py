@@ -61,6 +61,7 @@ def comparison():
             "data": {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 21}},
             "compare": {
                 "high_deborah": [1.5],
+                "next": {"flows": ["laos", "uniaxial"]},
                 "library": {"degree": 0},
                 "sweep": {"laws": ["ptt_linear"], "parameter": "epsilon", "values": [0.1]},
             },

@@ -9,7 +9,7 @@ import numpy as np
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.design.experiments import OBSERVED, candidate_experiments
-from discover.identify.design.next_experiment import Proposal, propose_experiments
+from discover.identify.design.next_experiment import Proposal, propose_experiments, rank
 from discover.identify.rivals.bands import PredictionBand, prediction_bands
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.identify.soundness.physics_flows import time_scale
@@ -186,9 +186,16 @@ def next_measurement(
             options.deborah_numbers,
             float(np.sum(declared.modulus)),
         )
-        proposals = propose_experiments(
-            chosen, others, declared, experiments, noise, options.observe, seed=seed
-        )
+        quick = [one for one in experiments if one.in_transient_shear or not one.in_shear]
+        slow = [one for one in experiments if one not in quick]
+        for some in (quick, slow):
+            found = propose_experiments(
+                chosen, others, declared, some, noise, options.observe, seed=seed
+            )
+            proposals = sorted([*proposals, *found], key=rank)
+            # states and creep, which are solved for, are asked where nothing else decides
+            if proposals and len(proposals[0].falling) == len(others):
+                break
     names = (chosen.name, *(law.name for law in others))
     oscillations = [p for p in proposals if p.experiment.pipkin is not None]
     return NextMeasurement(names, proposals[:_SHOWN], noise=noise, oscillations=oscillations)

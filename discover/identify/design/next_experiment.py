@@ -143,7 +143,7 @@ def propose_experiments(
                     np.stack([run[0] for run in runs]),
                 )
             )
-    return sorted(proposals, key=_rank)
+    return sorted(proposals, key=rank)
 
 
 def _predicted(
@@ -178,7 +178,8 @@ def _followed_by_all(
     return [run[:, :kept] for run in runs], shorter
 
 
-def _rank(proposal: Proposal) -> tuple:
+def rank(proposal: Proposal) -> tuple[float, ...]:
+    """Return by what proposals are sorted, the best first; see `propose_experiments`."""
     enough = min(proposal.weakest, OVERWHELMING)
     total = sum(min(value, OVERWHELMING) for value in proposal.evidence.values())
     hardest = max(map(_EFFORT.index, proposal.observed))
