@@ -183,7 +183,7 @@ def rank(proposal: Proposal) -> tuple[float, ...]:
     enough = min(proposal.weakest, OVERWHELMING)
     total = sum(min(value, OVERWHELMING) for value in proposal.evidence.values())
     hardest = max(map(_EFFORT.index, proposal.observed))
-    return (-len(proposal.falling), hardest, -enough, -total)
+    return (-float(len(proposal.falling)), float(hardest), -float(enough), -float(total))
 
 
 def _measurements(observed: Sequence[str]) -> list[tuple[int, ...]]:
