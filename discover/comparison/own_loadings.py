@@ -103,7 +103,10 @@ def judged(
             known.flows,
         )
     loadings = loadings_of(known, own, deviation)
-    recorded, known = known.flows, known_in(loadings.taken_out(data[0]))
+    recorded, model = known.flows, known.before.model
+    known = known_in(loadings.taken_out(data[0]))
+    if known.along is None:  # constants of the declared law are those with which was learned
+        known = replace(known, before=replace(known.before, model=model))
     frames = {name: loadings.frame(name, known.frame(one)) for name, one in own.items()}
     undated = loadings.taken_out(data[1])
     found = judge(study, known, library, own, frames, seed, say, undated, loadings)
