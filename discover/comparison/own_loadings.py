@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from discover.comparison.fitting.prepared import with_runs
 from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known
 from discover.comparison.judgement import Judgement, judge
@@ -25,12 +26,7 @@ def with_own_loadings(data: StudyData, deviation: float | None) -> StudyData:
     InputError
         If loadings cannot differ so, or a stress was imposed.
     """
-    parts = {
-        name: replace(part, runs=tuple(with_loadings(part.runs, deviation, None)))
-        for name in ("dataset", "fit", "held_out")
-        for part in [getattr(data, name)]
-    }
-    return replace(data, **parts)
+    return with_runs(data, lambda runs: with_loadings(list(runs), deviation, None))
 
 
 def loadings_of(known: Known, own: Mapping[str, LearnerOutcome], deviation: float) -> OwnLoadings:

@@ -1,13 +1,14 @@
 """The study file: what may be written in it, and nothing else."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
 from discover.dataset.loading import LARGEST
 from discover.laws.registry import ANY, LAWS
 from discover.learners.registry import learner_names
+from discover.protocols.classes import FLOW_CLASSES, FlowClass
 from discover.validation import Section
 from tensor_library.closed_forms import CLOSED_FORMS
 
@@ -215,25 +216,10 @@ class Sweep(Section):
     values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
 
 
-NextFlow = Literal[
-    "laos",
-    "start_up",
-    "cessation",
-    "steps",
-    "superposed",
-    "step_strain",
-    "flow_curve",
-    "creep",
-    "uniaxial",
-    "planar",
-    "biaxial",
-]
-
-
 class NextExperiment(Section):
     """What the user could measure next."""
 
-    flows: Annotated[tuple[NextFlow, ...], Field(min_length=1)] = get_args(NextFlow)
+    flows: Annotated[tuple[FlowClass, ...], Field(min_length=1)] = FLOW_CLASSES
     observe: Annotated[tuple[Literal["sigma12", "N1", "N2"], ...], Field(min_length=1)] = (
         "sigma12",
         "N1",

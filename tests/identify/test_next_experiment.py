@@ -1,13 +1,11 @@
 """Bands, proposed experiments, and what happens when they are run."""
 
-from typing import get_args
-
 import numpy as np
 import pytest
 
 from discover.errors import InputError
 from discover.identify.design.experiment_outcome import judge_laws
-from discover.identify.design.experiments import FLOW_CLASSES, candidate_experiments
+from discover.identify.design.experiments import candidate_experiments
 from discover.identify.design.next_experiment import DECISIVE, propose_experiments, squared_distance
 from discover.identify.rivals.bands import bands_of_predictions, prediction_bands
 from discover.identify.side_by_side.many_laws import (
@@ -17,8 +15,9 @@ from discover.identify.side_by_side.many_laws import (
     sigma_points,
 )
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
+from discover.protocols.classes import FLOW_CLASSES
 from discover.simulate import simulate
-from discover.study.schema import NextFlow
+from discover.study.schema import NextExperiment
 
 MAXWELL = Fluid.dimensionless(UpperConvectedMaxwell())
 SMALL = np.array([[1e-3**2]])
@@ -83,7 +82,8 @@ def test_a_maxwell_fluid_relaxes_flows_and_creeps_in_the_experiments_as_on_paper
 
 
 def test_a_study_may_name_every_class_of_experiment():
-    assert get_args(NextFlow) == FLOW_CLASSES
+    assert NextExperiment(flows=FLOW_CLASSES).flows == FLOW_CLASSES
+    assert {e.kind for e in candidate_experiments(1.0)} == set(FLOW_CLASSES)
 
 
 def test_only_a_second_normal_stress_difference_separates_the_slip_twin(about_the_twin):

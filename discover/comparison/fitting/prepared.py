@@ -20,7 +20,7 @@ def prepared(data: StudyData) -> StudyData:
             'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
             'such as held_out = ["fast.csv"].'
         )
-    return _with_runs(data, as_compared)
+    return with_runs(data, as_compared)
 
 
 def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
@@ -64,10 +64,11 @@ def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
 
 def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
     """Return data with each run changed, in every part of it."""
-    return _with_runs(data, lambda runs: map(change, runs))
+    return with_runs(data, lambda runs: map(change, runs))
 
 
-def _with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]) -> StudyData:
+def with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]) -> StudyData:
+    """Return data with the runs changed together, in every part of it."""
     parts = {
         name: replace(part, runs=tuple(change(part.runs)))
         for name in ("dataset", "fit", "held_out")

@@ -125,15 +125,13 @@ class Bench:
         widths = np.array([*[np.inf] * len(places), *free, WIDTH, *self.widths])
         values = self.law.start
         values[len(names) :] = [start.get(term, 0.0) for term in terms]
-        at = _Place(values, 0.0, np.zeros(len(self.widths)))
 
         def off(place: _Place) -> Float[np.ndarray, " p"]:
             sizes = place.sizes(columns)
             sizes[~np.isfinite(widths)] = 0.0  # of faults alone anything is known before
             return sizes / widths
 
-        now, place = np.inf, at
-        step = np.zeros(len(widths))
+        place = _Place(values, 0.0, np.zeros(len(self.widths)))
         for _ in range(_MOST_STEPS):
             told = self._derivatives(place, columns)
             if told is None:
@@ -141,9 +139,7 @@ class Bench:
             residual, slopes = told
             square = self.worth * slopes @ slopes.T + np.diag(1.0 / widths**2)
             gradient = self.worth * slopes @ residual + off(place) / widths
-            now = 0.5 * self.worth * float(residual @ residual) + 0.5 * float(
-                np.sum(off(place) ** 2)
-            )
+            now = self._objective(residual, off(place))
             step = -_solved(square, gradient)
             largest = float(np.max(np.abs(step[len(places) : len(columns) + 1])))
             step = step * min(1.0, _AT_ONCE / max(largest, 1e-300))
@@ -156,6 +152,10 @@ class Bench:
                 break
         return self._found(place, columns, places, widths, off)
 
+    def _objective(self, residual: Float[np.ndarray, " m"], off: Float[np.ndarray, " p"]) -> float:
+        """Return minus the log of likelihood and prior, but for a constant."""
+        return 0.5 * self.worth * float(residual @ residual) + 0.5 * float(np.sum(off**2))
+
     def _better(self, place, columns, step, now: float, off, linear):
         """Return objective and place of the first of ever shorter steps that helps."""
         for k in range(_HALVINGS):
@@ -163,8 +163,7 @@ class Bench:
             residual = self._residual(tried, linear)
             if residual is None:
                 continue
-            cost = 0.5 * self.worth * float(residual @ residual)
-            cost += 0.5 * float(np.sum(off(tried) ** 2))
+            cost = self._objective(residual, off(tried))
             if cost < now:
                 return cost, tried
         return None
@@ -175,7 +174,7 @@ class Bench:
         if told is None:
             return None
         residual, slopes = told
-        now = 0.5 * self.worth * float(residual @ residual) + 0.5 * float(np.sum(off(place) ** 2))
+        now = self._objective(residual, off(place))
         if not np.isfinite(now):
             return None
         square = self.worth * slopes @ slopes.T + np.diag(1.0 / widths**2)

@@ -31,15 +31,12 @@ def intervals_of_either(
     sparse = outcomes.get(SPARSE)
     if sparse is None:
         return dict(outcomes)
-    terms = []
-    for term, value in zip(sparse.terms, coefficients, strict=True):
-        one = term
-        if term.ci95 is not None:
-            half = 0.0 if term.term in without else 0.5 * (term.ci95[1] - term.ci95[0])
-            low, high = min(term.ci95[0], value - half), max(term.ci95[1], value + half)
-            one = replace(term, ci95=(float(low), float(high)))
-        terms.append(one)
-    return {**outcomes, SPARSE: replace(sparse, terms=tuple(terms))}
+    other = {}
+    for term, value in zip(sparse.terms, map(float, coefficients), strict=True):
+        certain = term.ci95 is None or term.term in without
+        half = 0.0 if certain else 0.5 * (term.ci95[1] - term.ci95[0])
+        other[term.term] = value, value - half, value + half
+    return intervals_of_other(outcomes, other)
 
 
 def intervals_of_other(
@@ -81,18 +78,13 @@ def bands_of_either(
     predictions
         Of the other law, by the same key; None where it runs away.
     """
-    wider = {}
+    limits = {}
     for key, band in bands.items():
         predicted = predictions.get(key)
-        wider[key] = band
         if predicted is not None:
             moved = np.stack([predicted[q] for q in QUANTITIES], axis=-1) - band.chosen
-            wider[key] = replace(
-                band,
-                rivals_low=np.minimum(band.rivals_low, band.rivals_low + moved),
-                rivals_high=np.maximum(band.rivals_high, band.rivals_high + moved),
-            )
-    return wider
+            limits[key] = band.rivals_low + moved, band.rivals_high + moved
+    return bands_within(bands, limits)
 
 
 def bands_within(

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from functools import partial
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.protocols.classes import FLOW_CLASSES, FlowClass
 from discover.protocols.control import imposed_stress, steady_rates
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import (
@@ -18,21 +20,6 @@ from discover.protocols.protocol import (
     start_up,
     step_rates,
 )
-
-FlowClass = Literal[
-    "laos",
-    "start_up",
-    "cessation",
-    "steps",
-    "superposed",
-    "step_strain",
-    "flow_curve",
-    "creep",
-    "uniaxial",
-    "planar",
-    "biaxial",
-]
-FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)
 
 Observed = Literal["sigma12", "N1", "N2"]
 OBSERVED: tuple[Observed, ...] = ("sigma12", "N1", "N2")
@@ -120,11 +107,10 @@ def candidate_experiments(
             raise InputError(f"{label} must be positive numbers; got {list(values)}.")
     unit = 1.0 / relaxation_time
     found = []
-    for name in _MAKERS:
+    makers = {**_MAKERS, "creep": partial(_creep, modulus=modulus)}
+    for name in FLOW_CLASSES:
         if name in classes:
-            found += _MAKERS[name](unit, weissenberg_numbers, deborah_numbers)
-    if "creep" in classes:
-        found += _creep(unit, weissenberg_numbers, modulus)
+            found += makers[name](unit, weissenberg_numbers, deborah_numbers)
     return found
 
 
@@ -224,8 +210,9 @@ def _flow_curve(unit, weissenberg, deborah):
     return [Experiment(title, "flow_curve", steady_rates(rates), counted)]
 
 
-def _creep(unit, weissenberg, modulus):
+def _creep(unit, weissenberg, deborah, modulus):
     """Return stresses that rise as fast as an elastic solid follows at the largest rate."""
+    del deborah
     times = np.linspace(0.0, 10.0, N_SAMPLES) / unit
     fastest, found = max(weissenberg) * unit, []
     for level in weissenberg:
