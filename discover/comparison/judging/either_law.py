@@ -33,8 +33,9 @@ def intervals_of_either(
         return dict(outcomes)
     other = {}
     for term, value in zip(sparse.terms, map(float, coefficients), strict=True):
-        certain = term.ci95 is None or term.term in without
-        half = 0.0 if certain else 0.5 * (term.ci95[1] - term.ci95[0])
+        half = 0.0
+        if term.ci95 is not None and term.term not in without:
+            half = 0.5 * (term.ci95[1] - term.ci95[0])
         other[term.term] = value, value - half, value + half
     return intervals_of_other(outcomes, other)
 
