@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import least_squares
 
 from discover.comparison.judging.bench_faults import Faults, OnBench
 from discover.comparison.judging.bench_flows import faster, yielding
@@ -30,9 +31,10 @@ _LATE = 0.5
 """Standard deviation of the zero of the clock, in the shortest time from it to a sample."""
 
 _STEP = 1e-3
-_MOST_STEPS, _HALVINGS = 8, 4
-_AT_ONCE = 0.1  # the most that a factor moves in one step
+_EVALUATIONS = 20
 _ENOUGH = 0.05  # of the objective, below which no step is worth its time
+_RUNAWAY = 1e3
+"""What a law that runs away leaves of each sample, in its noise: more than any trial may."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,9 @@ class Bench:
         names = tuple(dict.fromkeys([*MODE_CONSTANTS, *found.names]))
         every = dict.fromkeys([*found.terms, *terms], 0.0)
         law = MovedLaw(found.declared, {**every, **found.terms}, {}, names)
-        predicted = _predicted(law, law.start, flows, 0.0)
-        if predicted is None:
+        try:
+            predicted = _predicted(law, law.start, flows, 0.0)
+        except _RunsAway:
             return None
         records, weights, left = [], [], []
         for flow, values in zip(flows, predicted, strict=True):
@@ -109,9 +112,8 @@ class Bench:
     def fit(self, start: Mapping[str, float]) -> OnBench | None:
         """Return a law with the likeliest faults; None where it runs away.
 
-        By the steps of Gauss and Newton, each halved until it helps. The evidence is Laplace's in
-        the faults   [MacKay 1992, Neural Comput. 4, 415], and a coefficient costs what it does in
-        the Bayesian criterion.
+        The evidence is Laplace's in the faults   [MacKay 1992, Neural Comput. 4, 415], and a
+        coefficient costs what it does in the Bayesian criterion.
 
         Parameters
         ----------
@@ -125,60 +127,49 @@ class Bench:
         widths = np.array([*[np.inf] * len(places), *free, WIDTH, *self.widths])
         values = self.law.start
         values[len(names) :] = [start.get(term, 0.0) for term in terms]
-
-        def off(place: _Place) -> Float[np.ndarray, " p"]:
-            sizes = place.sizes(columns)
-            sizes[~np.isfinite(widths)] = 0.0  # of faults alone anything is known before
-            return sizes / widths
-
-        place = _Place(values, 0.0, np.zeros(len(self.widths)))
-        for _ in range(_MOST_STEPS):
-            told = self._derivatives(place, columns)
-            if told is None:
-                return None
-            residual, slopes = told
-            square = self.worth * slopes @ slopes.T + np.diag(1.0 / widths**2)
-            gradient = self.worth * slopes @ residual + off(place) / widths
-            now = self._objective(residual, off(place))
-            step = -_solved(square, gradient)
-            largest = float(np.max(np.abs(step[len(places) : len(columns) + 1])))
-            step = step * min(1.0, _AT_ONCE / max(largest, 1e-300))
-            linear = slopes[len(columns) + 1 :]
-            better = self._better(place, columns, step, now, off, linear)
-            if better is None:
-                break
-            gained, place = now - better[0], better[1]
-            if gained < _ENOUGH:
-                break
-        return self._found(place, columns, places, widths, off)
-
-    def _objective(self, residual: Float[np.ndarray, " m"], off: Float[np.ndarray, " p"]) -> float:
-        """Return minus the log of likelihood and prior, but for a constant."""
-        return 0.5 * self.worth * float(residual @ residual) + 0.5 * float(np.sum(off**2))
-
-    def _better(self, place, columns, step, now: float, off, linear):
-        """Return objective and place of the first of ever shorter steps that helps."""
-        for k in range(_HALVINGS):
-            tried = place.moved(columns, step / 2.0**k)
-            residual = self._residual(tried, linear)
-            if residual is None:
-                continue
-            cost = self._objective(residual, off(tried))
-            if cost < now:
-                return cost, tried
-        return None
-
-    def _found(self, place: "_Place", columns, places, widths, off) -> OnBench | None:
-        """Return a law where the steps have ended."""
-        told = self._derivatives(place, columns)
-        if told is None:
+        begin = _Place(values, 0.0, np.zeros(len(self.widths)))
+        try:
+            return self._found(self._likeliest(begin, columns, widths), columns, places, widths)
+        except _RunsAway:
             return None
-        residual, slopes = told
-        now = self._objective(residual, off(place))
-        if not np.isfinite(now):
-            return None
+
+    def _likeliest(self, begin: "_Place", columns: Sequence[int], widths) -> "_Place":
+        """Return the place of largest probability, of residuals that are one at the noise.
+
+        What the clock and the tool change is linear about the beginning.
+        """
+        root = float(np.sqrt(self.worth))
+        linear = self._derivatives(begin, columns)[1][len(columns) + 1 :]
+
+        def left(sizes):
+            try:
+                residual = self._residual(begin.at(columns, sizes), linear)
+            except _RunsAway:
+                residual = np.full(linear.shape[1], _RUNAWAY)
+            return np.concatenate([root * residual, sizes / widths])
+
+        def slopes(sizes):
+            told = self._derivatives(begin.at(columns, sizes), columns)[1]
+            told[len(columns) + 1 :] = linear
+            return np.vstack([root * told.T, np.diag(1.0 / widths)])
+
+        found = least_squares(
+            left,
+            begin.sizes(columns),
+            slopes,  # pyright: ignore[reportArgumentType]  (annotated as a string in SciPy)
+            x_scale="jac",
+            ftol=_ENOUGH / self.samples,
+            max_nfev=_EVALUATIONS,
+        )
+        return begin.at(columns, found.x)
+
+    def _found(self, place: "_Place", columns, places, widths) -> OnBench:
+        """Return a law where its fit has ended."""
+        residual, slopes = self._derivatives(place, columns)
+        off = place.sizes(columns) / widths
+        now = 0.5 * self.worth * float(residual @ residual) + 0.5 * float(np.sum(off**2))
         square = self.worth * slopes @ slopes.T + np.diag(1.0 / widths**2)
-        covariance = _solved(square, np.eye(len(square)))
+        covariance = _inverse(square)
         half = HALF_BAND * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         names, terms = self.law.names, tuple(self.law.terms)
         coefficients = {
@@ -245,44 +236,35 @@ class Bench:
         half = HALF_BAND * np.sqrt(np.sum(moved**2, axis=0))
         return values - half, values + half
 
-    def _residual(self, place: "_Place", linear) -> Float[np.ndarray, " m"] | None:
+    def _residual(self, place: "_Place", linear) -> Float[np.ndarray, " m"]:
         """Return what is left of the runs; `linear` is what the linear faults change."""
         here = _predicted(self.law, place.values, self.flows, place.rate)
-        if here is None:
-            return None
         residual = self._weighed([a - b for a, b in zip(here, self.records, strict=True)])
         return residual + place.linear @ linear if len(place.linear) else residual
 
     def _derivatives(self, place: "_Place", columns: Sequence[int]):
         """Return residuals and their derivatives: coefficients, constants, rate, clock, tool."""
         here = _predicted(self.law, place.values, self.flows, place.rate)
-        if here is None:
-            return None
         moved = []
         for column in columns:
             other = place.values.copy()
             other[column] += _STEP
             moved.append(_predicted(self.law, other, self.flows, place.rate))
         moved.append(_predicted(self.law, place.values, self.flows, place.rate + _STEP))
-        slopes = []
-        for rows in moved:
-            if rows is None:
-                return None
-            slopes.append(self._weighed([(b - a) / _STEP for a, b in zip(here, rows, strict=True)]))
+        slopes = [
+            self._weighed([(b - a) / _STEP for a, b in zip(here, rows, strict=True)])
+            for rows in moved
+        ]
         if self.widths:
             later = _STEP * self.widths[0]
             ahead = _predicted(self.law, place.values, self.flows, place.rate, later)
             fluid = self.law.fluid(place.values)
-            found = [yielding(fluid, faster(one, place.rate)) for one in self.flows]
-            felt = [one for one in found if one is not None]
-            if ahead is None or len(felt) < len(found):
-                return None
+            felt = [yielding(fluid, faster(one, place.rate)) for one in self.flows]
             slopes.append(
                 self._weighed([(a - b) / later for a, b in zip(here, ahead, strict=True)])
             )
-            slopes.append(self._weighed(felt))
-        residual = self._residual(place, np.array(slopes[len(columns) + 1 :]))
-        return None if residual is None else (residual, np.array(slopes))
+            slopes.append(self._weighed([_followed(one) for one in felt]))
+        return self._residual(place, np.array(slopes[len(columns) + 1 :])), np.array(slopes)
 
     def _weighed(self, rows: Sequence[np.ndarray]) -> Float[np.ndarray, " m"]:
         return np.concatenate([w * row for w, row in zip(self.weights, rows, strict=True)])
@@ -300,12 +282,21 @@ class _Place:
         """Return all that is fitted."""
         return np.array([*self.values[list(columns)], self.rate, *self.linear])
 
-    def moved(self, columns: Sequence[int], step: Float[np.ndarray, " p"]) -> "_Place":
-        """Return another place, a step away."""
+    def at(self, columns: Sequence[int], sizes: Float[np.ndarray, " p"]) -> "_Place":
+        """Return another place, by all that is fitted."""
         values = self.values.copy()
-        values[list(columns)] += step[: len(columns)]
-        rate, linear = float(step[len(columns)]), step[len(columns) + 1 :]
-        return _Place(values, self.rate + rate, self.linear + linear)
+        values[list(columns)] = sizes[: len(columns)]
+        return _Place(values, float(sizes[len(columns)]), sizes[len(columns) + 1 :])
+
+
+class _RunsAway(Exception):
+    """A law cannot be followed through the runs."""
+
+
+def _followed(values: np.ndarray | None) -> np.ndarray:
+    if values is None:
+        raise _RunsAway
+    return values
 
 
 def _tells(flow: Flow) -> bool:
@@ -314,11 +305,10 @@ def _tells(flow: Flow) -> bool:
     return at_rate and flow.in_shear and flow.records_shear_stress and flow.measured is not None
 
 
-def _solved(square: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the solution of normal equations whose columns differ in size."""
+def _inverse(square: Float[np.ndarray, "p p"]) -> Float[np.ndarray, "p p"]:
+    """Return the inverse of normal equations whose columns differ in size."""
     scale = np.sqrt(np.maximum(np.diag(square), 1e-300))
-    inverse = np.linalg.pinv(square / np.outer(scale, scale), rcond=1e-12)
-    return (inverse / np.outer(scale, scale)) @ values
+    return np.linalg.pinv(square / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
 
 
 def _occam(square: Float[np.ndarray, "p p"], widths: Float[np.ndarray, " p"]) -> float:
@@ -335,11 +325,9 @@ def _occam(square: Float[np.ndarray, "p p"], widths: Float[np.ndarray, " p"]) ->
 
 def _predicted(
     law: MovedLaw, values, flows: Sequence[Flow], rate: float, later: float = 0.0
-) -> list[Float[np.ndarray, " _"]] | None:
-    """Return σ12 of the runs, some time after their samples; None where a law runs away."""
-    found = [_of_law(law, values, flow, rate, later) for flow in flows]
-    told = [one[:, 0] for one in found if one is not None]
-    return told if len(told) == len(found) else None
+) -> list[Float[np.ndarray, " _"]]:
+    """Return σ12 of the runs, some time after their samples."""
+    return [_followed(_of_law(law, values, flow, rate, later))[:, 0] for flow in flows]
 
 
 def _of_law(
