@@ -123,8 +123,9 @@ class Compiled(Generic[P, R]):
 
     def _made(self, args, kwargs, arrays, folder):
         """Return the program for such arguments: found, or exported and kept, or traced."""
-        soon = None if self._runs_long else _compiled_soon()
-        options = {**(soon or {}), **self._asked_for} or None
+        soon = {} if self._runs_long else _compiled_soon()
+        always = {**_whole_loops(), **self._asked_for} or None
+        options = {**soon, **(always or {})} or None
         # its signature does not name what it hands on to jax.jit
         alone = eqx.filter_jit(self._function, compiler_options=options)  # pyright: ignore
 
@@ -146,7 +147,7 @@ class Compiled(Generic[P, R]):
                 kept = self._export(args, kwargs, arrays)
                 save_program(file, *kept)
             nesting, data = kept
-            options = options if len(data) < _LARGE else self._asked_for or None
+            options = options if len(data) < _LARGE else always
             exported = jax.export.deserialize(bytearray(data))
         except (NotDescribable, NotImplementedError, ValueError, TypeError) as reason:
             _LOGGER.debug("%s is traced at every start: %s", self._function.__qualname__, reason)
@@ -195,18 +196,33 @@ class Compiled(Generic[P, R]):
 
 
 @functools.cache
-def _compiled_soon() -> dict[str, bool] | None:
-    """Return options that make XLA compile sooner, or None where its version knows none of them.
+def _compiled_soon() -> dict[str, Any]:
+    """Return options that make XLA compile sooner, none where its version knows none of them.
 
     Most programs are small and run for a second or less, and XLA's newer emitters take half as
     long again to compile them as its older ones. What those make is as fast, but for large
     matrices.
     """
-    options = {"xla_cpu_use_fusion_emitters": False}
+    return _if_known({"xla_cpu_use_fusion_emitters": False})
+
+
+@functools.cache
+def _whole_loops() -> dict[str, Any]:
+    """Return options that keep sums inside the loop that they stand in.
+
+    Newer versions of XLA hand sums of more than some thousand numbers to a library, and a loop
+    with a call of a library is started piece by piece at every step, where it else is one piece
+    of machine code (`discover.compilation_cache`): four times the work for eight runs of a fluid
+    of fourteen modes.
+    """
+    return _if_known({"xla_cpu_experimental_ynn_fusion_type": ""})
+
+
+def _if_known(options: dict[str, Any]) -> dict[str, Any]:
     try:
         jax.jit(jnp.negative, compiler_options=options).lower(0.0).compile()
     except jax.errors.JaxRuntimeError:
-        return None
+        return {}
     return options
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discover.programs import compiled
-from discover.programs.program_cache import _compiled_soon
+from discover.programs.program_cache import _compiled_soon, _whole_loops
 
 
 @pytest.fixture
@@ -26,8 +26,25 @@ def asked(monkeypatch):
 def test_only_what_does_not_run_long_is_compiled_in_haste(asked, runs_long):
     double = compiled(lambda x: 2.0 * x, runs_long=runs_long)
     assert double(jnp.ones(3)).tolist() == [2.0, 2.0, 2.0]
-    assert (_compiled_soon() in asked) is not runs_long
-    assert _compiled_soon() is not None  # with the version of XLA that these tests run on
+    assert asked[-1] == {**({} if runs_long else _compiled_soon()), **_whole_loops()}
+    assert _compiled_soon()  # with the version of XLA that these tests run on
+
+
+def _compiled(**options):
+    def steps(state):
+        def step(y, _):
+            longer = jnp.sum(jnp.cos(y[:, :, None] * y[:, None, :]), axis=2)
+            return 0.9 * y + 1e-3 * longer, None
+
+        return jax.lax.scan(step, state, None, 100)[0]
+
+    return jax.jit(steps, **options).lower(jnp.ones((40, 40))).compile().as_text()
+
+
+def test_a_loop_with_a_long_sum_is_one_piece_and_would_not_be_without_being_asked_for():
+    assert "xla_cpu_small_call" in _compiled(compiler_options=_whole_loops())
+    # with the version of XLA that these tests run on
+    assert "xla_cpu_small_call" not in _compiled()
 
 
 def test_a_program_may_be_called_with_numbers_while_another_is_traced():
@@ -41,4 +58,5 @@ def test_an_option_that_the_compiler_does_not_know_is_left_out(monkeypatch):
         raise jax.errors.JaxRuntimeError("No such compile option")
 
     monkeypatch.setattr(jax, "jit", refuse)
-    assert _compiled_soon.__wrapped__() is None
+    assert _compiled_soon.__wrapped__() == {}
+    assert _whole_loops.__wrapped__() == {}
