@@ -16,6 +16,8 @@ from discover.protocols import measured_rate, start_up
 from discover.report.loop.verdict import loop_verdict
 from discover.simulate import simulate
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.05, 8.0, 80)
 EFFECTS = ("giesekus_mobility", "rate_rise_time", "rate_gain", "stress_offset")
 

@@ -10,13 +10,15 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.closed_loop.explanations.other_benches import BENCH
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 FLOWS = {
     "slow.csv": (start_up(0.5), np.linspace(0.1, 8.0, 80)),
     "fast.csv": (start_up(2.0), np.linspace(0.1, 8.0, 80)),
     "wave.csv": (oscillation(2.0, 1.0), np.linspace(0.1, 12.0, 120)),
     "unseen.csv": (start_up(3.0), np.linspace(0.1, 8.0, 80)),
 }
-EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag", "rate_gain"]
+EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag"]
 
 
 def loop_of(folder, **faults):

@@ -31,6 +31,7 @@ def clean(planter):
     return planter.plant(noise=Noise(0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect", ["giesekus_mobility", "stress_drift", "thixotropy", "wall_slip", "time_delay"]
 )
@@ -40,6 +41,7 @@ def test_a_planted_effect_changes_the_stress_as_much_as_asked(planter, clean, ef
     assert relative_change(case, clean) == pytest.approx(0.12, rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", sorted(OUTSIDE))
 def test_a_mechanism_from_outside_changes_it_as_asked_and_is_in_no_dictionary(
     planter, clean, mechanism
@@ -50,6 +52,7 @@ def test_a_mechanism_from_outside_changes_it_as_asked_and_is_in_no_dictionary(
     assert relative_change(case, clean) == pytest.approx(0.12, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_same_seed_plants_the_same(planter):
     first, second = (planter.plant(["thixotropy"], seed=5) for _ in range(2))
     other = planter.plant(["thixotropy"], seed=6)

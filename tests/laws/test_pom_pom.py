@@ -54,9 +54,18 @@ def predicted(name, protocol, times, rate, modes=(), **columns):
     return of_records(name, run, *modes)[0]
 
 
-@both
 @pytest.mark.parametrize(
-    ("kind", "rate"), [("shear", 5.0), ("uniaxial", 1.5), ("planar", 1.0), ("biaxial", 0.6)]
+    ("name", "kind", "rate"),
+    [
+        ("pom_pom", "shear", 5.0),
+        ("pom_pom_drag_strain", "uniaxial", 1.5),
+        pytest.param("pom_pom_drag_strain", "shear", 5.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "uniaxial", 1.5, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "planar", 1.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom_drag_strain", "planar", 1.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "biaxial", 0.6, marks=pytest.mark.slow),
+        pytest.param("pom_pom_drag_strain", "biaxial", 0.6, marks=pytest.mark.slow),
+    ],
 )
 def test_two_modes_are_those_of_full_tensors_in_every_flow(name, kind, rate):
     modulus, times = (1000.0, 300.0), (0.01, 2.0)
@@ -137,6 +146,7 @@ def _stretch(name, drawn):
     return low
 
 
+@pytest.mark.slow
 def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
     strain, frequency = 2.0, 1.0
     one = np.ones(1)

@@ -87,6 +87,7 @@ def constant():
     return TBNNUDE(recipe=RECIPE).fit(data.runs)
 
 
+@pytest.mark.slow
 def test_where_constants_suffice_members_learn_from_halves_of_the_runs(constant):
     assert len(constant.members_) == len(constant.ensemble_fluids_) == 3  # the default
     assert constant.result_.details["ensemble"] == "trained on halves of the runs"
