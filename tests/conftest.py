@@ -57,7 +57,8 @@ _END_TO_END = {
     "test_constants_beside_other_times.py", "test_own_noise.py", "test_comparison.py",
     "test_profile.py", "test_open_constants.py", "test_bands_of_states.py", "test_coarse_rates.py",
     "test_modes_of_a_stiff_fluid.py", "test_named_effects.py", "test_folds.py",
-    "test_other_ways.py", "test_further_laws.py",
+    "test_other_ways.py", "test_further_laws.py", "test_nameless_terms.py", "test_loadings.py",
+    "test_other_benches.py",
 }  # fmt: skip
 
 

@@ -145,6 +145,7 @@ def test_factors_larger_than_loadings_differ_by_refute(exact):
     assert "loadings would have to differ by more" in loop.remaining["description"]
 
 
+@pytest.mark.slow
 def test_modulus_is_told_no_better_than_loadings_differ(exact):
     base = dc.Fluid(dc.make_law("ucm"), [90.0], [1.0])
     data = data_of(exact, FACTORS)

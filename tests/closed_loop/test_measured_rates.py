@@ -133,6 +133,7 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     np.testing.assert_allclose(predicted, exact, atol=2e-3 * np.max(exact))
 
 
+@pytest.mark.slow
 def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     generator = np.random.default_rng(0)
     runs = [

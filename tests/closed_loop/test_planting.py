@@ -73,10 +73,14 @@ def test_what_cannot_be_planted_is_refused(planter):
         planter.plant(["gremlins"])
     with pytest.raises(InputError, match="gremlins"):
         planter.plant(outside="gremlins")
-    with pytest.raises(InputError, match="No admissible amplitude"):
-        planter.plant(["finite_extensibility"], size=50.0)
     with pytest.raises(InputError, match="base law"):
         Planter("water")
+
+
+@pytest.mark.slow
+def test_what_no_amplitude_changes_as_much_is_refused(planter):
+    with pytest.raises(InputError, match="No admissible amplitude"):
+        planter.plant(["finite_extensibility"], size=50.0)
 
 
 def loop(case):

@@ -161,6 +161,7 @@ def test_with_ever_shorter_rouse_times_it_becomes_the_law_without_stretch():
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_half_a_cycle_from_where_scipy_ends_ends_in_its_mirror_image():
     """What Newton's steps look for is what this leaves as it is."""
     strain, frequency, law = 3.0, 1.0, independent()

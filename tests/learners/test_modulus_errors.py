@@ -100,7 +100,9 @@ def fit_of(problem):
     return refit(problem, [(0,)], [(np.array([0.2]), np.zeros(0))], np.ones(1), 1)[0]
 
 
-@pytest.mark.parametrize("learner", ["tensor_sindy", "closed_loop"])
+@pytest.mark.parametrize(
+    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "closed_loop"]
+)
 def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(learner):
     """And by both ways to fit, without the sweep's noise several times too narrow."""
     off, narrow = [], []

@@ -61,6 +61,7 @@ def up():
 observed = eqx.filter_jit(observe)
 
 
+@pytest.mark.slow
 def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
     runs = [swing(2.0), up()]
     problem = make_problem(runs, FEW, MODULUS, TIME)

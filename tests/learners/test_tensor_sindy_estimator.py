@@ -29,7 +29,9 @@ def found(model):
 
 @pytest.fixture(scope="module")
 def giesekus():
-    return TensorSINDy(LIBRARY).fit(small_dataset("giesekus", {"alpha": 0.2}))
+    return TensorSINDy(LIBRARY, max_terms=3, n_stability=0).fit(
+        small_dataset("giesekus", {"alpha": 0.2})
+    )
 
 
 def test_giesekus_comes_back_alone(giesekus):

@@ -64,7 +64,7 @@ FAULTS = {
     "kind",
     [
         "factor",
-        "zero",
+        pytest.param("zero", marks=pytest.mark.slow),
         pytest.param("range", marks=pytest.mark.slow),
         pytest.param("growth", marks=pytest.mark.slow),
     ],
