@@ -238,6 +238,7 @@ def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
     assert inside[False] < 0.7
 
 
+@pytest.mark.slow
 def test_a_term_that_stands_for_errors_of_the_moduli_is_left_out():
     """Beside exact moduli the larger law is the better one in most draws."""
     terms = ("sigma.sigma", "gammadot", "I", "gammadot.gammadot")
