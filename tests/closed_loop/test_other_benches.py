@@ -18,7 +18,7 @@ FLOWS = {
     "wave.csv": (oscillation(2.0, 1.0), np.linspace(0.1, 12.0, 120)),
     "unseen.csv": (start_up(3.0), np.linspace(0.1, 8.0, 80)),
 }
-EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag"]
+EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag", "rate_gain"]
 
 
 def loop_of(folder, **faults):
