@@ -10,7 +10,6 @@ from pathlib import Path
 
 import jaxtyping
 import pytest
-from jaxtyping import install_import_hook
 from threadpoolctl import threadpool_limits
 
 # OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
@@ -22,23 +21,23 @@ threadpool_limits(1, "blas")
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
 
-# What is first imported inside a module under the hook below is compiled anew, in every worker.
-for _large in ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic"):
-    importlib.import_module(_large)
-
-# Shapes written on public functions are checked while the tests run. The hook must come before
-# the packages are imported.
-install_import_hook(["tensor_library", "discover"], "beartype.beartype")
-
-from discover.compilation_cache import enable_compilation_cache  # noqa: E402
-from discover.precision import enable_x64  # noqa: E402
-
 # the mutations of files are the benchmark's
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
-enable_x64()
-# shared by the workers of one test run, and by the next run
-enable_compilation_cache(Path(__file__).parents[1] / ".pytest_cache" / "compiled")
+# What is first imported inside a module under the hook below is compiled anew, in every worker.
+_LARGE = ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic")
+
+
+def _import_what_tests_need() -> None:
+    for large in _LARGE:
+        importlib.import_module(large)
+    # Shapes written on public functions are checked while the tests run. The hook must come before
+    # the packages are imported.
+    jaxtyping.install_import_hook(["tensor_library", "discover"], "beartype.beartype")
+    importlib.import_module("discover.precision").enable_x64()
+    # shared by the workers of one test run, and by the next run
+    folder = Path(__file__).parents[1] / ".pytest_cache" / "compiled"
+    importlib.import_module("discover.compilation_cache").enable_compilation_cache(folder)
 
 
 # whole commands and studies, where shapes are checked some hundred thousand times; what they call
@@ -57,7 +56,8 @@ _END_TO_END = {
     "test_constants_beside_other_times.py", "test_own_noise.py", "test_comparison.py",
     "test_profile.py", "test_open_constants.py", "test_bands_of_states.py", "test_coarse_rates.py",
     "test_modes_of_a_stiff_fluid.py", "test_named_effects.py", "test_folds.py",
-    "test_other_ways.py", "test_further_laws.py",
+    "test_other_ways.py", "test_further_laws.py", "test_nameless_terms.py", "test_loadings.py",
+    "test_other_benches.py",
 }  # fmt: skip
 
 
@@ -111,13 +111,21 @@ _WORTH_OPTIMISING = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile without optimising where slow tests are left out.
+    """Import what tests need where they run; compile without optimising if slow ones are left out.
 
     Most programs of the others run for milliseconds, and LLVM takes longer over them than they do.
     A release runs the slow ones too, compiled as users have them.
     """
     if _compiles_soon(config):
         os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
+    if not _leaves_tests_to_workers(config):
+        _import_what_tests_need()
+
+
+def _leaves_tests_to_workers(config: pytest.Config) -> bool:
+    """Return whether this is the process of pytest-xdist that neither collects nor runs a test."""
+    shared_out = config.getoption("numprocesses", None) and not config.option.collectonly
+    return bool(shared_out) and not hasattr(config, "workerinput")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -189,6 +197,16 @@ def verdict_alone(monkeypatch):
 def left_to_the_verdict():
     """Return what does the same as `verdict_alone` to a patch of longer life than a test."""
     return _leave_out_what_stands_beside_a_verdict
+
+
+@pytest.fixture(scope="module")
+def effects_alone() -> Iterator[None]:
+    """Leave out free functions and next tests of loops, which have files of tests of their own."""
+    beyond = importlib.import_module("discover.closed_loop.beyond_the_search")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(beyond, "_free_functions", lambda *_: ())
+        patch.setattr(beyond, "next_tests", lambda *_: beyond.NextTests())
+        yield
 
 
 @pytest.fixture(scope="session")

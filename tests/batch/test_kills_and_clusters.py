@@ -194,6 +194,7 @@ def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp
     assert max(computed(tmp_path).values()) == 1
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path, monkeypatch):
     dask = pytest.importorskip("dask")
     pytest.importorskip("distributed")

@@ -206,8 +206,8 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
     ("effect", "entry", "law"),
     [
         ("giesekus_mobility", "alpha", "giesekus"),
-        ("ptt_exponential", "epsilon", "ptt_exponential"),
-        ("non_affine_motion", "zeta", "johnson_segalman"),
+        pytest.param("ptt_exponential", "epsilon", "ptt_exponential", marks=pytest.mark.slow),
+        pytest.param("non_affine_motion", "zeta", "johnson_segalman", marks=pytest.mark.slow),
     ],
 )
 def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_read_back_from_rheotool(

@@ -12,7 +12,7 @@ GOOD = {
 }
 
 
-@pytest.fixture(scope="module", params=[50, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[25, pytest.param(100, marks=pytest.mark.slow)])
 def slice_of_cases(request):
     said = []
     with pytest.MonkeyPatch.context() as patch:

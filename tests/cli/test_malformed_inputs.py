@@ -30,7 +30,7 @@ def nothing_is_computed():
             yield
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, database=None)
+@settings(max_examples=30, deadline=None, derandomize=True, database=None)
 @given(kind=st.sampled_from(list(KINDS)), seed=st.integers(0, 10**6))
 def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
     with tempfile.TemporaryDirectory() as root:
@@ -43,10 +43,8 @@ def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(malformed_cases, "mutate_text", lambda text, source: text.encode())
     monkeypatch.setattr(malformed_cases, "mutate_values", lambda content, source: content)
     monkeypatch.setattr(malformed_cases, "spoil_file", lambda path, source: None)
-    for seed in range(3):
-        (tmp_path / str(seed)).mkdir()
-        _, outcome, _ = attempt(kind, seed, tmp_path / str(seed))
-        assert outcome.code in (0, None), outcome
+    _, outcome, _ = attempt(kind, 0, tmp_path)
+    assert outcome.code in (0, None), outcome
 
 
 @pytest.mark.parametrize(

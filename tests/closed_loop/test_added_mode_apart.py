@@ -26,6 +26,8 @@ from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as starting
 from discover.statistics.residual import Expectation
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULI, TIMES = (60.0, 80.0), (3.0, 0.4)
 EFFECTS = ["relaxation_mode", "giesekus_mobility", "thixotropy"]
 
@@ -132,6 +134,7 @@ def test_mobilities_of_their_own_are_no_structure(mobilities):
         assert mode.relaxation_time_s == pytest.approx(time, rel=0.15)
 
 
+@pytest.mark.slow
 def test_one_mobility_of_both_modes_stays_one():
     result = loop((0.3, 0.3))
     assert {stage.effect for stage in result.stages} == {"relaxation_mode", "giesekus_mobility"}

@@ -11,6 +11,8 @@ from discover.report.predictions import loop_predictions
 from discover.study import parse_study
 from discover.study.data import load_study_data
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, NOISE, MOBILITY, FREQUENCY = 100.0, 1.0, 0.02, 0.3, 2.0
 KINDS = ("flow_curve", "amplitude_sweep", "lve", "creep", "relaxation")
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "stress_gain", "stress_offset"]
@@ -78,6 +80,7 @@ def test_every_quantity_has_a_band_that_holds_and_is_as_wide_as_the_noise(tmp_pa
     assert "95 % of measurements" in page
 
 
+@pytest.mark.slow
 def test_a_band_of_another_fluid_does_not_hold_its_flow_curve(tmp_path):
     """The control: a law without its mobility has a band too, and the curve leaves it."""
     folder = planted(tmp_path, 0)

@@ -131,6 +131,7 @@ def test_a_commanded_rate_leaves_nothing_open():
     assert commanded.terms[0].ci95 == (0.298, 0.302)
 
 
+@pytest.mark.slow
 def test_samples_dense_enough_leave_nothing_open():
     dense = outcome(60, lambda amplitude, times, rates: measured_rate(times, rates))
     assert coarse_rates_of(dense) is None

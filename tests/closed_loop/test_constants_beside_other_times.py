@@ -1,9 +1,12 @@
 """Constants beside a term that is a wrong relaxation time hold their value with the right one."""
 
 import numpy as np
+import pytest
 from independent import Giesekus, start_up
 
 import discover as dc
+
+pytestmark = pytest.mark.usefixtures("effects_alone")
 
 TIMES = np.linspace(0.1, 8.0, 60)
 

@@ -23,6 +23,8 @@ from discover.inference.varying_constant import VaryingConstant
 from discover.protocols import in_flow, start_up
 from discover.report.plots.by_mode import by_mode_picture
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
 
@@ -177,6 +179,7 @@ def test_the_forward_model_gives_each_mode_its_constant(kind, name):
     np.testing.assert_allclose(predicted, truth, atol=1e-3 * np.max(np.abs(truth)))
 
 
+@pytest.mark.slow
 def test_a_flow_curve_tells_each_constant(tmp_path):
     # steady shear in closed form   [Bird, Armstrong & Hassager 1987, table 7.3-2]
     mobilities, rates = (0.1, 0.3, 0.6), np.geomspace(0.03, 300.0, 60)
@@ -275,6 +278,7 @@ def told_maxwell(mobilities, rates=RATES):
     return dc.close_loop(data(mobilities, rates), base, held_out=[f"{rates[2]}"], **asked)
 
 
+@pytest.mark.slow
 def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_for():
     result = told_maxwell((0.1, 0.3, 0.6))
     assert result.verdict == "effects_added"
@@ -283,6 +287,7 @@ def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_f
     assert result.error_after.held_out == pytest.approx(NOISE, rel=0.3)  # 50 samples of noise
 
 
+@pytest.mark.slow
 def test_control_one_constant_that_explains_the_runs_stays_one():
     result = told_maxwell((0.3, 0.3, 0.3))
     assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
@@ -293,6 +298,7 @@ def test_control_one_constant_that_explains_the_runs_stays_one():
     assert all(mode.ci95[0] < 0.3 < mode.ci95[1] < 0.5 for mode in one.modes)
 
 
+@pytest.mark.slow
 def test_one_constant_that_explains_slow_runs_is_not_claimed_of_modes_that_they_do_not_stretch():
     result = told_maxwell((0.1, 0.3, 0.6), rates=(0.1, 0.2, 0.4))
     one = result.by_mode["giesekus_mobility"]

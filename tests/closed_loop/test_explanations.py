@@ -25,6 +25,8 @@ from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.whiteness import SIGNIFICANCE
 from discover.study import parse_study
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
 FLOWS = {

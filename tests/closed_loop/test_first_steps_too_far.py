@@ -11,6 +11,8 @@ from independent.thixotropic import Thixotropic
 
 import discover as dc
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 FLOWS = {"slow.csv": (start_up(0.2), 8.0), "faster.csv": (start_up(0.6), 6.0)}
 NOISE = 0.02
@@ -31,7 +33,13 @@ def records(folder, material):
     ("effect", "material", "constant", "planted"),
     [
         ("giesekus_mobility", Giesekus(0.5, 100.0, 1.0), "alpha", 0.5),
-        ("non_affine_motion", JohnsonSegalman(0.55, 100.0, 1.0), "xi", 0.55),
+        pytest.param(
+            "non_affine_motion",
+            JohnsonSegalman(0.55, 100.0, 1.0),
+            "xi",
+            0.55,
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_what_was_planted_is_found_from_the_far_end(tmp_path, effect, material, constant, planted):

@@ -10,6 +10,8 @@ from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Fold
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.05, 5.0, 40)
 
 

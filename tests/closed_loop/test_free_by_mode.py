@@ -89,6 +89,7 @@ def test_a_mode_that_no_run_tells_is_left_open_and_follows_the_others():
     assert all(held(mode, truth) for mode, truth in told)
 
 
+@pytest.mark.slow
 def test_a_lower_degree_that_was_refuted_gives_way_to_the_next(monkeypatch):
     """Which is fitted to the same runs; evidence there would be content with less."""
     monkeypatch.setattr(of_degrees, "BARE_MENTION", 100.0)

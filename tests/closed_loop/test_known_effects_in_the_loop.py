@@ -12,6 +12,8 @@ from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.protocols import start_up as commanded
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MOBILITY, GAIN = 0.3, -0.1
 CANDIDATES = ["giesekus_mobility", "ptt_linear", "stress_gain"]
 

@@ -15,6 +15,8 @@ from discover.closed_loop import law_choice
 from discover.errors import InputError
 from discover.report.loop.verdict import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005
 
@@ -139,6 +141,7 @@ def found_beside(material, names, effects):
     )
 
 
+@pytest.mark.slow
 def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
     found = found_beside(material, ("ucm", "white_metzner"), ["thixotropy"])
@@ -148,6 +151,7 @@ def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
 
 
+@pytest.mark.slow
 def test_control_a_law_that_is_there_stays_beside_an_effect():
     material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
     found = found_beside(material, ("ucm", "giesekus"), ["thixotropy"])

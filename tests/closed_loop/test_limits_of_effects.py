@@ -7,6 +7,8 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset import load_dataset
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 STEPS = (0.1, 0.5, 1.0, 2.0, 4.0)
 DAMPING, BREAKDOWN, BUILD_UP = 0.25, 0.3, 1.0
@@ -86,7 +88,7 @@ def giesekus_steps():
             ("strain_damping",),
             marks=pytest.mark.slow,
         ),
-        (structure_in_start_up, "thixotropy", ()),
+        pytest.param(structure_in_start_up, "thixotropy", (), marks=pytest.mark.slow),
         (giesekus_steps, "giesekus_mobility", ()),
     ],
     ids=["exponential steps", "steps", "start-ups", "steps that do not separate"],

@@ -19,6 +19,8 @@ from discover.report.loop.certainty import how_sure
 from discover.report.loop.next_step import what_to_measure_next
 from discover.statistics.misread import Misread
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {
     "slow.csv": (start_up(0.5), protocol(0.5), GROWTH),
@@ -102,6 +104,7 @@ def test_page_says_that_it_holds_if_loadings_differ_so(loaded, tmp_path):
     assert "loading /" not in page
 
 
+@pytest.mark.slow
 def test_runs_of_one_loading_have_the_same_answer_with_wider_intervals(exact):
     data = data_of(exact, {})
     plain, free = (closed(data, max_effects=1, loading=one) for one in (None, 0.03))
@@ -113,6 +116,7 @@ def test_runs_of_one_loading_have_the_same_answer_with_wider_intervals(exact):
         assert one["ci95"][0] < 1.0 < one["ci95"][1]
 
 
+@pytest.mark.slow
 def test_without_loadings_such_runs_are_unexplained(exact):
     loop = closed(data_of(exact, FACTORS), effects=EFFECTS[:1], max_effects=1)
     assert loop.verdict == "unexplained"
@@ -127,6 +131,7 @@ def test_what_refutes_runs_read_by_factors_names_the_way_out(exact, monkeypatch)
     assert "or let each run be a loading of its own ([loop] loading)" in what_to_measure_next(loop)
 
 
+@pytest.mark.slow
 def test_a_law_of_another_kind_is_not_explained_by_factors():
     loop = closed(data_of(records(KBKZ(modulus=100.0)), FACTORS), loading=0.03, max_effects=1)
     assert loop.verdict == "unexplained"
@@ -140,6 +145,7 @@ def test_factors_larger_than_loadings_differ_by_refute(exact):
     assert "loadings would have to differ by more" in loop.remaining["description"]
 
 
+@pytest.mark.slow
 def test_modulus_is_told_no_better_than_loadings_differ(exact):
     base = dc.Fluid(dc.make_law("ucm"), [90.0], [1.0])
     data = data_of(exact, FACTORS)

@@ -14,6 +14,8 @@ from discover.protocols import measured_rate, oscillatory_shear, shear_rates, st
 from discover.simulate import simulate
 from discover.statistics.residual import summarise
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.05, 10.0, 120)
 DECLARED = DeclaredModel.maxwell(100.0, 1.0)
 FLOWS = {
@@ -27,12 +29,9 @@ EFFECTS = (
     "giesekus_mobility",
     "non_affine_motion",
     "ptt_linear",
-    "solvent_viscosity",
     "rate_gain",
     "rate_rise_time",
     "stress_offset",
-    "time_delay",
-    "tr(sigma)*I",
     "tr(sigma)*gammadot",
 )
 
@@ -175,6 +174,7 @@ def test_bad_input_is_refused_with_one_message(options, message):
         loop(make_dataset(UpperConvectedMaxwell()), **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "tried"), [(2.0, True), (20.0, False)])
 def test_terms_that_name_the_rate_are_not_tried_where_the_loop_must_extrapolate_far(factor, tried):
     flow = start_up(1.5 * factor)

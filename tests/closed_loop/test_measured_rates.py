@@ -16,6 +16,8 @@ from discover.protocols import measured_rate, start_up
 from discover.report.loop.verdict import loop_verdict
 from discover.simulate import simulate
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.05, 8.0, 80)
 EFFECTS = ("giesekus_mobility", "rate_rise_time", "rate_gain", "stress_offset")
 
@@ -131,6 +133,7 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     np.testing.assert_allclose(predicted, exact, atol=2e-3 * np.max(exact))
 
 
+@pytest.mark.slow
 def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     generator = np.random.default_rng(0)
     runs = [

@@ -11,6 +11,8 @@ from discover.protocols import start_up as protocol
 from discover.report.loop.found import what_was_found
 from discover.report.loop.next_step import what_to_measure_next
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {
     "slow.csv": (start_up(0.5), protocol(0.5), GROWTH),

@@ -12,6 +12,8 @@ from discover.effects import BY_MODE, make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.protocols import oscillatory_shear, start_up
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULI, TIMES = np.array([100.0, 50.0]), np.array([1.0, 0.1])
 FLOWS = {
     "slow": (start_up(1.0), lambda t: 1.0),
@@ -94,6 +96,7 @@ def test_two_mobilities_are_no_thixotropy_and_each_mode_gets_its_own():
         assert low - (high - low) / 2 < mobility < high + (high - low) / 2
 
 
+@pytest.mark.slow
 def test_a_thixotropy_that_is_there_stays():
     result = loop(runs((0.3, 0.3), breakdown=0.05))
     assert result.verdict == "effects_added"

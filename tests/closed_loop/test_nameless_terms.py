@@ -8,6 +8,8 @@ import discover as dc
 from discover.dataset import Dataset, Run
 from discover.protocols import start_up as protocol
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.1, 8.0, 60)
 TERM, NAME = "tr(sigma)*gammadot", "non_affine_motion"
 

@@ -11,6 +11,8 @@ from discover.dataset import Dataset, Run
 from discover.protocols import oscillatory_shear, start_up
 from discover.report.loop.verdict import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.1, 10.0, 100)
 FLOWS = {"slow": start_up(0.4), "fast": start_up(1.5), "wave": oscillatory_shear(1.5, 0.8)}
 RATES = {
@@ -42,7 +44,7 @@ def drawn(signal, noise, seed=0):
 
 @pytest.mark.parametrize("declared", [DECLARED, TO_FIT], ids=["known", "to_fit"])
 @pytest.mark.parametrize(
-    "seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))]
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3, 4))]
 )
 def test_pure_noise_is_no_signal(seed, declared):
     result = loop(drawn(lambda rate: 0.0 * rate, 5.0, seed), declared)

@@ -10,6 +10,8 @@ from discover.dataset.repeats import count_flows
 from discover.protocols.control import steady_rates
 from discover.report.loop.verdict import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 TIMES = np.linspace(0.1, 6.0, 40)
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 
@@ -40,7 +42,7 @@ def looped(*runs: dc.Run, **options):
     return dc.close_loop(data, BASE, effects=effects, max_effects=1, **options)
 
 
-@pytest.mark.parametrize("repeated", [False, True])
+@pytest.mark.parametrize("repeated", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_name_that_one_flow_alone_tells_is_less_likely_than_not(repeated):
     runs = [run("once", 2.0, 0), *([run("again", 2.0, 1)] if repeated else [])]
     loop = looped(*runs)
@@ -62,6 +64,7 @@ def test_a_name_that_two_flows_tell_is_believed():
     assert "Fitted, not tested" not in loop_verdict(loop)[0]
 
 
+@pytest.mark.slow
 def test_runs_that_other_searches_leave_out_in_turn_test_a_name():
     runs = run("slow", 0.7, 0), run("fast", 2.0, 1)
     alone, left_out = (

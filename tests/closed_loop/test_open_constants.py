@@ -6,6 +6,8 @@ from independent.folders import write_table
 
 import discover as dc
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 NOISE, MODULUS, TIME = 0.01, 100.0, 1.0
 BASE = dc.Fluid(dc.make_law("ucm"), 30.0, 0.5)
 

@@ -10,6 +10,8 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.closed_loop.explanations.other_benches import BENCH
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 FLOWS = {
     "slow.csv": (start_up(0.5), np.linspace(0.1, 8.0, 80)),
     "fast.csv": (start_up(2.0), np.linspace(0.1, 8.0, 80)),

@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 
 import discover as dc
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "stress_gain", "stress_offset"]
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
@@ -102,6 +104,7 @@ def test_n1_that_was_not_fitted_judges_a_law_found_in_the_stress_alone(tmp_path)
     assert loop.error_before.held_out > 1.0
 
 
+@pytest.mark.slow
 def test_the_page_of_a_flow_curve_has_the_rate_below_it_and_not_time(tmp_path):
     options = {"effects": EFFECTS, "max_effects": 1, "explanations": 1}
     loop = dc.close_loop(curve_folder(tmp_path, 0.3), BASE, **options)

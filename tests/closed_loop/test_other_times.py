@@ -13,6 +13,8 @@ from independent.maxwell import UpperConvectedMaxwell
 import discover as dc
 from discover.closed_loop.explanations.other_times import FACTOR
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 FLOWS = {
     "slow.csv": start_up(0.3),

@@ -10,6 +10,8 @@ from independent import Giesekus, Structured, start_up
 import discover as dc
 from discover.closed_loop import own_noise
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MOBILITY, MODULUS, TIME = 0.3, 100.0, 1.0
 NOISES = {0.5: 0.06, 2.0: 0.06, 5.0: 0.002}
 """Relative noise of each start-up, by its rate in 1/s: slow flows hardly move the transducer."""

@@ -31,6 +31,7 @@ def clean(planter):
     return planter.plant(noise=Noise(0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect", ["giesekus_mobility", "stress_drift", "thixotropy", "wall_slip", "time_delay"]
 )
@@ -40,6 +41,7 @@ def test_a_planted_effect_changes_the_stress_as_much_as_asked(planter, clean, ef
     assert relative_change(case, clean) == pytest.approx(0.12, rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", sorted(OUTSIDE))
 def test_a_mechanism_from_outside_changes_it_as_asked_and_is_in_no_dictionary(
     planter, clean, mechanism
@@ -50,6 +52,7 @@ def test_a_mechanism_from_outside_changes_it_as_asked_and_is_in_no_dictionary(
     assert relative_change(case, clean) == pytest.approx(0.12, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_same_seed_plants_the_same(planter):
     first, second = (planter.plant(["thixotropy"], seed=5) for _ in range(2))
     other = planter.plant(["thixotropy"], seed=6)
@@ -65,6 +68,12 @@ def test_noise_has_the_size_and_the_correlation_asked_for():
     assert neighbours == pytest.approx(0.6, abs=0.02)
 
 
+def test_a_base_that_is_no_law_is_refused():
+    with pytest.raises(InputError, match="base law"):
+        Planter("water")
+
+
+@pytest.mark.slow
 def test_what_cannot_be_planted_is_refused(planter):
     with pytest.raises(InputError, match="gremlins"):
         planter.plant(["gremlins"])
@@ -72,8 +81,6 @@ def test_what_cannot_be_planted_is_refused(planter):
         planter.plant(outside="gremlins")
     with pytest.raises(InputError, match="No admissible amplitude"):
         planter.plant(["finite_extensibility"], size=50.0)
-    with pytest.raises(InputError, match="base law"):
-        Planter("water")
 
 
 def loop(case):

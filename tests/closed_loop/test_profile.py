@@ -22,6 +22,8 @@ from discover.inference.problem import FitProblem
 from discover.inference.profile import profiled
 from discover.report.loop.verdict import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, PRODUCT, SOLVENT = 100.0, 0.5, 1.0
 
 

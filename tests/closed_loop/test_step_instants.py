@@ -19,6 +19,8 @@ from discover.forward.batches.rate_steps import RateSteps
 from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.report.loop.verdict import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01
 INSTANTS = {"up.csv": 4.01, "down.csv": 3.99, "stop.csv": 4.02, "judge.csv": 3.02}
 FLOWS = {
@@ -51,6 +53,7 @@ def loop(tmp_path_factory):
     return loop_on(tmp_path_factory.mktemp("data") / "steps", FLOWS)
 
 
+@pytest.mark.slow
 def test_the_law_is_found_behind_steps_that_the_samples_do_not_date(loop):
     # with straight lines between the samples the verdict is "unexplained"
     assert loop.verdict == "effects_added"
@@ -61,6 +64,7 @@ def test_the_law_is_found_behind_steps_that_the_samples_do_not_date(loop):
     assert loop.error_after.held_out == pytest.approx(NOISE, rel=0.3)
 
 
+@pytest.mark.slow
 def test_instants_are_told_with_intervals_that_hold_them(loop):
     found = loop.remaining["step_instants"]
     assert set(found) == set(INSTANTS)
@@ -77,12 +81,14 @@ def test_instants_are_told_with_intervals_that_hold_them(loop):
             assert high - low < 0.5 * (after - before)
 
 
+@pytest.mark.slow
 def test_the_verdict_says_that_instants_were_fitted(loop):
     said = " ".join(loop_verdict(loop))
     assert "steps between two samples" in said
     assert "those of a run held out to that run itself" in said
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_steps_where_the_rate_has_none(tmp_path):
     flows = {name: (start_up(1.0 + i), 5.0) for i, name in enumerate(FLOWS)}
     loop = loop_on(tmp_path, flows)

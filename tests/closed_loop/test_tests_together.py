@@ -7,6 +7,8 @@ from independent.folders import write_table
 
 import discover as dc
 
+pytestmark = pytest.mark.usefixtures("effects_alone")
+
 MOBILITY, MODULUS, TIME, SOLVENT = 0.3, 100.0, 1.0, 1.0
 FLUID = Giesekus(MOBILITY, MODULUS, TIME)
 
@@ -32,9 +34,8 @@ def slow_and_steady(folder, noise: float, samples: int):
 
 
 # 10 %: nothing of the mobility is in the start-ups, so no fit without the flow curve predicts it
-@pytest.mark.parametrize(
-    ("noise", "samples"), [pytest.param(0.1, 400, marks=pytest.mark.slow), (0.01, 3000)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("noise", "samples"), [(0.1, 400), (0.01, 3000)])
 def test_a_flow_curve_alone_shows_an_effect_beside_long_records_that_do_not(
     tmp_path, noise, samples
 ):

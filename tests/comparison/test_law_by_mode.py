@@ -229,8 +229,9 @@ def test_bands_hold_the_normal_stress_of_modes_that_the_runs_leave_open():
 
 
 def test_control_bands_stay_narrow_where_the_runs_determine_every_mode():
-    runs = records((0.25, 0.25, 0.25), (1.0, 5.0, 25.0))
-    flows = flows_of(runs, "training")
+    equal = (0.25, 0.25, 0.25)
+    runs, fast = records(equal, (1.0, 5.0, 25.0)), records(equal, (3.0,))
+    flows = [*flows_of(runs, "training"), *flows_of(fast, "held_out")]
     term = RecoveredTerm("sigma.sigma", 0.25)
     found = coefficients_in_modes(known_part(), [term], runs, flows)
     assert all(0.5 * band.widths()["N1"] < NOISE for band in found.bands.values())
@@ -351,6 +352,7 @@ def test_control_a_run_held_out_of_another_fluid_is_not(asked):
     assert asked((0.02, 0.05, 0.1), MOBILITIES, [stiffer]).said == ""
 
 
+@pytest.mark.slow
 def test_a_law_by_mode_that_a_run_held_out_refutes_explains_nothing(asked):
     (run,) = records(MOBILITIES, UNSEEN)
     stiffer = replace(run, stress=1.5 * run.stress)
@@ -361,12 +363,14 @@ def test_a_law_by_mode_that_a_run_held_out_refutes_explains_nothing(asked):
     assert open_where_modes_differ(NORMAL, law, in_library=True) == NORMAL
 
 
+@pytest.mark.slow
 def test_control_one_that_foretells_it_explains_both(asked):
     law = asked(FITTED, MOBILITIES, records(MOBILITIES, UNSEEN), explained=False).law
     assert law.explains
     assert not law.refuted
 
 
+@pytest.mark.slow
 def test_networks_that_slip_and_whose_junctions_are_lost_by_mode_are_found_with_their_n2(
     monkeypatch,
 ):

@@ -48,6 +48,7 @@ def along(data):
     return FittedAlong(declared, StudyData(data, data, data.select([])), LIBRARY)
 
 
+@pytest.mark.slow
 def test_the_law_is_found_with_its_modulus_and_its_time():
     fitted = along(held(3.0))
     fit, free = fitted.before.classical["ptt_linear"], fitted.constants
@@ -59,7 +60,9 @@ def test_the_law_is_found_with_its_modulus_and_its_time():
     assert np.max(fitted.before.classical["giesekus"].run_errors) > 0.05
 
 
-def test_a_coefficient_beyond_the_range_of_the_loop_lies_in_its_own_interval():
+def test_a_coefficient_beyond_the_range_of_the_loop_lies_in_its_own_interval(monkeypatch):
+    own = {"ptt_linear": CLASSICAL_EFFECTS["ptt_linear"]}
+    monkeypatch.setattr(before_learning, "CLASSICAL_EFFECTS", own)
     fitted = along(held(EXTENSIBILITY))
     term = RecoveredTerm("tr(sigma)*sigma", EXTENSIBILITY, ci95=(0.0, 20.0))
     law = law_of_terms(["tr(sigma)*sigma"], [EXTENSIBILITY], {}, True)

@@ -92,7 +92,7 @@ def holds(limits, exact):
 @pytest.mark.parametrize(
     ("material", "instrument", "names"),
     [
-        (FenePeterlin(30.0), None, {("finite_extensibility",)}),
+        pytest.param(FenePeterlin(30.0), None, {("finite_extensibility",)}, marks=pytest.mark.slow),
         (Giesekus(0.3), Instrument(lag=0.1), {("giesekus_mobility", "transducer_lag")}),
         # a lag and a rate that rises late give a Maxwell fluid one σ12, and two N1
         (

@@ -28,6 +28,7 @@ FLOWS = {
 FACTORS = {"slow.csv": 1.03, "fast.csv": 0.97, "middle.csv": 1.01, "held.csv": 1.025}
 FAR = {"slow.csv": 1.15, "fast.csv": 0.88, "middle.csv": 1.12, "held.csv": 0.9}
 MOBILITY = 0.3
+FEW_TERMS = {"library": {"degree": 0}, "max_terms": 2}
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def data_of(exact, factors):
 
 def compared(data, **options):
     fluid = dc.Fluid(dc.make_law("ucm"), [100.0], [1.0])
-    options = {"learners": ["tensor_sindy"], "quick": True, **options}
+    options = {"learners": ["tensor_sindy"], "quick": True, **FEW_TERMS, **options}
     return dc.compare(data, fluid, held_out=["held.csv"], **options)
 
 

@@ -70,6 +70,7 @@ def width_of_the_mobility(found) -> float:
     return high - low
 
 
+@pytest.mark.slow
 def test_a_noisy_n1_beside_a_quiet_stress_takes_nothing_from_what_the_stress_tells():
     found = found_in(Giesekus(MOBILITY, MODULUS, TIME))
     assert found.explanation.verdict == "explained"
@@ -77,6 +78,7 @@ def test_a_noisy_n1_beside_a_quiet_stress_takes_nothing_from_what_the_stress_tel
     assert width_of_the_mobility(found) < 6.0 * deviation()
 
 
+@pytest.mark.slow
 def test_with_equal_weights_the_noise_of_n1_leaves_a_pattern_in_the_stress(monkeypatch):
     monkeypatch.setattr(own_noise, "weights_by_noise", lambda *_: None)
     found = found_in(Giesekus(MOBILITY, MODULUS, TIME))
@@ -84,6 +86,7 @@ def test_with_equal_weights_the_noise_of_n1_leaves_a_pattern_in_the_stress(monke
     assert width_of_the_mobility(found) > 6.0 * deviation()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("as_users_run_it")
 def test_a_fluid_of_another_kind_stays_unexplained_beside_a_noisy_n1():
     found = found_in(Structured(2.0, (2.0,), in_modulus=True, modulus=MODULUS, mobility=0.0))

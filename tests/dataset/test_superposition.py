@@ -154,7 +154,10 @@ def relaxation(celsius, noise=None):
     return CREEP_TIMES, exact * np.exp(error)
 
 
-@pytest.mark.parametrize(("kind", "made"), [("creep", creep), ("relaxation", relaxation)])
+@pytest.mark.parametrize(
+    ("kind", "made"),
+    [("creep", creep), pytest.param("relaxation", relaxation, marks=pytest.mark.slow)],
+)
 def test_tables_over_time_alone_give_shifts_whose_intervals_hold_the_planted_ones(kind, made):
     inside = []
     for seed in range(6):
@@ -254,6 +257,7 @@ def test_tables_over_time_become_a_folder_of_their_own(tmp_path):
     assert "holds a creep.csv already" in again.output
 
 
+@pytest.mark.slow
 @pytest.mark.measured
 def test_polystyrene_superposes(measured_data, tmp_path):
     result = invoke(measured_data / "ps-linear", "--out", tmp_path / "master", "--vertical")

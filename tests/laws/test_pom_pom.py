@@ -22,10 +22,6 @@ ARMS, RATIO = 4.0, 0.3
 CONSTANTS = {"q": ARMS, "stretch_time_ratio": RATIO}
 TIMES = np.linspace(0.05, 4.0, 60)
 both = pytest.mark.parametrize("name", ["pom_pom", "pom_pom_drag_strain"])
-# where the drag strain has the factor alone that a start-up and a steady state of both hold
-mainly_one = pytest.mark.parametrize(
-    "name", ["pom_pom_drag_strain", pytest.param("pom_pom", marks=pytest.mark.slow)]
-)
 
 
 def independent(name, modulus=1.0, time=1.0):
@@ -54,9 +50,18 @@ def predicted(name, protocol, times, rate, modes=(), **columns):
     return of_records(name, run, *modes)[0]
 
 
-@both
 @pytest.mark.parametrize(
-    ("kind", "rate"), [("shear", 5.0), ("uniaxial", 1.5), ("planar", 1.0), ("biaxial", 0.6)]
+    ("name", "kind", "rate"),
+    [
+        ("pom_pom", "shear", 5.0),
+        ("pom_pom_drag_strain", "uniaxial", 1.5),
+        pytest.param("pom_pom_drag_strain", "shear", 5.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "uniaxial", 1.5, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "planar", 1.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom_drag_strain", "planar", 1.0, marks=pytest.mark.slow),
+        pytest.param("pom_pom", "biaxial", 0.6, marks=pytest.mark.slow),
+        pytest.param("pom_pom_drag_strain", "biaxial", 0.6, marks=pytest.mark.slow),
+    ],
 )
 def test_two_modes_are_those_of_full_tensors_in_every_flow(name, kind, rate):
     modulus, times = (1000.0, 300.0), (0.01, 2.0)
@@ -92,7 +97,8 @@ def test_the_error_of_fixed_steps_falls_with_their_fourth_power():
     assert np.all(orders > 3.5)
 
 
-@mainly_one
+@pytest.mark.slow
+@both
 def test_the_stress_of_a_flow_brings_its_strain_back(name):
     times = np.linspace(0.02, 3.0, 150)
     stress = exact(name, 2.0 * UNIT["shear"], times)[:, 0, 1]
@@ -112,7 +118,11 @@ def test_steady_shear_is_the_closed_form_that_has_a_maximum(name):
     assert found[-1] < np.max(found)
 
 
-@mainly_one
+@pytest.mark.parametrize(
+    # where the drag strain has the factor alone that a start-up and a steady state of both hold
+    "name",
+    ["pom_pom_drag_strain", pytest.param("pom_pom", marks=pytest.mark.slow)],
+)
 def test_steady_extension_hardens_to_the_square_of_the_arms(name):
     rates = np.array([0.1, 0.3, 0.45, 20.0])
     protocol = in_flow(steady_rates(rates), "uniaxial")
@@ -137,6 +147,7 @@ def _stretch(name, drawn):
     return low
 
 
+@pytest.mark.slow
 def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
     strain, frequency = 2.0, 1.0
     one = np.ones(1)
@@ -151,7 +162,8 @@ def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
     )
 
 
-@mainly_one
+@pytest.mark.slow
+@both
 def test_no_flow_takes_the_conformation_away(name):
     """σ + I = 3 Λ² S, and A stays positive definite: in a reversal at Wi 20 too."""
     fluid = Fluid.dimensionless(make_law(name, CONSTANTS))

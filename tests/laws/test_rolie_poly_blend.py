@@ -72,7 +72,7 @@ def by_the_loop(protocol, rate, modulus=(1.0,), time=(1.0,), times=TIMES, **colu
     ("kind", "rate"),
     [
         ("shear", 8.0),
-        ("uniaxial", 2.5),
+        pytest.param("uniaxial", 2.5, marks=pytest.mark.slow),
         pytest.param("planar", 1.5, marks=pytest.mark.slow),
         pytest.param("biaxial", 1.0, marks=pytest.mark.slow),
     ],
@@ -161,6 +161,7 @@ def test_with_ever_shorter_rouse_times_it_becomes_the_law_without_stretch():
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)
 
 
+@pytest.mark.slow
 def test_half_a_cycle_from_where_scipy_ends_ends_in_its_mirror_image():
     """What Newton's steps look for is what this leaves as it is."""
     strain, frequency, law = 3.0, 1.0, independent()

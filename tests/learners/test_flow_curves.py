@@ -59,6 +59,7 @@ def test_sensitivities_of_a_flow_curve_beside_a_transient_are_its_differences():
     assert float(jnp.linalg.norm(residual)) > 0.05
 
 
+@pytest.mark.slow
 def test_the_network_is_told_of_steady_states_as_their_differences_say():
     problem = make_training_problem([flow_curve(rates=SLOW), start()], np.ones(1), np.ones(1))
     law = initial_law(jax.random.key(0), 3, True, jnp.ones(8))

@@ -100,7 +100,9 @@ def fit_of(problem):
     return refit(problem, [(0,)], [(np.array([0.2]), np.zeros(0))], np.ones(1), 1)[0]
 
 
-@pytest.mark.parametrize("learner", ["tensor_sindy", "closed_loop"])
+@pytest.mark.parametrize(
+    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "closed_loop"]
+)
 def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(learner):
     """And by both ways to fit, without the sweep's noise several times too narrow."""
     off, narrow = [], []
@@ -236,6 +238,7 @@ def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
     assert inside[False] < 0.7
 
 
+@pytest.mark.slow
 def test_a_term_that_stands_for_errors_of_the_moduli_is_left_out():
     """Beside exact moduli the larger law is the better one in most draws."""
     terms = ("sigma.sigma", "gammadot", "I", "gammadot.gammadot")

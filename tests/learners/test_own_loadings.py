@@ -83,6 +83,7 @@ def test_sensitivities_are_those_with_the_factors_let_go():
     assert np.asarray(columns)[:, 3] == pytest.approx(slope, abs=1e-6 * np.max(np.abs(slope)))
 
 
+@pytest.mark.slow
 def test_sparse_regression_holds_the_mobility_whatever_the_loadings():
     found = dc.TensorSINDy(modulus=100.0).fit(runs_of(FACTORS)).result_
     assert [term.term for term in found.terms] == ["sigma.sigma"]

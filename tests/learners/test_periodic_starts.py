@@ -61,6 +61,7 @@ def up():
 observed = eqx.filter_jit(observe)
 
 
+@pytest.mark.slow
 def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
     runs = [swing(2.0), up()]
     problem = make_problem(runs, FEW, MODULUS, TIME)
@@ -98,6 +99,7 @@ def test_what_a_law_predicts_is_what_scipy_finds_after_many_cycles():
     assert np.linalg.norm(found[1, : len(run), 0] - exact) > 0.05 * np.linalg.norm(exact)
 
 
+@pytest.mark.slow
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
     problem = training_problem([swing(2.0), up()], np.array([MODULUS]), np.array([TIME]))
     law = TensorBasisNetwork.initialise(jax.random.key(0), width=4)

@@ -38,7 +38,13 @@ def predicted(runs, law):
     return np.asarray(observed_in_batch(fluid, flows))[..., 0], flows.n_steps
 
 
-@pytest.mark.parametrize("law", [("giesekus", {"alpha": 0.4}), ("johnson_segalman", {"xi": 0.3})])
+@pytest.mark.parametrize(
+    "law",
+    [
+        ("giesekus", {"alpha": 0.4}),
+        pytest.param(("johnson_segalman", {"xi": 0.3}), marks=pytest.mark.slow),
+    ],
+)
 def test_laws_record_the_same_on_shortened_runs_in_few_steps(law):
     runs = records(noise=0.0)
     whole, many = predicted(runs, law)

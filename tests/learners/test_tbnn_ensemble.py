@@ -87,6 +87,7 @@ def constant():
     return TBNNUDE(recipe=RECIPE).fit(data.runs)
 
 
+@pytest.mark.slow
 def test_where_constants_suffice_members_learn_from_halves_of_the_runs(constant):
     assert len(constant.members_) == len(constant.ensemble_fluids_) == 3  # the default
     assert constant.result_.details["ensemble"] == "trained on halves of the runs"
@@ -96,6 +97,7 @@ def test_where_constants_suffice_members_learn_from_halves_of_the_runs(constant)
     np.testing.assert_allclose(mobilities[0], 0.3, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_members_that_fit_are_handed_on_and_the_others_are_not(constant):
     fits = [member["fits"] for member in constant.result_.details["members"]]
     assert fits[0]

@@ -90,6 +90,7 @@ def swept(law, strains, together):
     return np.asarray(solved(law)[:, 0])
 
 
+@pytest.mark.slow
 def test_once_one_strain_has_no_periodic_state_no_other_of_a_sweep_is_solved_for():
     # a trial law that drives itself: periodic up to a strain of 0.437, where it takes many steps
     runaway, strains = Fluid(Giesekus(-1.2), MODULUS, TIME, SOLVENT), (0.1, 0.435, 10.0)
@@ -115,7 +116,11 @@ def test_steady_states_are_solved_for_once_each_however_many_samples_stand_besid
 
 
 @pytest.mark.parametrize(
-    ("protocol", "times"), [(imposed_stress(TIMES, STRESS), TIMES), (SWEEP, COUNTED)]
+    ("protocol", "times"),
+    [
+        (imposed_stress(TIMES, STRESS), TIMES),
+        pytest.param(SWEEP, COUNTED, marks=pytest.mark.slow),
+    ],
 )
 def test_derivatives_forward_and_in_reverse_are_differences(protocol, times):
     flows = lay_out([protocol], [times])

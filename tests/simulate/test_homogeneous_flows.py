@@ -104,7 +104,7 @@ def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learner
     np.testing.assert_allclose(recorded_at(run.protocol, found), exact, rtol=2e-5)
 
 
-@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize("sampled", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_an_oscillation_that_had_gone_on_is_periodic_from_its_first_sample(sampled):
     period = 2.0 * np.pi / 2.0
     times = np.linspace(0.0, 2.0 * period, 129)

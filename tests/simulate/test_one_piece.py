@@ -31,7 +31,11 @@ def products(function, *arguments) -> int:
 # in creep, which takes four times as long to compile, all of them are slow
 @pytest.mark.parametrize(
     ("run", "terms"),
-    [(START_UP, None), (CREEP, 2), pytest.param(CREEP, None, marks=pytest.mark.slow)],
+    [
+        (START_UP, None),
+        pytest.param(CREEP, 2, marks=pytest.mark.slow),
+        pytest.param(CREEP, None, marks=pytest.mark.slow),
+    ],
     ids=["start", "creep, two terms", "creep"],
 )
 def test_no_candidate_of_the_loop_brings_a_matrix_product_into_the_steps(run, terms):

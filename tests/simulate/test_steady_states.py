@@ -93,7 +93,9 @@ def followed_until_steady(rate, constants):
 CHAINS = {"stretch_time_ratio": 0.25, "beta": 0.0, "maximum_stretch": 5.0}
 
 
-@pytest.mark.parametrize("name", ["fene_p", "rolie_poly_fene"])
+@pytest.mark.parametrize(
+    "name", ["fene_p", pytest.param("rolie_poly_fene", marks=pytest.mark.slow)]
+)
 def test_chains_that_end_have_the_steady_state_of_their_start_up_however_fast(name):
     """FENE-P is at rest without strength too, where the steps used to end from Wi 100 on."""
     if name == "fene_p":

@@ -23,7 +23,7 @@ def noise(correlation=0.0, seed=0, size=0.01):
     return drawn / np.sqrt(SAMPLES)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.6])
+@pytest.mark.parametrize("correlation", [pytest.param(0.0, marks=pytest.mark.slow), 0.6])
 def test_noise_is_rarely_taken_for_structure(correlation):
     taken = [not is_noise(noise(correlation, seed), WEIGHT) for seed in range(100)]
     # significance 0.001: more than 3 of 100 has a probability below 1e-5
