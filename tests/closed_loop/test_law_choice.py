@@ -141,7 +141,6 @@ def found_beside(material, names, effects):
     )
 
 
-@pytest.mark.slow
 def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
     found = found_beside(material, ("ucm", "white_metzner"), ["thixotropy"])
@@ -151,7 +150,6 @@ def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
 
 
-@pytest.mark.slow
 def test_control_a_law_that_is_there_stays_beside_an_effect():
     material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
     found = found_beside(material, ("ucm", "giesekus"), ["thixotropy"])

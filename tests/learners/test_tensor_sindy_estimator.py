@@ -102,7 +102,6 @@ def test_exponential_ptt_comes_back_with_its_inner_parameter():
     assert model.terms_[0].inner["epsilon"] == pytest.approx(0.4, abs=1e-3)
 
 
-@pytest.mark.slow
 def test_a_coefficient_that_may_be_one_tells_more_of_the_inner_parameter():
     noisy = small_dataset("ptt_exponential", {"epsilon": 0.4}, noise=0.02, seed=3)
     (term,) = TensorSINDy(LIBRARY, **OF_ONE_TERM).fit(noisy).terms_
@@ -115,7 +114,6 @@ def test_a_coefficient_that_may_be_one_tells_more_of_the_inner_parameter():
     assert value == pytest.approx(0.4, rel=0.02)
 
 
-@pytest.mark.slow
 def test_a_coefficient_that_is_not_one_is_not_taken_for_it():
     law = LibraryExpansion(
         jnp.array([0.5]), jnp.array([0.7]), LIBRARY.subset([LIBRARY.names.index(EXPONENTIAL)])
