@@ -11,7 +11,7 @@ from discover.closed_loop.added_mode_apart import (
     start_from,
 )
 from discover.closed_loop.candidates import admission
-from discover.closed_loop.explanations import Carried, search_and_carry
+from discover.closed_loop.explanations import FACTORS, Carried, search_and_carry
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law, law_beside_effects
@@ -21,7 +21,7 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
 from discover.closed_loop.small_strains import find_instrument_effects
 from discover.dataset import Run
-from discover.effects import BY_MODE, AbstractEffect
+from discover.effects import BY_MODE, AbstractEffect, make_effect
 from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.forward.declared import may_differ_by_mode
 from discover.inference.constants import ConstantByMode
@@ -196,14 +196,19 @@ class SearchTask:
         instead: tuple[Search, LawByMode] | None = None,
     ) -> SearchResult:
         # of one mode nothing can differ from another's
-        asked = [*self.candidates, BY_MODE] if len(declared.modulus) > 1 else self.candidates
+        by_mode = [BY_MODE] if len(declared.modulus) > 1 else []
+        names = {e.name for e in (*self.candidates, *declared.effects)}
+        # no candidates, but a bench may have a little of them
+        unasked = {*FACTORS} - names
+        asked = [*self.candidates, *map(make_effect, sorted(unasked)), *by_mode]
         model = AugmentedModel(declared, asked, data_scales(self.fitted))
+        admitted = admission(self.fitted, self.held_out)
         search = Search(
             model,
             self._batch,
             self._held_batch,
             len(self.candidates),
-            admission(self.fitted, self.held_out),
+            lambda effect: effect.name not in unasked and admitted(effect),
             ToleratedMisfit(
                 Expectation(self.noise, declared.linear_error),
                 NumericalResolution(model, self._batch, self.fitted),

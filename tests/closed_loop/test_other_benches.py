@@ -18,7 +18,8 @@ FLOWS = {
     "wave.csv": (oscillation(2.0, 1.0), np.linspace(0.1, 12.0, 120)),
     "unseen.csv": (start_up(3.0), np.linspace(0.1, 8.0, 80)),
 }
-EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag", "rate_gain"]
+# gains of rate and stress are no candidates, and a bench may have them all the same
+EFFECTS = ["giesekus_mobility", "tool_compliance", "transducer_lag"]
 
 
 def loop_of(folder, **faults):
@@ -44,7 +45,9 @@ def test_a_clock_that_is_fast_is_no_tool_that_yields(tmp_path):
     assert max([0.0, *(p for name, p in named.items() if name != "giesekus_mobility")]) < 0.5
     beside = next(one for one in loop.explanations.likeliest_first if one.bench)
     assert beside.effects == ("giesekus_mobility",)
-    assert beside.bench["rates"] == pytest.approx(-0.02, abs=0.008)
+    # at small rates a stress that reads less is like a rate that is less
+    factor = beside.bench["rates"] + beside.bench["stresses"]
+    assert factor == pytest.approx(-0.02, abs=0.008)
     assert beside.bench["relaxation times"] == pytest.approx(0.02, abs=0.008)
     assert all(BENCH in s.aliases for s in loop.stages if s.effect != "giesekus_mobility")
     assert "check gap, calibration and temperature" in loop.remaining["description"]

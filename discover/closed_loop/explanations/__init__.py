@@ -5,7 +5,7 @@ from discover.closed_loop.explanations.bands.wider_intervals import (
     over_explanations,
 )
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
-from discover.closed_loop.explanations.other_benches import OtherBench, other_benches
+from discover.closed_loop.explanations.other_benches import FACTORS, OtherBench, other_benches
 from discover.closed_loop.explanations.other_times import weighed_times
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
@@ -13,6 +13,7 @@ from discover.closed_loop.explanations.untested import why_untested
 
 __all__ = [
     "BEAM_WIDTH",
+    "FACTORS",
     "Carried",
     "OtherBench",
     "explain",

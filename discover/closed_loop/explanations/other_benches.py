@@ -35,6 +35,9 @@ _FAULTS = {
 }
 """Effects that a bench may have a little of, and what is more than told by them."""
 
+FACTORS = tuple(name for name in _FAULTS if name != _TOOL)
+"""Of these, those that a bench may have where they are no candidates."""
+
 
 @dataclass(frozen=True)
 class OtherBench:
