@@ -12,6 +12,8 @@ from scipy.optimize import nnls
 
 from discover.dataset.columns import as_column
 from discover.errors import InputError
+from discover.statistics.residual import slow_part
+from discover.statistics.whiteness import FEWEST_FAST, SIGNIFICANCE, separate_probability
 
 MOST_MODES = 30
 TOLERANCE = 1.5
@@ -109,6 +111,9 @@ class RelaxationSpectrum:
     modulus_covariance
         Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
         leaves them; None where they do not come from one.
+    pattern
+        Root mean square of what in that misfit is no noise; 0 where all of it may be. Of modes too
+        few to follow the sweep there is some.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -117,6 +122,7 @@ class RelaxationSpectrum:
     best_error: float
     errors: dict[int, float]
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    pattern: float = 0.0
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -178,7 +184,9 @@ def relaxation_spectrum(
     # more unknowns than data would fit the noise
     most_modes = min(most_modes, len(sweep.angular_frequency))
     found = fewest_modes(partial(_fit, sweep), most_modes, tolerance)
-    return replace(found, modulus_covariance=_covariance(sweep, found))
+    return replace(
+        found, modulus_covariance=_covariance(sweep, found), pattern=_pattern(sweep, found)
+    )
 
 
 def fewest_modes(
@@ -240,3 +248,18 @@ def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarr
     free = max(len(design) - len(found), 1)
     variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
     return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)
+
+
+def _pattern(sweep: LinearSweep, found: RelaxationSpectrum) -> float:
+    """Return the root mean square of what in the misfit is no noise: neighbours that agree.
+
+    Of a sweep too short to tell, all of it.
+    """
+    design = _relative_moduli(sweep, found.relaxation_time)
+    rows = np.split(design @ found.modulus - 1.0, 2)
+    order = np.argsort(sweep.angular_frequency)
+    if len(order) < FEWEST_FAST:
+        return found.relative_error
+    if separate_probability([row[order] for row in rows]) > SIGNIFICANCE:
+        return 0.0
+    return float(np.sqrt(np.mean([slow_part(row[order]) ** 2 for row in rows])))
