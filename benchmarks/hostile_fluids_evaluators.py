@@ -4,13 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from hostile_fluids_benches import Record, Sampled, ramped
-from hostile_fluids_records import FLOWS, GIESEKUS, UCM, _record, recorded
-from independent import oscillation, start_up, steps
+from hostile_fluids_records import FLOWS, GIESEKUS, Record, Sampled, _record, recorded
+from independent import start_up, steps
 from independent.flow import Flow
 from independent.folders import maxwell_sweep
 from independent.instruments import Instrument
-from independent.material import RateLaw, integrate, rate_tensor
+from independent.material import RateLaw, integrate
 from independent.sweeps import modulus_of
 from scipy.integrate import solve_ivp
 
@@ -39,6 +38,7 @@ SLOW_START: Sampled = {
     "held.csv": (start_up(0.6), np.linspace(0.1, 8.0, 80)),
 }
 
+
 def digitised(law: RateLaw, jitter: float = 0.01) -> Maker:
     """Return the maker of curves that a hand read from a plot: times that are off, too."""
 
@@ -52,6 +52,7 @@ def digitised(law: RateLaw, jitter: float = 0.01) -> Maker:
 
     return make
 
+
 def read_by_hand(size: float, correlation: float = 0.7):
     """Return the error of a hand along a curve, in shares of each value."""
 
@@ -64,6 +65,7 @@ def read_by_hand(size: float, correlation: float = 0.7):
         return stress * (1 + size * error)
 
     return put
+
 
 def pulled(law: RateLaw, told: Callable[[np.ndarray, np.ndarray, float], np.ndarray]) -> Maker:
     """Return the maker of uniaxial extensions whose stress is told otherwise.
@@ -84,15 +86,18 @@ def pulled(law: RateLaw, told: Callable[[np.ndarray, np.ndarray, float], np.ndar
 
     return make
 
+
 def _pulled_record(times: np.ndarray, rate: float, stress: np.ndarray) -> Record:
     columns = {
         "time_s": times, "hencky_rate_1_s": np.full(len(times), rate), "tensile_stress_Pa": stress
     }  # fmt: skip
     return Record(columns, "tensile_stress_Pa", {"flow": "uniaxial"})
 
+
 def over_first_area(stress: np.ndarray, times: np.ndarray, rate: float) -> np.ndarray:
     """Return force over the first area: σ exp(−ε)."""
     return stress * np.exp(-rate * times)
+
 
 def necked(law: RateLaw, begins: float = 1.5, more: float = 0.6) -> Maker:
     """Return the maker of extensions that neck: beyond a strain it is faster in the middle.
@@ -122,6 +127,7 @@ def necked(law: RateLaw, begins: float = 1.5, more: float = 0.6) -> Maker:
 
     return make
 
+
 def planar_told_uniaxial(law: RateLaw) -> Maker:
     """Return the maker of planar extensions that are told to be uniaxial."""
 
@@ -140,6 +146,7 @@ def planar_told_uniaxial(law: RateLaw) -> Maker:
         return made
 
     return make
+
 
 def ringing_creep(law: RateLaw, inertia: float, solvent: float = 2.0) -> Maker:
     """Return the maker of creep with the inertia of a tool: I γ'' = σ − what the fluid carries."""
@@ -172,6 +179,7 @@ def ringing_creep(law: RateLaw, inertia: float, solvent: float = 2.0) -> Maker:
 
     return make
 
+
 def with_first_difference(
     told: Callable[[np.ndarray, Record], np.ndarray], noise: float = 0.01
 ) -> Callable[[str, Record], Record]:
@@ -185,6 +193,7 @@ def with_first_difference(
 
     return change
 
+
 def late_axially(lag: float):
     """Return N1 behind a soft axis: it follows with a time."""
 
@@ -197,14 +206,17 @@ def late_axially(lag: float):
 
     return told
 
+
 def thrown_out(size: float):
     """Return N1 less what the inertia of the fluid takes, in proportion to the rate squared."""
     return lambda times, run: run.N1 - size * run.columns["shear_rate_1_s"] ** 2
+
 
 def of_plates(times: np.ndarray, run: Record) -> np.ndarray:
     """Return N1 − N2, which the thrust of parallel plates tells, for N1."""
     del times
     return run.N1 - run.N2
+
 
 def settling(first: float = 8.0, time: float = 25.0):
     """Return the change of a record: a solvent whose particles settle while the session lasts."""
@@ -217,6 +229,7 @@ def settling(first: float = 8.0, time: float = 25.0):
 
     return change
 
+
 def soft_steps(rise: float, law: RateLaw = GIESEKUS) -> Maker:
     """Return the maker of steps of the rate that take their time, told as at once."""
 
@@ -226,9 +239,11 @@ def soft_steps(rise: float, law: RateLaw = GIESEKUS) -> Maker:
 
     return make
 
+
 def spliced(at: float, more: float):
     """Return a stress whose first part another card recorded, with a gain of its own."""
     return lambda name, time, stress: stress * (1 + more * (time < at))
+
 
 def humming(size: float, frequency: float):
     """Return a stress with a hum that begins anywhere in each run."""
@@ -238,15 +253,18 @@ def humming(size: float, frequency: float):
 
     return told
 
+
 def sticking(name: str, time: np.ndarray, stress: np.ndarray) -> np.ndarray:
     """Return a stress that in the fast run sticks and slips, by 6 %, every 0.7 s."""
     if name != "fast.csv":
         return stress
     return stress * (1 - 0.06 * ((time / 0.7) % 1.0) * (stress > 60.0))
 
+
 def rested(shares: Mapping[str, float], time: float = 4.0):
     """Return a stress of a structure that has not come back from the run before."""
     return lambda name, t, stress: stress * (1 - shares[name] * np.exp(-t / time))
+
 
 def distorted(third: float, law: RateLaw = GIESEKUS) -> Maker:
     """Return the maker of runs whose wave has a third harmonic that nobody told."""
@@ -265,26 +283,29 @@ def distorted(third: float, law: RateLaw = GIESEKUS) -> Maker:
 
     return make
 
+
 def sweep_at(law: RateLaw, strain: float, low: float = 0.03, high: float = 50.0):
     """Return the maker of a sweep at a strain that is not small, told as linear."""
 
     def make() -> dict[str, dict[str, np.ndarray]]:
         frequencies = np.geomspace(low, high, 17)
         found = np.array([modulus_of(law, strain, omega, 8) for omega in frequencies])
-        return {
-            "lve.csv": {"omega_rad_s": frequencies, "Gp_Pa": found.real, "Gpp_Pa": found.imag}
-        }
+        return {"lve.csv": {"omega_rad_s": frequencies, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
 
     return make
 
+
 _RATES = np.geomspace(0.05, 20.0, 30)
+
 
 def _steady(law: RateLaw, rates: np.ndarray) -> np.ndarray:
     ends = np.array([20.0, 60.0])
     return np.array([law.respond(start_up(rate), ends).sigma12[-1] for rate in rates])
 
+
 def _curve(rates: np.ndarray, stress: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
     return {"flow_curve.csv": {"shear_rate_1_s": rates, "stress_Pa": stress}}
+
 
 def in_haste(law: RateLaw, each: float = 1.0):
     """Return the maker of a flow curve swept upwards, with a time for each point."""
@@ -295,6 +316,7 @@ def in_haste(law: RateLaw, each: float = 1.0):
         return _curve(_RATES, found.sigma12)
 
     return make
+
 
 def apparent(law: RateLaw):
     """Return the maker of a flow curve of a capillary at rates as of a Newtonian fluid."""
@@ -311,6 +333,7 @@ def apparent(law: RateLaw):
 
     return make
 
+
 def by_cox_and_merz(modulus: float, time: float):
     """Return the maker of a flow curve that nobody measured: |η*| of one mode."""
 
@@ -319,10 +342,12 @@ def by_cox_and_merz(modulus: float, time: float):
 
     return make
 
+
 def broad(count: int = 10):
     """Return moduli and times of a broad spectrum, evenly in log time."""
     times = np.geomspace(20.0, 0.04, count)
     return 60.0 * np.exp(-0.5 * (np.log(times / 0.3) / 2.0) ** 2), times
+
 
 def sweep_of_modes(moduli: np.ndarray, times: np.ndarray):
     """Return the maker of a linear sweep of these modes."""
@@ -332,5 +357,3 @@ def sweep_of_modes(moduli: np.ndarray, times: np.ndarray):
         return {"lve.csv": maxwell_sweep(moduli, times, frequencies)}
 
     return make
-
-__all__ = ["UCM", "oscillation", "ramped", "rate_tensor"]

@@ -17,8 +17,8 @@ from discover.closed_loop.judging.judgement import Judgement, judge
 from discover.closed_loop.judging.left_out_in_turn import judged_in_turn
 from discover.closed_loop.judging.loadings import judged_by_loadings
 from discover.closed_loop.judging.misread_runs import judged_as_read
-from discover.closed_loop.judging.sweep_error import judged_beyond_sweep
 from discover.closed_loop.judging.silence import Silence, fluid_is_silent
+from discover.closed_loop.judging.sweep_error import judged_beyond_sweep
 from discover.dataset import Run
 from discover.dataset.checking.start import doubts_of_start
 

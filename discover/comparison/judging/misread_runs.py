@@ -22,6 +22,7 @@ from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import root_of
+from discover.statistics.beyond_sweep import ADVICE, REASON, beyond_the_sweep
 from discover.statistics.misread import (
     OF_MODES,
     POSSIBLE,
@@ -36,6 +37,7 @@ from discover.statistics.misread import (
 from discover.statistics.outliers import stray
 from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import Expectation
+from discover.words import percent_of
 
 _MODES_ASKED = 12
 
@@ -69,10 +71,27 @@ def hold_against_misreading(
         found = _described_better(explanation, name, outcomes[name], flows, bands, own)
         if found is not None:
             return as_misread(found)
-        return None if own is None else _with_one_more_mode(own, flows, explanation.expectation)
+        if own is None:
+            return None
+        beyond = _beyond_the_sweep(own, flows, explanation.expectation)
+        return beyond or _with_one_more_mode(own, flows, explanation.expectation)
 
     held = hold_against(explanation, refutation_of)
     return hold_against_smaller_laws(held, outcomes, flows, law)
+
+
+def _beyond_the_sweep(
+    law: MovedLaw, flows: Sequence[Flow], expectation: Expectation
+) -> Refutation | None:
+    """Return what refutes a law that only the sweep's error excuses, of what that cannot change."""
+    spectrum = law.declared.spectrum
+    if spectrum is None or law.inner:
+        return None
+    fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
+    every = readings_of(law, flows) if len(fitted) < len(flows) else []
+    asked = [beyond_the_sweep(runs, expectation, spectrum.pattern) for runs in (fitted, every)]
+    beyond = next((one for one in asked if one is not None), None)
+    return None if beyond is None else Refutation(REASON.format(percent_of(beyond.misfit)), ADVICE)
 
 
 def _with_one_more_mode(
