@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from discover.dataset.columns import as_column
 from discover.errors import InputError
 from discover.statistics.residual import slow_part
-from discover.statistics.whiteness import FEWEST_FAST, SIGNIFICANCE, separate_probability
+from discover.statistics.whiteness import FEWEST_FAST, noise_probability, separate_probability
 
 MOST_MODES = 30
 TOLERANCE = 1.5
@@ -21,6 +21,9 @@ FLOOR = 0.01
 """A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
 
 MARGINS = (0.0, 0.25, 0.5)
+
+_SEEMS_NOISE = 0.05
+"""Probability that noise leaves such a misfit, up to which it is taken to be none."""
 
 
 @dataclass(frozen=True)
@@ -251,15 +254,28 @@ def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarr
 
 
 def _pattern(sweep: LinearSweep, found: RelaxationSpectrum) -> float:
-    """Return the root mean square of what in the misfit is no noise: neighbours that agree.
+    """Return the root mean square of what in the misfit is no noise.
 
-    Of a sweep too short to tell, all of it.
+    Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
+    leave less than these by more than the freedom that they have. Of a sweep too short to tell it
+    is all of the misfit.
     """
     design = _relative_moduli(sweep, found.relaxation_time)
-    rows = np.split(design @ found.modulus - 1.0, 2)
     order = np.argsort(sweep.angular_frequency)
+    rows = np.split(design @ found.modulus - 1.0, 2)
+    rows = np.array([row[order] for row in rows])
     if len(order) < FEWEST_FAST:
         return found.relative_error
-    if separate_probability([row[order] for row in rows]) > SIGNIFICANCE:
-        return 0.0
-    return float(np.sqrt(np.mean([slow_part(row[order]) ** 2 for row in rows])))
+    count = rows.size
+
+    def variance(modes: int, error: float) -> float:
+        return error**2 * count / max(count - modes, 1)
+
+    least = min(variance(modes, error) for modes, error in found.errors.items())
+    coarse = np.sqrt(max(variance(len(found), found.relative_error) - least, 0.0))
+    chance = len(rows) * min(separate_probability([row]) for row in rows)
+    of_all = noise_probability(rows, np.ones_like(rows))
+    if min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE:
+        return min(float(coarse), found.relative_error)
+    slow = float(np.sqrt(np.mean([slow_part(row) ** 2 for row in rows])))
+    return min(max(slow, float(coarse)), found.relative_error)

@@ -67,7 +67,8 @@ def swept(noise, count, seed=0, **options):
 
 
 def test_what_modes_miss_of_a_sweep_is_noise_or_the_pattern_of_modes_too_few():
-    patterns = [swept(0.02, 3, seed).pattern for seed in range(20)]
-    assert sum(pattern > 0.0 for pattern in patterns) <= 1
-    few = swept(0.005, 9, most_modes=3)
+    patterns = [swept(0.02, 3, seed).pattern for seed in range(12)]
+    assert np.median(patterns) < 0.008
+    assert max(patterns) < 0.02
+    few = swept(0.005, 9, most_modes=5)
     assert 0.8 * few.relative_error < few.pattern <= few.relative_error
