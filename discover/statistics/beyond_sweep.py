@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from discover.statistics.lack_of_fit import LackOfFit, what_is_left
 from discover.statistics.projection import without
@@ -21,16 +22,18 @@ REASON = "what is left ({}) has a pattern that no error of the moduli of the swe
 
 ADVICE = "measure the sweep to frequencies as high, and as low, as the times and rates of the runs"
 
+_TOO_FAR = 1e-4
 _SMALLEST = 1e-6  # of records, that computed ones are accurate to
 
 
 def beyond_the_sweep(
     runs: Sequence[Reading], expectation: Expectation, pattern: float
 ) -> LackOfFit | None:
-    """Return what is left of runs beside all that the sweep excuses; None where that is noise.
+    """Return what the sweep does not excuse of what is left of runs; None where it excuses all.
 
     The constants of the law, and errors of the moduli of unit variance, move to where both leave
-    least, noise taken for white: a kind that is correlated lets them go further.
+    least, noise taken for white: a kind that is correlated lets them go further. Nothing is
+    excused where the errors have to be far larger than the sweep allows (probability below 1e-4).
 
     Parameters
     ----------
@@ -47,7 +50,8 @@ def beyond_the_sweep(
         return None
     without_sweep = replace(expectation, linear_error=pattern)
     records = [run.predicted - run.residual for run in runs]
-    if _left(runs, [run.residual for run in runs], records, without_sweep) is None:
+    before = _left(runs, [run.residual for run in runs], records, without_sweep)
+    if before is None:
         return None
     session = Session(runs)
     if not session.is_told or session.shared is None:
@@ -65,8 +69,10 @@ def beyond_the_sweep(
     design = without(columns, errors)
     asked = without(columns, residual)
     normal = design.T @ design + np.eye(errors.shape[1])
-    moved = residual - errors @ np.linalg.solve(normal, design.T @ asked)
-    moved = without(columns, moved) * noise
+    step = np.linalg.solve(normal, design.T @ asked)
+    if chi2.sf(step @ step, len(step)) <= _TOO_FAR:
+        return before
+    moved = without(columns, residual - errors @ step) * noise
     rows = [
         moved[part] / weight for part, weight in zip(session.rows, session.weights, strict=True)
     ]
