@@ -18,6 +18,7 @@ from discover.closed_loop.judging.left_out_in_turn import judged_in_turn
 from discover.closed_loop.judging.loadings import judged_by_loadings
 from discover.closed_loop.judging.misread_runs import judged_as_read
 from discover.closed_loop.judging.silence import Silence, fluid_is_silent
+from discover.closed_loop.judging.sweep_error import judged_beyond_sweep
 from discover.dataset import Run
 from discover.dataset.checking.start import doubts_of_start
 
@@ -73,6 +74,10 @@ def verdict_on(
     judgement = judged_as_read(
         judgement, *final.readings, tolerated.expectation,
         tolerated.resolution, final.fit.theta, active,
+    )  # fmt: skip
+    judgement = judged_beyond_sweep(
+        judgement, *final.readings, tolerated, final.model.declared.linear_pattern,
+        final.fit.theta, active,
     )  # fmt: skip
     judgement = judged_by_loadings(judgement, final.loadings, final.loading)
     times = other_times(search, final.carried, judgement) if final.carried else []

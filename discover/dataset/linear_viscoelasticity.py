@@ -12,6 +12,8 @@ from scipy.optimize import nnls
 
 from discover.dataset.columns import as_column
 from discover.errors import InputError
+from discover.statistics.residual import slow_part
+from discover.statistics.whiteness import FEWEST_FAST, noise_probability, separate_probability
 
 MOST_MODES = 30
 TOLERANCE = 1.5
@@ -19,6 +21,9 @@ FLOOR = 0.01
 """A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
 
 MARGINS = (0.0, 0.25, 0.5)
+
+_SEEMS_NOISE = 0.05
+"""Probability that noise leaves such a misfit, up to which it is taken to be none."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,9 @@ class RelaxationSpectrum:
     modulus_covariance
         Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
         leaves them; None where they do not come from one.
+    pattern
+        Root mean square of what in that misfit is no noise; 0 where all of it may be. Of modes too
+        few to follow the sweep there is some.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -117,6 +125,7 @@ class RelaxationSpectrum:
     best_error: float
     errors: dict[int, float]
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    pattern: float = 0.0
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -178,7 +187,9 @@ def relaxation_spectrum(
     # more unknowns than data would fit the noise
     most_modes = min(most_modes, len(sweep.angular_frequency))
     found = fewest_modes(partial(_fit, sweep), most_modes, tolerance)
-    return replace(found, modulus_covariance=_covariance(sweep, found))
+    return replace(
+        found, modulus_covariance=_covariance(sweep, found), pattern=_pattern(sweep, found)
+    )
 
 
 def fewest_modes(
@@ -240,3 +251,31 @@ def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarr
     free = max(len(design) - len(found), 1)
     variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
     return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)
+
+
+def _pattern(sweep: LinearSweep, found: RelaxationSpectrum) -> float:
+    """Return the root mean square of what in the misfit is no noise.
+
+    Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
+    leave less than these by more than the freedom that they have. Of a sweep too short to tell it
+    is all of the misfit.
+    """
+    design = _relative_moduli(sweep, found.relaxation_time)
+    order = np.argsort(sweep.angular_frequency)
+    rows = np.split(design @ found.modulus - 1.0, 2)
+    rows = np.array([row[order] for row in rows])
+    if len(order) < FEWEST_FAST:
+        return found.relative_error
+    count = rows.size
+
+    def variance(modes: int, error: float) -> float:
+        return error**2 * count / max(count - modes, 1)
+
+    least = min(variance(modes, error) for modes, error in found.errors.items())
+    coarse = np.sqrt(max(variance(len(found), found.relative_error) - least, 0.0))
+    chance = len(rows) * min(separate_probability([row]) for row in rows)
+    of_all = noise_probability(rows, np.ones_like(rows))
+    if min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE:
+        return min(float(coarse), found.relative_error)
+    slow = float(np.sqrt(np.mean([slow_part(row) ** 2 for row in rows])))
+    return min(max(slow, float(coarse)), found.relative_error)

@@ -25,6 +25,11 @@ POSSIBLE = 0.1
 """Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
 right laws in white noise one in twenty-five, in noise correlated to 0.9 one in five."""
 
+OF_MODES = (
+    "measure the linear moduli over these times and declare all modes, or let `close-loop` fit one "
+    "more"
+)
+
 _RANGES = "measure one flow in both ranges of the transducer"
 _ADVICE: dict[FaultKind, str] = {
     "factor": "filling, temperature or rate may have differed from run to run: repeat a run, or "
@@ -36,6 +41,7 @@ _ADVICE: dict[FaultKind, str] = {
     "below": _RANGES,
     "bent": "calibrate the transducer at several stresses",
     "modes": "measure the linear moduli again, on the same sample",
+    "further_mode": OF_MODES,
 }
 
 
@@ -49,9 +55,10 @@ class Misread:
         Which of the faults.
     sizes
         Of the runs: factors less one, zeros in their unit, or by how much a factor grows over the
-        run; or the one factor less one.
+        run; or the one factor less one; or the modulus of a mode over that of all others.
     level
-        Stress from which on, or up to which, the factor holds; 0 of a fault of runs.
+        Stress from which on, or up to which, the factor holds; the time of a mode in s; 0 of a
+        fault of runs.
     probability
         That it is noise and constants that it describes, with the price of all that were tried.
     gain
@@ -78,7 +85,9 @@ class Misread:
 
     def excused(self, expectation: Expectation) -> bool:
         """Return whether linear data, or loadings, err by as much."""
-        if self.beside_sweep:  # what the sweep may err by is in the probability
+        if (
+            self.beside_sweep and self.kind != "further_mode"
+        ):  # what the sweep may err by is in the probability
             expectation = replace(expectation, linear_error=0.0)
         return expectation.excuses(self.size)
 
@@ -135,6 +144,8 @@ def reads(found: Misread) -> str:
     if found.kind == "bent":
         more = f"{100 * abs(low):.2g} % {'more' if low > 0 else 'less'}"
         return f"as if the transducer read {more} at the largest stress than in proportion"
+    if found.kind == "further_mode":
+        return one_more_mode(found.level, found.sizes[0])
     if found.kind == "zero":
         return f"as if each run had been read from a zero of its own ({low:.2g} to {high:.2g} Pa)"
     if found.kind == "growth":
@@ -147,6 +158,22 @@ def reads(found: Misread) -> str:
     return (
         "as if each run had been read by a factor of its own, of which the largest is "
         f"{100 * (high - low):.2g} % more than the least"
+    )
+
+
+def one_more_mode(time: float, share: float) -> str:
+    """Return how the records would have been read with a further mode, as a clause.
+
+    Parameters
+    ----------
+    time
+        Its relaxation time in s.
+    share
+        Its modulus over that of all others.
+    """
+    return (
+        f"as if there were one more relaxation mode, of some {time:.2g} s and {100 * share:.2g} % "
+        "of the modulus"
     )
 
 
@@ -184,6 +211,8 @@ def _told(session: Session, fault: Fault) -> Misread | None:
     chance = float(fisher.sf(wald, count, freedom))
     gain = 0.5 * one.effective_samples * np.log(one.before / max(one.after, 1e-300))
     sizes = np.linalg.pinv(one.seen) @ one.values
+    if fault.positive and np.any(sizes <= 0.0):
+        return None
     change = fault.own.T @ sizes
     steps = -np.linalg.lstsq(beside.T, change, rcond=1e-9)[0]
     runs = session.runs

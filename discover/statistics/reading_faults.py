@@ -16,10 +16,10 @@ from jaxtyping import Float, Int
 from discover.statistics.covariance import least_squares_covariance
 from discover.statistics.projection import rms, without
 
-FaultKind = Literal["factor", "zero", "growth", "above", "below", "bent", "modes"]
+FaultKind = Literal["factor", "zero", "growth", "above", "below", "bent", "modes", "further_mode"]
 """A factor, a zero and a factor that grows in time, of each run; a factor above or below a level;
-a factor that grows with the stress, as of a transducer that is not quite linear; and a factor on
-the modulus of each mode, of a spectrum that was told wrong."""
+a factor that grows with the stress, as of a transducer that is not quite linear; a factor on the
+modulus of each mode, of a spectrum that was told wrong; and a mode that the spectrum lacks."""
 
 KINDS: tuple[FaultKind, ...] = get_args(FaultKind)
 
@@ -53,6 +53,9 @@ class Reading:
         What was controlled, as a protocol says it.
     modes
         Change of the prediction per relative change of each modulus; None where they are not asked.
+    further
+        Change of the prediction by one more mode of the modulus of all, one row for each of its
+        relaxation times, shape (times, n), and these times in s; None where none is asked.
     shared
         Changes of the prediction by errors that all runs share, of unit variance each: those that a
         sweep leaves of the moduli. None without any.
@@ -66,6 +69,7 @@ class Reading:
     control: str = "rate"
     modes: Float[np.ndarray, "modes n"] | None = None
     shared: Float[np.ndarray, "errors n"] | None = None
+    further: tuple[Float[np.ndarray, "times n"], Float[np.ndarray, " times"]] | None = None
 
     @property
     def has_zero(self) -> bool:
@@ -95,15 +99,18 @@ class Fault:
     own
         Change of all records per unit of each of its sizes, shape (sizes, samples).
     level
-        Of the stress in its unit; 0 of a fault of runs.
+        Of the stress in its unit, or the time of a mode in s; 0 of a fault of runs.
     tried
-        Number of levels that are asked beside this one.
+        Number of levels, or of times, that are asked.
+    positive
+        Whether its size cannot be below zero.
     """
 
     kind: FaultKind
     own: Float[np.ndarray, "sizes m"]
     level: float = 0.0
     tried: int = 1
+    positive: bool = False
 
 
 @dataclass(frozen=True)
@@ -174,6 +181,8 @@ class Session:
         elif kind == "modes":  # of one the factor is a modulus
             if self.modes is not None and len(self.modes) >= 2:
                 yield Fault(kind, self.modes)
+        elif kind == "further_mode":
+            yield from self._further()
         else:
             own = self._of_runs(kind)
             if len(own):
@@ -206,6 +215,15 @@ class Session:
             with np.errstate(invalid="ignore"):
                 beyond = size > level if kind == "above" else size <= level
             yield Fault(kind, (self.predicted * beyond)[None], float(level), len(levels))
+
+    def _further(self) -> Iterator[Fault]:
+        """Yield one more mode, of each time that is asked."""
+        told = [run.further for run in self.runs if run.further is not None]
+        if not told or len(told) < len(self.runs):
+            return
+        rows = self._together([own for own, _ in told])
+        for own, time in zip(rows, told[0][1], strict=True):
+            yield Fault("further_mode", own[None], float(time), len(rows), positive=True)
 
     def _bent(self) -> Iterator[Fault]:
         """Yield σ|σ| over the largest stress, in whose unit its size is."""

@@ -7,12 +7,14 @@ follow the law better as if they had been read so (`discover.statistics.misread`
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from discover.comparison.judging.as_predicted import SPARSE, AsPredicted, runs_as_predicted
 from discover.comparison.judging.either_law import bands_of_either, intervals_of_either
 from discover.comparison.judging.explanation import Explanation, least_seen
+from discover.comparison.judging.further_mode import clear_further_mode
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.refutation import Refutation, hold_against
 from discover.comparison.judging.smaller_laws import hold_against_smaller_laws
@@ -20,18 +22,24 @@ from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import root_of
+from discover.statistics.beyond_sweep import ADVICE, REASON, beyond_the_sweep
 from discover.statistics.misread import (
+    OF_MODES,
     POSSIBLE,
     Misread,
     advice,
     clear_misreading,
     misread,
     not_ruled_out,
+    one_more_mode,
     reads,
 )
 from discover.statistics.outliers import stray
 from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import Expectation
+from discover.words import percent_of
+
+_MODES_ASKED = 12
 
 
 def hold_against_misreading(
@@ -61,10 +69,41 @@ def hold_against_misreading(
     def refutation_of(name: str) -> Refutation | None:
         own = law if name == SPARSE else None
         found = _described_better(explanation, name, outcomes[name], flows, bands, own)
-        return None if found is None else as_misread(found)
+        if found is not None:
+            return as_misread(found)
+        if own is None:
+            return None
+        beyond = _beyond_the_sweep(own, flows, explanation.expectation)
+        return beyond or _with_one_more_mode(own, flows, explanation.expectation)
 
     held = hold_against(explanation, refutation_of)
     return hold_against_smaller_laws(held, outcomes, flows, law)
+
+
+def _beyond_the_sweep(
+    law: MovedLaw, flows: Sequence[Flow], expectation: Expectation
+) -> Refutation | None:
+    """Return what refutes a law that only the sweep's error excuses, of what that cannot change."""
+    spectrum = law.declared.spectrum
+    if spectrum is None or law.inner:
+        return None
+    fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
+    every = readings_of(law, flows) if len(fitted) < len(flows) else []
+    asked = [beyond_the_sweep(runs, expectation, spectrum.pattern) for runs in (fitted, every)]
+    beyond = next((one for one in asked if one is not None), None)
+    return None if beyond is None else Refutation(REASON.format(percent_of(beyond.misfit)), ADVICE)
+
+
+def _with_one_more_mode(
+    law: MovedLaw, flows: Sequence[Flow], expectation: Expectation
+) -> Refutation | None:
+    """Return what refutes a law that a further relaxation mode makes describe the runs better."""
+    fitted = [flow for flow in flows if flow.kind == "training"]
+    found = clear_further_mode(law, fitted, expectation)
+    if found is None:
+        return None
+    how = one_more_mode(found.time, found.share)
+    return Refutation(f"the records follow the law clearly better {how}", OF_MODES)
 
 
 def as_misread(found: Misread) -> Refutation:
@@ -90,6 +129,8 @@ def _described_better(
     if not runs:
         told = runs_as_predicted(explanation, name, outcome, flows, bands)
         runs = [_reading(run, law) for run in told]
+    if law is not None:
+        runs = with_further_modes(runs, law, flows)
     fitted = sum(flow.kind == "training" for flow in flows)
     sets = [runs[:fitted], runs] if fitted < len(runs) else [runs]
     return clear_misreading(sets, explanation.expectation, least_seen(outcome))
@@ -150,6 +191,36 @@ def readings_of(law: MovedLaw, flows: Sequence[Flow]) -> list[Reading]:
     told = [_of_law(law, flow) for flow in flows]
     runs = [run for run in told if run is not None]
     return runs if len(runs) == len(told) else []
+
+
+def with_further_modes(
+    runs: Sequence[Reading], law: MovedLaw, flows: Sequence[Flow]
+) -> list[Reading]:
+    """Return readings that may also be asked whether the spectrum lacks a mode.
+
+    One of a time between half the shortest interval of the samples and twice the longest run.
+
+    Parameters
+    ----------
+    runs
+        Readings of the flows, in their order.
+    law
+        The law of every mode.
+    flows
+        Where one is not at a given rate, nothing is asked.
+    """
+    if len(runs) != len(flows) or any(flow.protocol.control != "rate" for flow in flows):
+        return list(runs)
+    shortest = min(float(np.min(np.diff(flow.times))) for flow in flows)
+    times = np.geomspace(0.5 * shortest, 2.0 * max(flow.times[-1] for flow in flows), _MODES_ASKED)
+    found = []
+    for run, flow in zip(runs, flows, strict=True):
+        told = law.of_further_modes(flow, times)
+        if told is None or len(told[0]) != len(flow.times):
+            return list(runs)
+        kept = np.isin(np.asarray(flow.times, dtype=float), run.times)
+        found.append(replace(run, further=(told[:, kept], times)))
+    return found
 
 
 def _of_law(law: MovedLaw, flow: Flow) -> Reading | None:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.laws.each_mode import LawOfEachMode
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
@@ -120,6 +121,23 @@ class MovedLaw:
     def of_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
         """Return the change of the record in a flow per relative change of each mode's modulus."""
         return self._once("moduli", flow, self._moved_moduli)
+
+    def of_further_modes(
+        self, flow: Flow, times: Float[np.ndarray, " k"]
+    ) -> Float[np.ndarray, "k n"] | None:
+        """Return the stress in a flow of one more mode of each of these times, as all modes are.
+
+        Its modulus is that of all modes together. At a given rate it adds to theirs; None of other
+        flows, and of a law with constants by mode. Zero where the law runs away.
+        """
+        if flow.protocol.control != "rate" or isinstance(self.declared.law, LawOfEachMode):
+            return None
+        fluid = self.fluid(self.start)
+        modulus = np.array([np.sum(fluid.modulus)])
+        one_more = [Fluid(fluid.law, modulus, np.array([time]), 0.0) for time in times]
+        found = [predict(fluid, flow) for fluid in one_more]
+        rows = [np.zeros(len(flow.times)) if one is None else one["sigma12"] for one in found]
+        return np.array([row if np.all(np.isfinite(row)) else np.zeros_like(row) for row in rows])
 
     def _once(self, what: str, flow: Flow, make: Callable[[Flow], Any]) -> Any:
         """Return what is made of a flow, made once; another flow may have the same name."""

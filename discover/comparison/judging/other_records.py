@@ -3,7 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 from discover.comparison.judging.filters_for_terms import holding_filters
-from discover.comparison.judging.misread_runs import holding_misreading, readings_of
+from discover.comparison.judging.misread_runs import (
+    holding_misreading,
+    readings_of,
+    with_further_modes,
+)
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.small_faults import holding_small_faults
 from discover.comparison.judging.smaller_laws import holding_smaller_laws
@@ -39,7 +43,8 @@ def holding_other_records(
     fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
     if not corrected:
         wider, held, of_filters = holding_filters(wider, held, chosen, law.declared, flows)
-        seen = wider, held, chosen, law, flows, fitted
+        asked = with_further_modes(fitted, law, [flow for flow in flows if flow.kind == "training"])
+        seen = wider, held, chosen, law, flows, asked
         wider, held, of_readings = holding_misreading(*seen, expectation)
         said = (*of_filters, *of_readings)
         if not computed:
