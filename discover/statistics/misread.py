@@ -19,7 +19,8 @@ from discover.statistics.residual import Expectation
 
 CLEAR = 1e-4
 """Probability up to which a fault is believed: of right laws in white noise one in a thousand has a
-fault of 1e-3, in noise correlated to 0.95 from sample to sample one in a hundred one of 1e-4."""
+fault of 1e-3; in noise correlated to 0.95 from sample to sample one in twenty has one of 1e-4, in
+noise correlated to 0.9 one or two in a hundred."""
 
 POSSIBLE = 0.1
 """Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
