@@ -56,7 +56,8 @@ def main() -> None:
 
 def problem_of(runs: int, modes: int):
     """Return what sparse regression fits, of start-ups of a fluid with so many modes."""
-    from discover.learners.tensor_sindy import TensorSINDy, search
+    from discover.laws.registry import make_law
+    from discover.learners.trajectories.problem import make_problem
     from discover.protocols import start_up
     from discover.simulate import synthetic_dataset
     from tensor_library import build_library
@@ -65,25 +66,13 @@ def problem_of(runs: int, modes: int):
         f"rate_{i}": start_up(float(rate)) for i, rate in enumerate(np.geomspace(0.3, 3, runs))
     }
     data = synthetic_dataset("giesekus", {"alpha": 0.2}, flows, noise=0.01, seed=0, n_samples=101)
-    learner = TensorSINDy(
+    return make_problem(
+        data.runs,
         build_library(degree=1),
-        modulus=np.full(modes, 1.0 / modes),
-        relaxation_time=np.geomspace(1.0, 0.01, modes),
+        np.full(modes, 1.0 / modes),
+        np.geomspace(1.0, 0.01, modes),
+        base=make_law("ucm"),
     )
-
-    class _Made(Exception):
-        """Holds the problem, before anything is fitted."""
-
-    def made(self, problem, *_, **__):
-        del self
-        raise _Made(problem)
-
-    search.SupportSearch.__init__ = made
-    try:
-        learner.fit(data)
-    except _Made as found:
-        return found.args[0]
-    raise RuntimeError("sparse regression made no problem")
 
 
 if __name__ == "__main__":

@@ -86,9 +86,8 @@ class Misread:
 
     def excused(self, expectation: Expectation) -> bool:
         """Return whether linear data, or loadings, err by as much."""
-        if (
-            self.beside_sweep and self.kind != "further_mode"
-        ):  # what the sweep may err by is in the probability
+        # what the sweep may err by is in the probability
+        if self.beside_sweep and self.kind != "further_mode":
             expectation = replace(expectation, linear_error=0.0)
         return expectation.excuses(self.size)
 

@@ -88,7 +88,7 @@ def judged_with(judgement: Judgement, coarse: CoarseRates | None) -> Judgement:
     if coarse is None or not coarse.is_coarse:
         return judgement
     told = replace(judgement, description=f"{coarse.sentence} {judgement.description}")
-    if not coarse.hides or told.verdict not in ("effects_added", "no_effect_needed"):
+    if not coarse.hides or not told.explains:
         return told
     return replace(told, verdict="unexplained")
 

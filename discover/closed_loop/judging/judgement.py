@@ -1,7 +1,7 @@
 """The verdict: does what was found explain the fitted runs, and does it carry over to others."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from discover.closed_loop.judging.fitted_runs import what_fitted_runs_say
 from discover.closed_loop.judging.held_out import HeldOut
@@ -55,6 +55,26 @@ class Judgement:
     missed: float = 0.0
     unseen: int = 0
     read_as: str = ""
+
+    @property
+    def explains(self) -> bool:
+        """Whether the model explains the runs, with effects or without any."""
+        return self.verdict in ("effects_added", "no_effect_needed")
+
+    def refuted(self, description: str, reason: str = "", advice: str = "") -> "Judgement":
+        """Return the judgement on a model that something speaks against.
+
+        Parameters
+        ----------
+        description
+            The reasons, in sentences.
+        reason, advice
+            As in `LackOfFit.refuted`; by default the reason stays.
+        """
+        left = self.left.refuted(reason or self.left.reason, advice)
+        return replace(
+            self, verdict="unexplained", structured=True, left=left, description=description
+        )
 
 
 def judge(

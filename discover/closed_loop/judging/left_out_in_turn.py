@@ -83,12 +83,8 @@ def judged_in_turn(
         f"was found ({', '.join(effects)}) describes these runs and is no finding."
     )
     return replace(
-        judgement,
-        verdict="unexplained",
-        structured=True,
+        judgement.refuted(text),
         carries_over=False,
-        left=judgement.left.refuted(judgement.left.reason),
-        description=text,
         missed=max(STRUCTURE * error / limit, CARRIED),
         unseen=len(missed),
     )

@@ -93,13 +93,7 @@ def judged_by_loadings(
     )
     if not refuted:
         return replace(judgement, description=text)
-    return replace(
-        judgement,
-        verdict="unexplained",
-        structured=True,
-        left=judgement.left.refuted(judgement.left.reason, ADVICE),
-        description=text,
-    )
+    return judgement.refuted(text, advice=ADVICE)
 
 
 def _excess(

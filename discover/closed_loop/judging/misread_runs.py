@@ -51,7 +51,7 @@ def judged_as_read(
     theta, active
         The parameters, and the effects in the model.
     """
-    if judgement.verdict not in ("effects_added", "no_effect_needed"):
+    if not judgement.explains:
         return judgement
     left = judgement.left
     if expectation.noise is not None and left.misfit <= left.expected:
@@ -67,14 +67,7 @@ def judged_as_read(
         f"{judgement.description} But the records follow the model clearly better {reads(best)}: "
         f"{advised}. Constants beside it would be others, so nothing is explained."
     )
-    return replace(
-        judgement,
-        verdict="unexplained",
-        structured=True,
-        left=left.refuted(left.reason, advised),
-        description=text,
-        read_as=reads(best),
-    )
+    return replace(judgement.refuted(text, advice=advised), read_as=reads(best))
 
 
 def holding_misreading(

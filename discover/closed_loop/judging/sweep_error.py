@@ -1,7 +1,6 @@
 """A model that only the error of the linear sweep excuses, held against what that error can do."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -37,8 +36,8 @@ def judged_beyond_sweep(
     theta, active
         The parameters, and the effects in the model.
     """
-    expectation, left = tolerated.expectation, judgement.left
-    if judgement.verdict not in ("effects_added", "no_effect_needed") or expectation.noise:
+    expectation = tolerated.expectation
+    if not judgement.explains or expectation.noise:
         return judgement
     sets = [fitted, [*fitted, *unseen]] if unseen else [fitted]
     found = [beyond_the_sweep(runs, expectation, pattern) for runs in sets]
@@ -48,10 +47,5 @@ def judged_beyond_sweep(
     if beyond.misfit <= STRUCTURE * tolerated.resolution.limit(theta, active, beyond.misfit):
         return judgement
     reason = REASON.format(percent_of(beyond.misfit))
-    return replace(
-        judgement,
-        verdict="unexplained",
-        structured=True,
-        left=left.refuted(reason, ADVICE),
-        description=f"{judgement.description} But {reason}: {ADVICE}. So nothing is explained.",
-    )
+    text = f"{judgement.description} But {reason}: {ADVICE}. So nothing is explained."
+    return judgement.refuted(text, reason, ADVICE)
