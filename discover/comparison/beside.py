@@ -1,6 +1,7 @@
 """What is looked at beside the laws found: rivals, structure, and the classical laws."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from discover.comparison.at_once import at_once
@@ -17,11 +18,18 @@ from tensor_library.library import TermLibrary
 
 
 class Beside(NamedTuple):
-    """What is looked at beside the laws found, for the fields of `Judgement` of the same names."""
+    """What is looked at beside the laws found, for the fields of `Judgement` of the same names.
+
+    Attributes
+    ----------
+    further
+        What the caller had computed at the same time, by name.
+    """
 
     rivals: Sequence[Rival]
     structure: Structure | None
     classical: Sequence[ClassicalFit]
+    further: Mapping[str, Any] = MappingProxyType({})
 
 
 def look_beside(
@@ -31,8 +39,19 @@ def look_beside(
     chosen: LearnerOutcome | None,
     frame: Frame,
     say: Callable[[str], None],
+    further: Mapping[str, Callable[[], Any]] = MappingProxyType({}),
 ) -> Beside:
-    """Return rivals, structure and classical laws, which need nothing of one another."""
+    """Return rivals, structure and classical laws, which need nothing of one another.
+
+    Parameters
+    ----------
+    study, known, library, chosen, frame
+        As in `judge`: what sparse regression found, and the frame in which it did.
+    say
+        Called with what is going on.
+    further
+        What else is to be computed side by side with these, by name.
+    """
 
     def classical(tell: Progress) -> Sequence[ClassicalFit]:
         tell("fitted to the same runs", 0.0)
@@ -54,8 +73,20 @@ def look_beside(
     parts: dict[str, Callable[[Progress], Any]] = {"the classical laws": classical}
     if chosen is not None:
         parts |= {"rivals": rivals, "the library": structure}
+    parts |= {name: _told(part) for name, part in further.items()}
     found = at_once(parts, lambda text, _: say(text))
-    return Beside(found.get("rivals", ()), found.get("the library"), found["the classical laws"])
+    more = {name: found[name] for name in further}
+    return Beside(
+        found.get("rivals", ()), found.get("the library"), found["the classical laws"], more
+    )
+
+
+def _told(part: Callable[[], Any]) -> Callable[[Progress], Any]:
+    def run(tell: Progress) -> Any:
+        tell("fitting", 0.0)
+        return part()
+
+    return run
 
 
 def _classical(study: Study, known: Known, independent: float | None) -> Sequence[ClassicalFit]:

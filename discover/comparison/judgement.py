@@ -66,6 +66,8 @@ from discover.study.data import StudyData
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
 
+_OF_MODES = "constants that differ from mode to mode"
+
 
 @dataclass(frozen=True)
 class Judgement:
@@ -140,17 +142,26 @@ def judge(
     chosen, frame = own.get("tensor_sindy"), frames.get("tensor_sindy", known.before)
     law = None if chosen is None else law_with_fitted(chosen, frame.model, known.fitted)
     is_silent = at_first.verdict == "no_signal"
+    # of normal stresses that were fitted too a law by mode says nothing
+    asks = not (chosen is None or is_silent or normal or study.compare.quick)
+
+    def modes(explanation: Explanation) -> OfModes:
+        assert chosen is not None
+        seen = at_first.in_library, explanation, expectation, len(library), flows
+        return ask_of_modes(chosen, frame, *seen, study.compare.recipe == "thorough")
+
+    # what does not explain its own runs is asked whatever those held out say of it
+    early = asks and not at_first.in_library
     beside = Beside((), None, ())
     if not is_silent:
-        beside = look_beside(study, known, library, chosen, frame, say)
+        parts = {_OF_MODES: lambda: modes(at_first)} if early else {}
+        beside = look_beside(study, known, library, chosen, frame, say, parts)
     tested = _tested(study, known, chosen, law, frame, outcomes, at_first, beside.rivals, seed)
     explanation = tested.explanation
-    of_modes = OfModes()
-    # of normal stresses that were fitted too a law by mode says nothing
-    if not (chosen is None or is_silent or normal or study.compare.quick):
-        say("constants that differ from mode to mode")
-        explained, n_terms = at_first.in_library, len(library)
-        of_modes = ask_of_modes(chosen, frame, explained, explanation, expectation, n_terms, flows)
+    of_modes = beside.further.get(_OF_MODES, OfModes())
+    if asks and not early:
+        say(_OF_MODES)
+        of_modes = modes(explanation)
     if of_modes.alike is not None and explanation.in_library:
         outcomes = with_intervals_of_modes(outcomes, of_modes.alike)
         tested = replace(tested, bands=holding_modes_apart(tested.bands, of_modes.alike))

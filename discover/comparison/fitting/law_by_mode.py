@@ -23,6 +23,7 @@ from discover.inference.readings import beside_one_another, fitted_readings, uns
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
 from discover.learners import RecoveredTerm
+from discover.learners.tensor_sindy.rough_problem import enough_to_rank
 from discover.statistics import LackOfFit
 from discover.statistics.misread import Misread, clear_misreading
 from discover.statistics.reading_faults import Reading
@@ -43,6 +44,10 @@ _OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
 """Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
 
 _MOST_TERMS = 3
+
+_STILL_IN = 2.0 * INDISTINGUISHABLE
+"""Sets that are so far behind the best on few samples are not fitted on all: more samples raise
+the evidence against them faster than that for a degree which few samples left open."""
 
 _DRAWS = 40
 
@@ -162,14 +167,19 @@ def fit_laws_by_mode(
     expectation: Expectation,
     n_candidates: int,
     flows: Sequence[Flow] = (),
+    ranks_on_all: bool = False,
 ) -> Iterator[LawByMode]:
     """Return the best law with constants by mode, then the same with more degrees in log λ.
 
-    None where no constant of the best differs from mode to mode. The terms are those of the path of
+    None where no constant of the best differs from mode to mode. Of more degrees none is returned
+    that runs away in a run held out. The terms are those of the path of
     sparse regression up to three, and those of Giesekus, of both laws of Phan-Thien and Tanner and
     of Johnson and Segalman. Each constant has the degree in log λ that evidence asks for, so that
     one constant for all modes stays where nothing speaks against it; then one degree more as often
     as a law is asked for.
+
+    To save time the terms are ranked on as few samples as sparse regression ranks its own, and
+    those that stay are fitted on all.
 
     Parameters
     ----------
@@ -187,38 +197,52 @@ def fit_laws_by_mode(
         Number of terms in the library, the choice among which every term pays for.
     flows
         In which it predicts.
+    ranks_on_all
+        Whether every set of terms is fitted on all samples.
     """
     sets = _candidate_sets(path)
-    problem = _problem(model, [name for of_set in sets for name in of_set], fitted, n_candidates)
+    names = [name for of_set in sets for name in of_set]
+    problem = _problem(model, names, fitted, n_candidates)
     forward = problem.model
-    found = [_fitted(problem, of_set) for of_set in sets]
-    usable = [(fit, degrees) for fit, degrees in found if fit.usable]
-    if not usable:
+    rough = problem
+    few = [enough_to_rank(run) for run in fitted]
+    # it has a program of its own to compile
+    if not ranks_on_all and 2 * sum(map(len, few)) < sum(map(len, fitted)):
+        rough = _problem(model, names, few, n_candidates)
+        ranked = _best_first(rough, sets)
+        sets = [tuple(one.degrees) for one in ranked if one.behind < _STILL_IN]
+    best = next(iter(_best_first(problem, sets)), None)
+    if best is None or not any(one.degree for one in best.degrees.values()):
         return
-    effective = problem.independent_samples(min((fit for fit, _ in usable), key=problem.cost))
-    fit, degrees = min(usable, key=lambda one: problem.worth(one[0], [*one[1]], effective))
-    if not any(one.degree for one in degrees.values()):
-        return
+    fit, degrees, effective = best.fit, best.degrees, best.effective
     worth = _worth_of(sparse, problem, fitted, effective)
+    is_first = True
     while fit.usable:
-        seen = fitted_readings(forward, problem.batch, fitted, fit)
-        constants, bands = _told(problem, fit, degrees, seen, model, flows)
-        left = problem.lack_of_fit(fit, fitted, expectation)
-        yield LawByMode(
-            constants,
-            left,
-            worth - problem.worth(fit, [*degrees], effective),
-            _errors(forward, fit, held_out),
-            bands if tuple(degrees) in _NAMED else {k: _without_n2(b) for k, b in bands.items()},
-            misread=_misread(problem, fit, left, seen, held_out, expectation),
-        )
+        errors = _errors(forward, fit, held_out)
+        # one of more degrees that runs away in runs held out is no better answer than the first
+        if is_first or None not in errors.values():
+            seen = fitted_readings(forward, problem.batch, fitted, fit)
+            constants, bands = _told(problem, fit, degrees, seen, model, flows)
+            left = problem.lack_of_fit(fit, fitted, expectation)
+            if tuple(degrees) not in _NAMED:
+                bands = {key: _without_n2(band) for key, band in bands.items()}
+            yield LawByMode(
+                constants,
+                left,
+                worth - problem.worth(fit, [*degrees], effective),
+                errors,
+                bands,
+                misread=_misread(problem, fit, left, seen, held_out, expectation),
+            )
+        is_first = False
         least = one_degree_more(forward, degrees)
         before = degrees
         if not least:
             return
-        fit, degrees = choose_degrees(problem, fit, degrees, least)
+        fit, degrees = choose_degrees(rough, fit, degrees, least)
         if all(degrees[name].degree == one.degree for name, one in before.items()):
             return
+        fit = problem.fit(fit.theta, fit.free)
 
 
 def coefficients_in_modes(
@@ -337,6 +361,31 @@ def _effect_of(term: str, coefficient: float) -> str:
         return term
     amplitude = make_effect(named).parameters[0]
     return named if amplitude.low <= coefficient <= amplitude.high else term
+
+
+@dataclass(frozen=True)
+class _Ranked:
+    """A set of effects as it was fitted, and by how much its criterion is above the least."""
+
+    fit: Fit
+    degrees: Mapping[str, Degree]
+    behind: float
+    effective: float
+
+
+def _best_first(problem: FitProblem, sets: Sequence[Sequence[str]]) -> list[_Ranked]:
+    """Return the sets of effects that can be fitted, those of the least criterion first."""
+    found = [_fitted(problem, of_set) for of_set in sets]
+    usable = [(fit, degrees) for fit, degrees in found if fit.usable]
+    if not usable:
+        return []
+    effective = problem.independent_samples(min((fit for fit, _ in usable), key=problem.cost))
+    worth = [problem.worth(fit, [*degrees], effective) for fit, degrees in usable]
+    ranked = [
+        _Ranked(*one, behind, effective)
+        for one, behind in zip(usable, np.array(worth) - min(worth), strict=True)
+    ]
+    return sorted(ranked, key=lambda one: one.behind)
 
 
 def _fitted(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, Degree]]:

@@ -57,6 +57,7 @@ def ask_of_modes(
     expectation: Expectation,
     n_candidates: int,
     flows: Sequence[Flow],
+    thorough: bool = False,
 ) -> OfModes:
     """Return what the runs say of each mode, and the law by mode where one for all is in doubt.
 
@@ -79,6 +80,8 @@ def ask_of_modes(
         Number of terms in the library.
     flows
         All flows, with what was recorded in them.
+    thorough
+        Whether laws by mode are ranked on all samples.
     """
     model, terms = frame.model, chosen.terms
     if len(model.modulus) < 2 or not model.law.linear_relaxation:
@@ -98,7 +101,7 @@ def ask_of_modes(
                 return OfModes(alike, None, said)
         elif alike is not None and _holds(frame, alike, explanation):
             said = _BY_MODES_APART
-    law = _law_by_mode(chosen, frame, expectation, n_candidates, flows)
+    law = _law_by_mode(chosen, frame, expectation, n_candidates, flows, thorough)
     return OfModes(alike, law, said if law is None else "")
 
 
@@ -122,6 +125,7 @@ def _law_by_mode(
     expectation: Expectation,
     n_candidates: int,
     flows: Sequence[Flow],
+    thorough: bool,
 ) -> LawByMode | None:
     model, training = frame.model, [flow for flow in frame.flows if flow.kind == "training"]
     predicted = [chosen.predictions[flow.key] for flow in training]
@@ -135,7 +139,8 @@ def _law_by_mode(
     )
     runs = frame.data.fit.runs, frame.data.held_out.runs
     path = chosen.details.get("path", ())
-    laws = fit_laws_by_mode(model, path, sparse, *runs, expectation, n_candidates, frame.flows)
+    asked = expectation, n_candidates, frame.flows, thorough
+    laws = fit_laws_by_mode(model, path, sparse, *runs, *asked)
     held = (
         _held_against_unseen(replace(law, bands=frame.bands(law.bands)), flows, expectation)
         for law in laws

@@ -29,12 +29,13 @@ def rough_problem(
     limits = rough_limits(problem.flows, np.asarray(problem.relaxation_time))
     if limits is None:
         return None
-    rough = make([thin_run(run, _most_samples(run)) for run in runs], **limits)
+    rough = make([enough_to_rank(run) for run in runs], **limits)
     return rough if rough.flows.n_steps <= WORTH_IT * steps else None
 
 
-def _most_samples(run: Run) -> int:
-    return _STATES_KEPT if run.protocol.control in STATES else SAMPLES
+def enough_to_rank(run: Run) -> Run:
+    """Return a run with as many of its samples as ranking laws takes."""
+    return thin_run(run, _STATES_KEPT if run.protocol.control in STATES else SAMPLES)
 
 
 def ranked_in_words(fine: TrajectoryProblem, rough: TrajectoryProblem | None, fitted: int) -> str:
