@@ -41,7 +41,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
     Attributes
     ----------
     network
-        Eight invariants in, eight numbers out.
+        Eight invariants in, eight numbers out; None where all coefficients are constant.
     constants
         cₙ, shape (8,).
     network_mask
@@ -53,7 +53,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
         A known law whose extra term is added, or None.
     """
 
-    network: eqx.nn.MLP
+    network: eqx.nn.MLP | None
     constants: Float[Array, "8"]
     network_mask: Float[Array, "8"]
     invariant_scale: Float[Array, "8"] | None = None
@@ -77,6 +77,8 @@ class TensorBasisNetwork(AbstractExtendedLaw):
 
     def coefficients(self, stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
         """Return the coefficients gₙ at one state."""
+        if self.network is None:
+            return self.constants
         invariants = scalar_invariants(stress, rate)
         if self.invariant_scale is not None:
             invariants = jnp.arcsinh(invariants / self.invariant_scale)

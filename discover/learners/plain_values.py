@@ -90,6 +90,7 @@ class PlainWriter:
         if isinstance(law, LibraryExpansion):
             return {KIND: "expansion", **self._fields(law, where)}
         if isinstance(law, TensorBasisNetwork):
+            assert law.network is not None  # a law that was trained has one
             weights = jax.tree.leaves(eqx.filter(law.network, eqx.is_array))
             return {
                 KIND: "network",

@@ -38,6 +38,11 @@ def initial_law(
     )
 
 
+def with_network(law: TensorBasisNetwork, network: eqx.nn.MLP | None) -> TensorBasisNetwork:
+    """Return the law with another network, or with none: its coefficients are its constants."""
+    return eqx.tree_at(lambda tree: tree.network, law, network, is_leaf=lambda leaf: leaf is None)
+
+
 @compiled
 def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
     """Return the root mean square of every invariant, or one where it vanishes."""

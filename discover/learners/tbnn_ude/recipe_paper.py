@@ -54,7 +54,8 @@ class PaperRecipe:
 def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> TensorBasisNetwork:
     """Return the network at the start of training."""
     law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
-    last: Any = law.network.layers[-1]  # its bias is there: the network is made with one
+    network: Any = law.network
+    last = network.layers[-1]  # its bias is there: the network is made with one
     return eqx.tree_at(
         lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
         law,

@@ -20,6 +20,7 @@ def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisN
         lambda tree: (tree.network, tree.constants),
         spec,
         (jax.tree.map(eqx.is_inexact_array, law.network), True),
+        is_leaf=lambda leaf: leaf is None,  # a law of constants has no network
     )
     return eqx.partition(law, spec)
 
@@ -111,15 +112,16 @@ class Rebuild(eqx.Module):
         Parameters as in `of_constants`; `moving` must be known when a program is compiled.
         """
         moving = np.asarray(moving)
-        last: Any = places_of(law).network.layers[-1]  # its bias is there: it was made with one
+        network: Any = places_of(law).network
+        last = network.layers[-1]  # its bias is there: it was made with one
         idle = np.append(last.weight[~moving], last.bias[~moving])
         positions = np.setdiff1d(np.arange(_count_of(law)), idle)
-        network = np.ones(positions.size - N_COEFFICIENTS)
+        of_network = np.ones(positions.size - N_COEFFICIENTS)
         return cls(
             law,
             jnp.asarray(positions),
-            jnp.concatenate([jnp.asarray(network, bool), jnp.asarray(moving)]),
-            jnp.concatenate([jnp.asarray(network), jnp.asarray(scale)]),
+            jnp.concatenate([jnp.asarray(of_network, bool), jnp.asarray(moving)]),
+            jnp.concatenate([jnp.asarray(of_network), jnp.asarray(scale)]),
         )
 
     @property
