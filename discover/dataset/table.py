@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.units import Quantity, find_column
@@ -71,7 +70,8 @@ class Table:
             If a cell is not a finite number, or is larger than any measurement.
         """
         text = self.columns[column]
-        values = np.asarray(pd.to_numeric(pd.Series(text), errors="coerce"), dtype=float)
+        # as Python reads them: pandas before 3 drops the last of many digits
+        values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
         finite = np.isfinite(values)
         if not np.all(finite):
             row = int(np.argmin(finite))
