@@ -51,17 +51,17 @@ TIMES = np.geomspace(0.02, 20.0, 60)
 FITTED, UNSEEN = (0.3, 1.0, 5.0), (3.0,)
 NOISE = 0.01
 MOBILITIES = (0.1, 0.25, 0.5)  # nearly linear in log λ on the scale of the link
-SLIP = "non_affine_motion"
+NAME, SLIP = "giesekus_mobility", "non_affine_motion"
 
 
-def records(mobilities, rates, noise=NOISE, fluid=None):
+def records(mobilities, rates, noise=NOISE, fluid=None, times=TIMES):
     fluid = fluid or multimode_giesekus(mobilities, MODULI, RELAXATION_TIMES)
     generator, runs = np.random.default_rng(5), []
     for rate in rates:
-        stress = fluid.respond(independent_start_up(rate), TIMES).sigma12
+        stress = fluid.respond(independent_start_up(rate), times).sigma12
         size = noise * np.sqrt(np.mean(stress**2))
-        stress = stress + size * generator.standard_normal(len(TIMES))
-        runs.append(Run(f"at {rate:g}", TIMES, start_up(rate), np.full(len(TIMES), rate), stress))
+        stress = stress + size * generator.standard_normal(len(times))
+        runs.append(Run(f"at {rate:g}", times, start_up(rate), np.full(len(times), rate), stress))
     return runs
 
 
@@ -98,20 +98,25 @@ def off(band, truth, quantity, of="N1"):
     return np.linalg.norm(outside) / np.linalg.norm(truth[of])
 
 
-def fitted(mobilities, fluid=None):
-    """The answer, beside a law with the mean mobility in every mode as what was found."""
+def laws_of(mobilities, fluid=None, times=TIMES, ranks_on_all=False):
+    """The answers, beside a law with the mean mobility in every mode as what was found."""
     model = known_part()
     mean = float(np.mean(mobilities))
     path = [
         {"support": [], "coefficients": [], "inner": {}},
         {"support": ["sigma.sigma"], "coefficients": [mean], "inner": {}},
     ]
-    same = [run.stress for run in records([mean] * 3, FITTED, noise=0.0)]
-    runs, unseen = (records(mobilities, rates, fluid=fluid) for rates in (FITTED, UNSEEN))
+    same = [run.stress for run in records([mean] * 3, FITTED, noise=0.0, times=times)]
+    runs, unseen = (records(mobilities, rates, NOISE, fluid, times) for rates in (FITTED, UNSEEN))
     sparse = SparseLaw(["sigma.sigma"], 1, same)
     flows = [*flows_of(runs, "training"), *flows_of(unseen, "held_out")]
-    found = fit_laws_by_mode(model, path, sparse, runs, unseen, Expectation(), 64, flows)
-    return next(found, None)
+    asked = Expectation(), 64, flows, ranks_on_all
+    return fit_laws_by_mode(model, path, sparse, runs, unseen, *asked)
+
+
+def fitted(mobilities, fluid=None):
+    """The best of them."""
+    return next(laws_of(mobilities, fluid), None)
 
 
 # one constant by mode and rivals of each kind; that of the fluid among all of them is a slow test
@@ -150,6 +155,38 @@ def test_the_constant_of_each_mode_is_found_and_predicts_a_run_that_no_fit_saw(l
     said = law.to_json()
     assert said["verdict"] == "explained"
     assert len(said["constants"]["giesekus_mobility"]["modes"]) == 3
+
+
+def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
+    monkeypatch.setattr(law_by_mode, "_NAMED", FEW)
+    kept, fit = [], law_by_mode._best_first
+
+    def listening(problem, sets):
+        kept.append((problem.weight.shape[1], len(sets)))
+        return fit(problem, sets)
+
+    monkeypatch.setattr(law_by_mode, "_best_first", listening)
+    times = np.geomspace(0.02, 20.0, 200)
+    of_few = next(laws_of(MOBILITIES, times=times))
+    (few, all_sets), (every, still_in) = kept
+    assert (few, every) == (60, 200)
+    assert still_in < all_sets
+    of_all = next(laws_of(MOBILITIES, times=times, ranks_on_all=True))
+    assert [*of_few.constants] == [*of_all.constants]
+    # both are at the minimum of all samples, to the tolerance of the fits
+    for one, other in zip(*(law.constants[NAME].modes for law in (of_few, of_all)), strict=True):
+        assert one.value == pytest.approx(other.value, rel=1e-3)
+
+
+def test_of_more_degrees_no_law_is_told_that_runs_away_in_a_run_held_out(monkeypatch, law):
+    monkeypatch.setattr(law_by_mode, "_NAMED", FEW[:1])
+    freer = laws_of(MOBILITIES)
+    assert next(freer).constants[NAME].degree == law.constants[NAME].degree
+    assert next(freer).constants[NAME].degree > law.constants[NAME].degree  # control
+    monkeypatch.setattr(law_by_mode, "_errors", lambda *_: {"at 3": None})
+    assert [one.constants[NAME].degree for one in laws_of(MOBILITIES)] == [
+        law.constants[NAME].degree
+    ]
 
 
 IN_INTEGRATION = 1e-3
