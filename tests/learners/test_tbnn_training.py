@@ -22,7 +22,7 @@ from discover.learners.tbnn_ude.recipe_paper import (
     paper_loss,
     train_paper,
 )
-from discover.learners.tbnn_ude.session import is_white
+from discover.learners.tbnn_ude.session import Session, is_white
 from discover.learners.tbnn_ude.variational import side_by_side, states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.protocols import in_flow, oscillatory_shear, start_up
@@ -100,6 +100,14 @@ def test_the_penalty_shrinks_what_the_polish_restores(trained):
     shrunk = float(trained.penalised_law.constants[3])
     assert abs(shrunk - 0.3) > 1e-5
     assert abs(float(trained.law.constants[3]) - 0.3) < abs(shrunk - 0.3)
+
+
+def test_constants_without_a_network_are_those_beside_one_that_is_zero(giesekus_problem, trained):
+    whole = initial_law(jax.random.key(0), SMALL.width, True, jnp.ones(8))
+    _, law = Session(giesekus_problem, SMALL, None).constants(whole)
+    # the same steps, to rounding
+    np.testing.assert_allclose(trained.law.constants, law.constants, atol=1e-9)
+    assert trained.law.network is not None  # it is trained, predicted and kept as any law
 
 
 def test_maxwell_data_leave_nothing_to_learn():
