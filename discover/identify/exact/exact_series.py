@@ -13,9 +13,10 @@ chance of about 1e-17.
 """
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import count, islice
 from typing import Any, no_type_check
 
 import numpy as np
@@ -74,17 +75,28 @@ def stress_series(
     modular
         Whether to return residues modulo `PRIME` and not fractions.
     """
+    return list(islice(_growing(coefficients, rate, linear_relaxation, modular), order + 1))
+
+
+def _growing(
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool,
+    modular: bool,
+) -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Yield the Taylor coefficients of `stress_series` one by one, each dearer than the last."""
     number = residue if modular else Fraction
     terms = [parse_term(name) for name in coefficients]
     values = [number(value) for value in coefficients.values()]
-    shear_rate = [number(r) for r in rate][:order] + [number(0)] * max(0, order - len(rate))
-    stress: list[list[Any]] = [[number(0)] * 4]
-    for k in range(order):
-        length = k + 1
-        zero = _Series((number(0),) * length, modular)
+    shear_rate: list[Any] = []
+    stress: list[tuple[Any, Any, Any, Any]] = [(number(0), number(0), number(0), number(0))]
+    for k in count():
+        yield stress[k]
+        shear_rate.append(number(rate[k] if k < len(rate) else 0))
+        zero = _Series((number(0),) * (k + 1), modular)
         one = _Series((number(1), *zero.values[1:]), modular)
         s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
-        g = _Series(tuple(shear_rate[:length]), modular)
+        g = _Series(tuple(shear_rate), modular)
         slope = [
             2 * (g * s12).values[k],
             number(0),
@@ -97,9 +109,10 @@ def stress_series(
         for c, components in zip(values, evaluated, strict=True):
             slope = [v - c * part.values[k] for v, part in zip(slope, components, strict=True)]
         inverse = number(Fraction(1, k + 1))
-        after = [value * inverse for value in slope]
-        stress.append([value % PRIME for value in after] if modular else after)
-    return [(s[0], s[1], s[2], s[3]) for s in stress]
+        s11, s22, s33, s12 = (
+            value * inverse % PRIME if modular else value * inverse for value in slope
+        )
+        stress.append((s11, s22, s33, s12))
 
 
 @dataclass(frozen=True)
@@ -186,14 +199,13 @@ def solve_for_coefficient(
     rest = dict(kept or {})
 
     # residues are enough to see at which order the term enters, and whether it enters too late;
-    # fractions are needed at that order only
-    wanted, *trial = (
-        [s[3] for s in stress_series(law, rate, order, linear_relaxation, modular=True)]
-        for law in (target, rest, {**rest, term: 1}, {**rest, term: 2})
-    )
-    for k in range(order + 1):
-        if trial[0][k] == trial[1][k] == trial[2][k]:
-            if trial[0][k] != wanted[k]:
+    # fractions are needed at that order only, and no later one at all
+    laws = (target, rest, {**rest, term: 1}, {**rest, term: 2})
+    series = (_growing(law, rate, linear_relaxation, modular=True) for law in laws)
+    for k, states in zip(range(order + 1), zip(*series, strict=True), strict=False):
+        wanted, *trial = (state[3] for state in states)
+        if trial[0] == trial[1] == trial[2]:
+            if trial[0] != wanted:
                 return []
             continue
         aim = shear_at(k, target, rate, linear_relaxation)
