@@ -33,6 +33,10 @@ _PROMISING = 1.25
 _TIED = 1.01
 """A screened misfit over the chosen one's up to which a law may turn out an exact tie."""
 
+_OF_NEAR = 0.1 * SCREENING
+"""Relative tolerance of what is no tie, where runs are costly: its misfit ranks it, and no interval
+of a constant is as narrow."""
+
 _MOST_POLISHED = 2 * BREADTH
 
 
@@ -221,7 +225,7 @@ def _polish(search: SupportSearch, fits: list[Fit], chosen: Fit) -> list[Fit]:
         limit = _TIED * chosen.misfit + 10.0 * search.floor
         tied = [fit for fit in fits if fit.misfit <= limit]
     near = [fit for fit in fits if not any(fit is one for one in tied)]
-    return [*_refitted(search, tied, POLISHING), *_refitted(search, near, SCREENING**2)]
+    return [*_refitted(search, tied, POLISHING), *_refitted(search, near, _OF_NEAR)]
 
 
 def _refitted(search: SupportSearch, fits: list[Fit], tolerance: float) -> list[Fit]:

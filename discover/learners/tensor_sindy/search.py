@@ -211,7 +211,9 @@ class SupportSearch:
         return sum(len(support) <= size for support in self._far - {*self.fits})
 
     def polish(self) -> list[Fit]:
-        """Refit the best of each size, and its near ties, to the tight tolerance."""
+        """Refit the best of each size, and its near ties, to a tight tolerance."""
+        # where runs are costly, to far less than what a coefficient is known to
+        tolerance = POLISHING if self.scout is None else SCREENING**2
         largest = max(len(s) for s in self.fits)
         chosen: list[tuple[int, ...]] = []
         for size in range(1, largest + 1):
@@ -220,7 +222,7 @@ class SupportSearch:
             limit = 1.001 * ranked[0].misfit + 10.0 * self.floor
             near = [f.support for f in ranked if f.misfit <= limit]
             chosen += near[: BREADTH if size == 1 else 4]
-        self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=POLISHING)
+        self._refit(chosen, {s: self.fits[s] for s in chosen}, tolerance=tolerance)
         self._count_independent([self.of_size(size)[0] for size in range(largest + 1)])
         # read again: the criterion decides between closed forms and polynomials of one size
         return [self.of_size(size)[0] for size in range(largest + 1)]
