@@ -47,15 +47,15 @@ def probability_over_correlations(
     free = len(residual) - known - asked
     if free < 1:
         return 1.0
-    products = [_products(columns[run]) for run in rows]
+    products = np.stack([_products(columns[run]) for run in rows])
     likelihoods, chances = [], []
     for correlation in _CORRELATIONS:
         parts = np.array([1.0, -correlation, correlation**2])
-        steps = [np.tensordot(parts, run, 1) for run in products]
+        steps = np.einsum("i,rijk->rjk", parts, products)
         sizes = np.ones(len(rows))
         for _ in range(_REFINED):
             sizes = _sizes(steps, sizes, rows)
-        total = sum(run / size for run, size in zip(steps, sizes, strict=True))
+        total = np.einsum("r,rjk->jk", 1.0 / sizes, steps)
         alone, both = _left(total, known), _left(total, known + asked)
         if not both > _ROUNDING * total[-1, -1]:
             return 0.0
@@ -91,10 +91,12 @@ def _left(total: Float[np.ndarray, "c c"], count: int) -> float:
 
 
 def _sizes(
-    steps: Sequence[np.ndarray], sizes: Float[np.ndarray, " runs"], rows: Sequence[np.ndarray]
+    steps: Float[np.ndarray, "runs c c"],
+    sizes: Float[np.ndarray, " runs"],
+    rows: Sequence[np.ndarray],
 ) -> Float[np.ndarray, " runs"]:
     """Return the variance of innovations of each run over the mean; of a short one that mean."""
-    total = sum(run / size for run, size in zip(steps, sizes, strict=True))
+    total = np.einsum("r,rjk->jk", 1.0 / sizes, steps)
     fitted = np.linalg.lstsq(total[:-1, :-1], total[:-1, -1], rcond=None)[0]
     left = np.append(-fitted, 1.0)
     counts = np.array([len(run) for run in rows])

@@ -20,7 +20,10 @@ from discover.statistics.residual import Expectation, fast_part
 REASON = "what is left ({}) has a pattern that no error of the moduli of the sweep leaves"
 """Of what is left, in words; its size is put in."""
 
-ADVICE = "measure the sweep to frequencies as high, and as low, as the times and rates of the runs"
+ADVICE = (
+    "measure the sweep to frequencies as high, and as low, as the times and rates of the runs, and "
+    "at a smaller strain if no modes describe it"
+)
 
 _TOO_FAR = 1e-4
 _SMALLEST = 1e-6  # of records, that computed ones are accurate to
