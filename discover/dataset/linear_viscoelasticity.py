@@ -120,7 +120,8 @@ class RelaxationSpectrum:
         from one.
     pattern
         Root mean square of what in that misfit is no noise, and may be of modes too few to follow
-        the sweep; 0 where all of it may be noise, or no number of modes follows it.
+        the sweep; 0 where all of it may be noise. None where no number of modes follows it: it is
+        off by itself, and excuses no pattern in records.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -129,7 +130,7 @@ class RelaxationSpectrum:
     best_error: float
     errors: dict[int, float]
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
-    pattern: float = 0.0
+    pattern: float | None = 0.0
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -287,12 +288,14 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
     return min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE
 
 
-def _pattern(sweep: LinearSweep, found: RelaxationSpectrum, best: RelaxationSpectrum) -> float:
+def _pattern(
+    sweep: LinearSweep, found: RelaxationSpectrum, best: RelaxationSpectrum
+) -> float | None:
     """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
     Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
     leave less than these by more than the freedom that they have. Of a sweep too short to tell it
-    is all of the misfit. If no number of modes leaves noise, the sweep is off by itself.
+    is all of the misfit. None if no number of modes leaves noise.
     """
     rows = _misfit(sweep, found)
     if rows.shape[1] < FEWEST_FAST:
@@ -307,7 +310,7 @@ def _pattern(sweep: LinearSweep, found: RelaxationSpectrum, best: RelaxationSpec
     slow = 0.0 if _seems_noise(rows) else _slow(rows)
     pattern = min(max(slow, float(coarse)), found.relative_error)
     left = _misfit(sweep, best)
-    return 0.0 if _slow(left) > FLOOR and not _seems_noise(left) else pattern
+    return None if _slow(left) > FLOOR and not _seems_noise(left) else pattern
 
 
 def _slow(rows: Float[np.ndarray, "2 n"]) -> float:
