@@ -5,15 +5,17 @@ noise and a factor of its own on each run. Each draw has other factors and anoth
 
     python benchmarks/loadings.py --draws 100 --differ 0.03
     python benchmarks/loadings.py --task compare --draws 100
+    python benchmarks/loadings.py --fluid extended_pom_pom --draws 20 --effects \
+        giesekus_mobility,convective_constraint_release,ptt_linear,finite_extensibility
 """
 
 import argparse
 from typing import NamedTuple
 
 import numpy as np
-from independent import Giesekus, oscillation, start_up
+from independent import Giesekus, PhanThienTanner, oscillation, start_up
 from independent.k_bkz import KBKZ
-from independent.pom_pom import PomPom
+from independent.pom_pom import ExtendedPomPom, PomPom
 
 import discover as dc
 from discover.dataset import Dataset, Run
@@ -32,6 +34,8 @@ FLUIDS = {
     "giesekus": Giesekus(0.3, 100.0),
     "k_bkz": KBKZ(modulus=100.0),
     "pom_pom": PomPom(modulus=100.0),
+    "extended_pom_pom": ExtendedPomPom(modulus=100.0),
+    "linear_ptt": PhanThienTanner(0.3, "linear", modulus=100.0, relaxation_time=1.0),
 }
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "wall_slip", "stress_gain"]
 NOISE, MOBILITY = 0.01, 0.3
@@ -60,9 +64,9 @@ class Answer(NamedTuple):
     factors: dict[str, tuple[float, float]]
 
 
-def of_loop(data: Dataset, base: dc.Fluid, loading: float | None) -> Answer:
+def of_loop(data: Dataset, base: dc.Fluid, loading: float | None, effects: list[str]) -> Answer:
     """Return what a closed loop answers."""
-    options = {"effects": EFFECTS, "max_effects": 2, "loading": loading}
+    options = {"effects": effects, "max_effects": 2, "loading": loading}
     loop = dc.close_loop(data, base, held_out=["held.csv"], **options)
     mobility = None
     if [stage.effect for stage in loop.stages] == ["giesekus_mobility"]:
@@ -72,8 +76,11 @@ def of_loop(data: Dataset, base: dc.Fluid, loading: float | None) -> Answer:
     return Answer(loop.verdict != "unexplained", mobility, factors)
 
 
-def of_comparison(data: Dataset, base: dc.Fluid, loading: float | None) -> Answer:
-    """Return what sparse regression answers."""
+def of_comparison(
+    data: Dataset, base: dc.Fluid, loading: float | None, effects: list[str]
+) -> Answer:
+    """Return what sparse regression answers, which has no candidates but terms."""
+    del effects
     options = {"learners": ["tensor_sindy"], "quick": True, "loading": loading}
     found = dc.compare(data, base, held_out=["held.csv"], **options)
     terms, mobility = found.outcomes["tensor_sindy"].terms, None
@@ -97,6 +104,7 @@ def main() -> None:
     parser.add_argument("--differ", type=float, default=0.03)
     parser.add_argument("--told", type=float, default=0.03, help="0 tells the loop nothing")
     parser.add_argument("--correlation", type=float, default=0.0)
+    parser.add_argument("--effects", default=",".join(EFFECTS), help="candidates of the loop")
     asked = parser.parse_args()
     fluid = FLUIDS[asked.fluid]
     exact = {name: fluid.respond(flow, times).sigma12 for name, (flow, _, times) in FLOWS.items()}
@@ -104,7 +112,7 @@ def main() -> None:
     explained = named = held = factors_held = factors_told = 0
     for seed in range(asked.seed, asked.seed + asked.draws):
         data, factors = drawn(exact, seed, asked.differ, asked.correlation)
-        answer = ANSWERS[asked.task](data, base, asked.told or None)
+        answer = ANSWERS[asked.task](data, base, asked.told or None, asked.effects.split(","))
         explained += answer.explained
         if answer.mobility is not None:
             named += 1

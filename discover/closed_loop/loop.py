@@ -51,6 +51,7 @@ from discover.dataset.own_loadings import with_loadings
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
+from discover.forward.scattered_rates import smoothed, unfelt_scatter
 from discover.forward.step_instants import instants_found, with_places
 from discover.inference.degrees import lowest_not_refuted
 from discover.linear_algebra_threads import in_one_thread
@@ -146,6 +147,9 @@ def run_loop(
     require_present(declared, {*known, *(effect.name for effect in candidates)})
     candidates = [effect for effect in candidates if effect.name not in known]
     require_possible(declared, [*fitted_runs, *held_runs])
+    of_scatter = unfelt_scatter(declared, fitted_runs)
+    if of_scatter:
+        fitted_runs, held_runs = [*map(smoothed, fitted_runs)], [*map(smoothed, held_runs)]
     silent = records_are_silent(fitted_runs)
     task = SearchTask(
         candidates,
@@ -205,7 +209,8 @@ def run_loop(
             for i, name in enumerate(final.active, start=1)
         ),
         remaining=_remaining(
-            final, constants, verdict, with_later_spikes(spikes, final.fitted, judgement), tested
+            final, constants, verdict, with_later_spikes(spikes, final.fitted, judgement), tested,
+            of_scatter,
         ),
         rankings=tuple(search.rankings),
         records=tuple(beyond.records),
@@ -253,6 +258,7 @@ def _remaining(
     verdict: FinalVerdict,
     spikes: Mapping[str, Sequence[float]],
     tested: tuple[Sequence[Run], Sequence[Run]],
+    of_rates: str,
 ) -> dict[str, Any]:
     """Return what is left, as the contract names it."""
     search, judgement, coarse = final.search, verdict.judgement, constants.coarse
@@ -278,7 +284,7 @@ def _remaining(
         "autocorrelation": float(np.mean(summary.autocorrelation)),
         "worst_run": judgement.worst.name,
         "worst_run_error": float(judgement.worst.errors[-1]),
-        "description": _with_refusals(judgement, search),
+        "description": f"{of_rates}. " * bool(of_rates) + _with_refusals(judgement, search),
         "read_as": judgement.read_as,
         "advice": left.advice,
         # of what explains nothing no interval is claimed

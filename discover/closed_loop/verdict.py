@@ -19,6 +19,7 @@ from discover.closed_loop.judging.loadings import judged_by_loadings
 from discover.closed_loop.judging.misread_runs import judged_as_read
 from discover.closed_loop.judging.silence import Silence, fluid_is_silent
 from discover.closed_loop.judging.sweep_error import judged_beyond_sweep
+from discover.closed_loop.judging.terms_beside import judged_beside_terms
 from discover.dataset import Run
 from discover.dataset.checking.start import doubts_of_start
 
@@ -80,6 +81,11 @@ def verdict_on(
         final.fit.theta, active,
     )  # fmt: skip
     judgement = judged_by_loadings(judgement, final.loadings, final.loading)
+    if final.loading:
+        judgement = judged_beside_terms(
+            judgement, final.model, final.batch, final.fit.theta, active, final.fitted,
+            final.fitted_readings, tolerated,
+        )  # fmt: skip
     times = other_times(search, final.carried, judgement) if final.carried else []
     judgement, instead = compared_with_times(judgement, active, final.carried, times)
     benches = instead_of(final.benches, final.carried, active)

@@ -11,6 +11,7 @@ from discover.comparison.fitting.prepared import (
     require_one_known_law,
     settled_by,
     thinned_to,
+    with_each_run,
     without_spikes_in_fit,
 )
 from discover.comparison.fitting.step_instants import with_step_instants
@@ -24,12 +25,13 @@ from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
+from discover.forward.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.multimode import Fluid
 from discover.learners.result import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.progress import Progress, silent
 from discover.study.data import StudyData, load_study_data
-from discover.study.declared_model import DeclaredModel, declared_model
+from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
@@ -85,6 +87,9 @@ def compare(
     sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
+    of_scatter = unfelt_scatter(forward_model(declared), data.fit.runs)
+    if of_scatter:
+        data = with_each_run(data, smoothed)
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     next_flows = options.next.weissenberg_numbers, options.next.deborah_numbers
     pipkin = list(itertools.product(*next_flows))
@@ -133,7 +138,7 @@ def compare(
         name=study.name,
         data_summary=data_in_words(data, study)
         + (_TAKEN_OUT if known.along is None and known.effects else "")
-        + "".join(f". {text}" for text in (of_steps, of_spikes) if text)
+        + "".join(f". {text}" for text in (of_scatter, of_steps, of_spikes) if text)
         + (_BY_LOADING if seen.loadings is not None else "")
         + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
         known_part=known_in_words(declared, known, study),

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.optimize import nnls
 
 from discover.dataset.columns import as_column
 from discover.errors import InputError
+from discover.statistics.independent_samples import independent_samples
 from discover.statistics.residual import slow_part
 from discover.statistics.whiteness import FEWEST_FAST, noise_probability, separate_probability
 
@@ -21,6 +22,8 @@ FLOOR = 0.01
 """A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
 
 MARGINS = (0.0, 0.25, 0.5)
+
+_Fit = Callable[[int, float], tuple[np.ndarray, np.ndarray, float]]
 
 _SEEMS_NOISE = 0.05
 """Probability that noise leaves such a misfit, up to which it is taken to be none."""
@@ -113,10 +116,12 @@ class RelaxationSpectrum:
         Error against the number of modes, the best for each number.
     modulus_covariance
         Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
-        leaves them; None where they do not come from one.
+        leaves them, with frequencies that err alike counted as one; None where they do not come
+        from one.
     pattern
-        Root mean square of what in that misfit is no noise; 0 where all of it may be. Of modes too
-        few to follow the sweep there is some.
+        Root mean square of what in that misfit is no noise, and may be of modes too few to follow
+        the sweep; 0 where all of it may be noise. None where no number of modes follows it: it is
+        off by itself, and excuses no pattern in records.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -125,7 +130,7 @@ class RelaxationSpectrum:
     best_error: float
     errors: dict[int, float]
     modulus_covariance: Float[np.ndarray, "k k"] | None = None
-    pattern: float = 0.0
+    pattern: float | None = 0.0
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -185,15 +190,17 @@ def relaxation_spectrum(
             "others."
         )
     # more unknowns than data would fit the noise
-    most_modes = min(most_modes, len(sweep.angular_frequency))
-    found = fewest_modes(partial(_fit, sweep), most_modes, tolerance)
+    count, fit = len(sweep.angular_frequency), cache(partial(_fit, sweep))
+    found = fewest_modes(fit, min(most_modes, count), tolerance)
+    modulus, time, error = min(_trials(fit, min(MOST_MODES, count)), key=lambda one: one[2])
+    best = replace(found, modulus=modulus, relaxation_time=time, relative_error=error)
     return replace(
-        found, modulus_covariance=_covariance(sweep, found), pattern=_pattern(sweep, found)
+        found, modulus_covariance=_covariance(sweep, found), pattern=_pattern(sweep, found, best)
     )
 
 
 def fewest_modes(
-    fit: Callable[[int, float], tuple[np.ndarray, np.ndarray, float]],
+    fit: _Fit,
     most: int,
     tolerance: float = TOLERANCE,
 ) -> RelaxationSpectrum:
@@ -209,7 +216,7 @@ def fewest_modes(
     tolerance
         How much worse than the best a spectrum may be, as a factor of 1 or more.
     """
-    trials = [fit(n, margin) for n in range(1, most + 1) for margin in MARGINS[: 2 * n]]
+    trials = _trials(fit, most)
     best = min(error for _, _, error in trials)
     errors: dict[int, float] = {}
     for modulus, _, error in trials:
@@ -217,6 +224,10 @@ def fewest_modes(
     within = [trial for trial in trials if trial[2] <= max(tolerance * best, FLOOR)]
     modulus, relaxation_time, error = min(within, key=lambda trial: (len(trial[0]), trial[2]))
     return RelaxationSpectrum(modulus, relaxation_time, error, best, dict(sorted(errors.items())))
+
+
+def _trials(fit: _Fit, most: int) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    return [fit(n, margin) for n in range(1, most + 1) for margin in MARGINS[: 2 * n]]
 
 
 def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -246,25 +257,48 @@ def _relative_moduli(sweep: LinearSweep, times: Float[np.ndarray, " k"]) -> np.n
 
 
 def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "k k"]:
-    """Return s² (AᵀA)⁻¹ of the moduli, s² the misfit for each degree of freedom that is left."""
+    """Return s² (AᵀA)⁻¹ of the moduli, s² the misfit for each degree of freedom that is left.
+
+    Where the misfit is no noise, neighbouring frequencies err alike, and so many of them count as
+    one as the autocorrelation of the misfit says: a sweep at a strain that is not small, or of a
+    tool with inertia, is off by something smooth, which the moduli take up as far as they can.
+    """
     design = _relative_moduli(sweep, found.relaxation_time) * found.modulus
     free = max(len(design) - len(found), 1)
     variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
+    rows = _misfit(sweep, found)
+    if not _seems_noise(rows):
+        variance *= rows.size / sum(independent_samples(row) for row in rows)
     return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)
 
 
-def _pattern(sweep: LinearSweep, found: RelaxationSpectrum) -> float:
-    """Return the root mean square of what in the misfit is no noise.
+def _misfit(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "2 n"]:
+    """Return what modes miss G′ and G″ by, relative, along increasing frequency."""
+    design = _relative_moduli(sweep, found.relaxation_time)
+    order = np.argsort(sweep.angular_frequency)
+    return (design @ found.modulus - 1.0).reshape(2, -1)[:, order]
+
+
+def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
+    """Return whether noise of each frequency may leave such a misfit; not told of a few."""
+    if rows.shape[1] < FEWEST_FAST:
+        return False
+    chance = len(rows) * min(separate_probability([row]) for row in rows)
+    of_all = noise_probability(rows, np.ones_like(rows))
+    return min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE
+
+
+def _pattern(
+    sweep: LinearSweep, found: RelaxationSpectrum, best: RelaxationSpectrum
+) -> float | None:
+    """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
     Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
     leave less than these by more than the freedom that they have. Of a sweep too short to tell it
-    is all of the misfit.
+    is all of the misfit. None if no number of modes leaves noise.
     """
-    design = _relative_moduli(sweep, found.relaxation_time)
-    order = np.argsort(sweep.angular_frequency)
-    rows = np.split(design @ found.modulus - 1.0, 2)
-    rows = np.array([row[order] for row in rows])
-    if len(order) < FEWEST_FAST:
+    rows = _misfit(sweep, found)
+    if rows.shape[1] < FEWEST_FAST:
         return found.relative_error
     count = rows.size
 
@@ -273,9 +307,11 @@ def _pattern(sweep: LinearSweep, found: RelaxationSpectrum) -> float:
 
     least = min(variance(modes, error) for modes, error in found.errors.items())
     coarse = np.sqrt(max(variance(len(found), found.relative_error) - least, 0.0))
-    chance = len(rows) * min(separate_probability([row]) for row in rows)
-    of_all = noise_probability(rows, np.ones_like(rows))
-    if min(chance, 1.0 if of_all is None else of_all) > _SEEMS_NOISE:
-        return min(float(coarse), found.relative_error)
-    slow = float(np.sqrt(np.mean([slow_part(row) ** 2 for row in rows])))
-    return min(max(slow, float(coarse)), found.relative_error)
+    slow = 0.0 if _seems_noise(rows) else _slow(rows)
+    pattern = min(max(slow, float(coarse)), found.relative_error)
+    left = _misfit(sweep, best)
+    return None if _slow(left) > FLOOR and not _seems_noise(left) else pattern
+
+
+def _slow(rows: Float[np.ndarray, "2 n"]) -> float:
+    return float(np.sqrt(np.mean([slow_part(row) ** 2 for row in rows])))

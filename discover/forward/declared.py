@@ -49,7 +49,8 @@ class DeclaredModel:
         Relative error with which the modes describe the linear data they come from; no prediction
         can be expected to do better.
     linear_pattern
-        Relative size of what in that error is no noise of the linear data; 0 where all may be.
+        Relative size of what in that error is no noise of the linear data; 0 where all may be, None
+        where no number of modes follows them.
     modulus_covariance
         Of the moduli in Pa², shape (k, k), as those data leave them; None where they are exact.
     effects
@@ -80,7 +81,7 @@ class DeclaredModel:
     parameters: tuple[tuple[str, float], ...] = ()
     free_parameters: tuple[FreeParameter, ...] = ()
     linear_error: float = 0.0
-    linear_pattern: float = 0.0
+    linear_pattern: float | None = 0.0
     effects: tuple[KnownEffect, ...] = ()
     by_mode: tuple[str, ...] = ()
     modulus_covariance: Float[np.ndarray, "k k"] | None = None

@@ -157,6 +157,21 @@ def unknown_between_samples(protocol: FlowProtocol, times: Samples | None = None
     return float(np.sqrt(change / size)) if size > 0.0 else 0.0
 
 
+def samples_of(
+    protocol: FlowProtocol, times: Samples
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Return the samples of a rate that was read in samples: times in s and rates in 1/s.
+
+    Parameters
+    ----------
+    protocol
+        Whose table holds nothing from before the record.
+    times
+        Of the record; where that was thinned, what its rate was read in before.
+    """
+    return _samples(np.asarray(protocol.table_times), np.asarray(protocol.table_rates), times)
+
+
 def _samples(
     knots: np.ndarray, rates: np.ndarray, times: Samples | None
 ) -> tuple[np.ndarray, np.ndarray]:

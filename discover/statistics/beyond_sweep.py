@@ -17,17 +17,20 @@ from discover.statistics.projection import without
 from discover.statistics.reading_faults import Reading, Session
 from discover.statistics.residual import Expectation, fast_part
 
-REASON = "what is left ({}) has a pattern that no error of the moduli of the sweep leaves"
+REASON = "what is left ({}) has a pattern that the error of the sweep does not excuse"
 """Of what is left, in words; its size is put in."""
 
-ADVICE = "measure the sweep to frequencies as high, and as low, as the times and rates of the runs"
+ADVICE = (
+    "measure the sweep to frequencies as high, and as low, as the times and rates of the runs, and "
+    "at a smaller strain if no modes describe it"
+)
 
 _TOO_FAR = 1e-4
 _SMALLEST = 1e-6  # of records, that computed ones are accurate to
 
 
 def beyond_the_sweep(
-    runs: Sequence[Reading], expectation: Expectation, pattern: float
+    runs: Sequence[Reading], expectation: Expectation, pattern: float | None
 ) -> LackOfFit | None:
     """Return what the sweep does not excuse of what is left of runs; None where it excuses all.
 
@@ -43,16 +46,18 @@ def beyond_the_sweep(
         What a complete law may leave.
     pattern
         Relative size of what the modes miss of the sweep and noise has not: of modes too few, which
-        miss records so too. That much is excused still.
+        miss records so too. That much is excused still. None for a sweep that no number of modes
+        follows, of whose moduli nothing is known: it excuses nothing.
     """
     runs = [run for run in runs if len(run.times)]
-    if expectation.linear_error <= pattern or not runs or any(_exact(run) for run in runs):
+    told = 0.0 if pattern is None else pattern
+    if expectation.linear_error <= told or not runs or any(_exact(run) for run in runs):
         return None
-    without_sweep = replace(expectation, linear_error=pattern)
+    without_sweep = replace(expectation, linear_error=told)
     records = [run.predicted - run.residual for run in runs]
     before = _left(runs, [run.residual for run in runs], records, without_sweep)
-    if before is None:
-        return None
+    if before is None or pattern is None:
+        return before
     session = Session(runs)
     if not session.is_told or session.shared is None:
         return None

@@ -13,14 +13,19 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import f as fisher
 
+from discover.statistics.any_correlation import probability_over_correlations
 from discover.statistics.projection import rms
 from discover.statistics.reading_faults import KINDS, Fault, FaultKind, Reading, Session
 from discover.statistics.residual import Expectation
 
 CLEAR = 1e-4
-"""Probability up to which a fault is believed: of right laws in white noise one in a thousand has a
-fault of 1e-3; in noise correlated to 0.95 from sample to sample one in twenty has one of 1e-4, in
-noise correlated to 0.9 one or two in a hundred."""
+"""Probability up to which a fault is believed. By the likeliest correlation of the noise alone, of
+right laws in white noise one in a thousand has a fault of 1e-3, but in noise correlated to 0.95
+from sample to sample one in fifteen has one of 1e-4."""
+
+_WHATEVER_CORRELATION = 0.1
+"""What the probability over all correlations of noise counts: it is right as it stands, so that
+one of 1e-3 is believed."""
 
 POSSIBLE = 0.1
 """Probability up to which a fault is not ruled out, so that what is said has to hold with it: of
@@ -208,9 +213,16 @@ def _told(session: Session, fault: Fault) -> Misread | None:
     count = len(one.values)
     freedom = max(one.effective_samples - count - len(beside), 1.0)
     wald = float(one.values @ np.linalg.solve(one.covariance, one.values)) / count
-    chance = float(fisher.sf(wald, count, freedom))
+    tried = len(KINDS) * fault.tried
+    probability = tried * float(fisher.sf(wald, count, freedom))
+    seen = np.linalg.pinv(one.seen)
+    if probability <= CLEAR:
+        over = probability_over_correlations(
+            fault.own.T @ seen, beside.T, session.residual, session.rows
+        )
+        probability = max(probability, _WHATEVER_CORRELATION * tried * over)
     gain = 0.5 * one.effective_samples * np.log(one.before / max(one.after, 1e-300))
-    sizes = np.linalg.pinv(one.seen) @ one.values
+    sizes = seen @ one.values
     if fault.positive and np.any(sizes <= 0.0):
         return None
     change = fault.own.T @ sizes
@@ -226,7 +238,7 @@ def _told(session: Session, fault: Fault) -> Misread | None:
         fault.kind,
         tuple(map(float, sizes)),
         fault.level,
-        min(1.0, len(KINDS) * fault.tried * chance),
+        min(1.0, probability),
         float(gain),
         steps[: len(session.columns)],
         changes,

@@ -43,4 +43,4 @@ def test_a_mode_beyond_the_sweep_is_not_put_down_to_its_error():
     found = verdict([(20.0, 0.1)])
     assert found.error_after.fit < 1.5 * spectrum().relative_error  # which would excuse it
     assert found.verdict == "unexplained"
-    assert "no error of the moduli" in found.remaining["description"]
+    assert "the error of the sweep does not excuse" in found.remaining["description"]

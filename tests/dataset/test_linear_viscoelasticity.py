@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from independent import Giesekus, Modes
+from independent.sweeps import modulus_of
 
 from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
 from discover.dataset.checking.sweep_inertia import sweep_inertia
@@ -83,3 +85,77 @@ def test_the_inertia_left_in_the_gel_sweep_is_a_small_part_of_the_stated_one(mea
     stated = (20.5844e-6 + 1.65747e-6) * 9947180 / 5.714
     assert found.evidence > 6.0
     assert 0.01 * stated < found.inertia < 0.05 * stated
+
+
+OMEGA = np.geomspace(0.03, 50.0, 17)
+MODULI, TIMES = np.array([20.0, 60.0, 120.0]), np.array([10.0, 1.0, 0.1])
+
+
+@pytest.fixture(scope="module")
+def at_a_strain_of_one():
+    """G′ + iG″ of three Giesekus modes at a strain of 1, which is not small, by scipy."""
+    fluid = Modes(*(Giesekus(0.3, g, t) for g, t in zip(MODULI, TIMES, strict=True)))
+    return np.array([modulus_of(fluid, 1.0, omega, 8) for omega in OMEGA])
+
+
+def noisy(complex_modulus, size, seed):
+    lot = np.random.default_rng([seed, 77])
+    parts = (complex_modulus.real, complex_modulus.imag)
+    return LinearSweep(OMEGA, *(v * (1 + size * lot.standard_normal(len(OMEGA))) for v in parts))
+
+
+def linear_modulus():
+    x = 1j * OMEGA[:, None] * TIMES
+    return (x / (1 + x)) @ MODULI
+
+
+def relative(found, measured):
+    """Return G′ and G″ of modes of 1 Pa over those measured."""
+    x = 1j * OMEGA[:, None] * found.relaxation_time
+    modes = x / (1 + x)
+    return np.concatenate([modes.real, modes.imag]) / measured[:, None]
+
+
+def off_by(found):
+    """Return how far moduli are from those of the linear sweep, in standard deviations."""
+    exact = linear_modulus()
+    design = relative(found, np.concatenate([exact.real, exact.imag]))
+    true = np.linalg.lstsq(design, np.ones(len(design)))[0]
+    return (found.modulus - true) / np.sqrt(np.diag(found.modulus_covariance))
+
+
+def independent(sweep, found):
+    """Return the variance of moduli with each frequency as an independent one."""
+    design = relative(found, np.concatenate([sweep.storage_modulus, sweep.loss_modulus]))
+    left = np.sum((design @ found.modulus - 1.0) ** 2) / (len(design) - len(found))
+    return left * np.diag(np.linalg.inv(design.T @ design))
+
+
+def test_intervals_of_moduli_hold_though_the_strain_of_a_sweep_was_not_small(at_a_strain_of_one):
+    for seed in range(3):
+        sweep = noisy(at_a_strain_of_one, 0.01, seed)
+        found = relaxation_spectrum(sweep)
+        assert np.all(np.abs(off_by(found)) < 2.0)
+        # half of them are off by more than two if each frequency counts
+        alone = independent(sweep, found)
+        assert np.all(np.diag(found.modulus_covariance) > 4.0 * alone)
+        # no number of modes follows it, so that more of them excuse nothing
+        assert found.pattern is None
+
+
+def test_noise_of_a_sweep_at_small_strain_widens_nothing():
+    wider = []
+    for seed in range(20):
+        sweep = noisy(linear_modulus(), 0.03, seed)
+        found = relaxation_spectrum(sweep)
+        wider.append(found.modulus_covariance[0, 0] / independent(sweep, found)[0])
+    # one in twenty may look like a pattern
+    assert np.count_nonzero(np.array(wider) > 1.001) <= 3
+
+
+def test_modes_too_few_leave_a_pattern_that_more_would_not():
+    frequency = np.geomspace(1e-3, 1e3, 61)
+    times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
+    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, frequency))
+    assert found.best_error < 0.1 * found.relative_error
+    assert found.pattern == pytest.approx(found.relative_error, rel=0.05)

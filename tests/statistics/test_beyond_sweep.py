@@ -72,3 +72,15 @@ def test_what_modes_miss_of_a_sweep_is_noise_or_the_pattern_of_modes_too_few():
     assert max(patterns) < 0.02
     few = swept(0.005, 9, most_modes=5)
     assert 0.8 * few.relative_error < few.pattern <= few.relative_error
+
+
+def test_a_sweep_that_no_modes_follow_excuses_nothing():
+    told = Expectation(linear_error=ERROR)
+    for seed in range(1, 5):
+        runs = readings(seed, off=1.0)
+        assert beyond_the_sweep(runs, told, 0.0) is None
+        beyond = beyond_the_sweep(runs, told, None)
+        assert beyond is not None
+        assert beyond.verdict == "unexplained"
+        # what is noise needs no excuse
+        assert beyond_the_sweep(readings(seed), told, None) is None

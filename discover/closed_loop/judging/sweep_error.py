@@ -17,7 +17,7 @@ def judged_beyond_sweep(
     fitted: Sequence[Reading],
     unseen: Sequence[Reading],
     tolerated: ToleratedMisfit,
-    pattern: float,
+    pattern: float | None,
     theta: np.ndarray,
     active: Sequence[str],
 ) -> Judgement:
