@@ -37,7 +37,7 @@ from discover.laws import Fluid
 from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
-from discover.report.plots.by_mode import by_mode_in_brief
+from discover.report.plots.by_mode import by_mode_in_brief, by_mode_picture
 from discover.report.wording import terms_text
 from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation
@@ -171,8 +171,14 @@ def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
     (few, all_sets), (every, still_in) = kept
     assert (few, every) == (60, 200)
     assert still_in < all_sets
+    left_out = (
+        f"{all_sets - still_in} of {all_sets} sets of terms were ranked on at most 60 samples"
+    )
+    assert of_few.left_out.startswith(left_out)
+    assert of_few.left_out in by_mode_picture(of_few.constants, False, of_few.left_out).caption
     of_all = next(laws_of(MOBILITIES, times=times, ranks_on_all=True))
     assert [*of_few.constants] == [*of_all.constants]
+    assert not of_all.left_out
     # both are at the minimum of all samples, to the tolerance of the fits
     for one, other in zip(*(law.constants[NAME].modes for law in (of_few, of_all)), strict=True):
         assert one.value == pytest.approx(other.value, rel=1e-3)

@@ -99,6 +99,8 @@ class LawByMode:
         Whether it explains the fitted runs, and runs held out speak against it.
     misread
         How else the runs were read, if it describes them clearly better so.
+    left_out
+        What was not fitted, to save time, in words; empty for nothing.
     """
 
     constants: Mapping[str, ConstantByMode]
@@ -108,6 +110,7 @@ class LawByMode:
     bands: Mapping[str, PredictionBand] = field(default_factory=dict)
     refuted: bool = False
     misread: Misread | None = None
+    left_out: str = ""
 
     @property
     def explains(self) -> bool:
@@ -204,13 +207,14 @@ def fit_laws_by_mode(
     names = [name for of_set in sets for name in of_set]
     problem = _problem(model, names, fitted, n_candidates)
     forward = problem.model
-    rough = problem
+    rough, left_out = problem, ""
     few = [enough_to_rank(run) for run in fitted]
     # it has a program of its own to compile
     if not ranks_on_all and 2 * sum(map(len, few)) < sum(map(len, fitted)):
         rough = _problem(model, names, few, n_candidates)
         ranked = _best_first(rough, sets)
-        sets = [tuple(one.degrees) for one in ranked if one.behind < _STILL_IN]
+        kept = [tuple(one.degrees) for one in ranked if one.behind < _STILL_IN]
+        sets, left_out = kept, _left_out(len(sets) - len(kept), len(sets), max(map(len, few)))
     best = next(iter(_best_first(problem, sets)), None)
     if best is None or not any(one.degree for one in best.degrees.values()):
         return
@@ -233,6 +237,7 @@ def fit_laws_by_mode(
                 errors,
                 bands,
                 misread=_misread(problem, fit, left, seen, held_out, expectation),
+                left_out=left_out,
             )
         is_first = False
         least = one_degree_more(forward, degrees)
@@ -361,6 +366,15 @@ def _effect_of(term: str, coefficient: float) -> str:
         return term
     amplitude = make_effect(named).parameters[0]
     return named if amplitude.low <= coefficient <= amplitude.high else term
+
+
+def _left_out(count: int, total: int, samples: int) -> str:
+    if not count:
+        return ""
+    return (
+        f"{count} of {total} sets of terms were ranked on at most {samples} samples of a run and "
+        "fitted no further, to save time (recipe 'thorough' fits all on all)."
+    )
 
 
 @dataclass(frozen=True)

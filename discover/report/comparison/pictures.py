@@ -51,7 +51,7 @@ def comparison_pictures(
 
 def _by_mode_picture(comparison: Comparison) -> Picture | None:
     law = comparison.by_mode
-    return None if law is None else by_mode_picture(law.constants, not law.explains)
+    return None if law is None else by_mode_picture(law.constants, not law.explains, law.left_out)
 
 
 def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:

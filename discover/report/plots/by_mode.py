@@ -29,7 +29,7 @@ _TRIED = ("linear", "quadratic", "free")
 
 
 def by_mode_picture(
-    constants: Mapping[str, ConstantByMode], is_unexplained: bool
+    constants: Mapping[str, ConstantByMode], is_unexplained: bool, left_out: str = ""
 ) -> Picture | None:
     """Return each constant by mode with its band; None where there is none.
 
@@ -39,6 +39,8 @@ def by_mode_picture(
         By name of the parameter, the effect or the term.
     is_unexplained
         Whether a law with these constants leaves more than noise.
+    left_out
+        What was not fitted, to save time, in words.
     """
     if not constants:
         return None
@@ -75,7 +77,7 @@ def by_mode_picture(
             "by_mode",
             f"{said}{doubt} Intervals take it that the law is the fluid's. They hold one degree "
             "more than was chosen, where one was tried, and modes that are free where more of them "
-            "are told than a parabola has constants.",
+            f"are told than a parabola has constants. {left_out}".rstrip(),
         )
 
 
