@@ -194,8 +194,12 @@ def relaxation_spectrum(
     found = fewest_modes(fit, min(most_modes, count), tolerance)
     modulus, time, error = min(_trials(fit, min(MOST_MODES, count)), key=lambda one: one[2])
     best = replace(found, modulus=modulus, relaxation_time=time, relative_error=error)
+    rows = _misfit(sweep, found)
+    is_noise = _seems_noise(rows)
     return replace(
-        found, modulus_covariance=_covariance(sweep, found), pattern=_pattern(sweep, found, best)
+        found,
+        modulus_covariance=_covariance(sweep, found, rows, is_noise),
+        pattern=_pattern(found, rows, is_noise, _misfit(sweep, best)),
     )
 
 
@@ -256,7 +260,9 @@ def _relative_moduli(sweep: LinearSweep, times: Float[np.ndarray, " k"]) -> np.n
     )
 
 
-def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "k k"]:
+def _covariance(
+    sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"], is_noise: bool
+) -> Float[np.ndarray, "k k"]:
     """Return s² (AᵀA)⁻¹ of the moduli, s² the misfit for each degree of freedom that is left.
 
     Where the misfit is no noise, neighbouring frequencies err alike, and so many of them count as
@@ -266,8 +272,7 @@ def _covariance(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarr
     design = _relative_moduli(sweep, found.relaxation_time) * found.modulus
     free = max(len(design) - len(found), 1)
     variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
-    rows = _misfit(sweep, found)
-    if not _seems_noise(rows):
+    if not is_noise:
         variance *= rows.size / sum(independent_samples(row) for row in rows)
     return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)
 
@@ -289,15 +294,17 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
 
 
 def _pattern(
-    sweep: LinearSweep, found: RelaxationSpectrum, best: RelaxationSpectrum
+    found: RelaxationSpectrum,
+    rows: Float[np.ndarray, "2 n"],
+    is_noise: bool,
+    left: Float[np.ndarray, "2 n"],
 ) -> float | None:
     """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
     Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
     leave less than these by more than the freedom that they have. Of a sweep too short to tell it
-    is all of the misfit. None if no number of modes leaves noise.
+    is all of the misfit. None if no number of modes leaves noise: `left` is of the best.
     """
-    rows = _misfit(sweep, found)
     if rows.shape[1] < FEWEST_FAST:
         return found.relative_error
     count = rows.size
@@ -307,9 +314,8 @@ def _pattern(
 
     least = min(variance(modes, error) for modes, error in found.errors.items())
     coarse = np.sqrt(max(variance(len(found), found.relative_error) - least, 0.0))
-    slow = 0.0 if _seems_noise(rows) else _slow(rows)
+    slow = 0.0 if is_noise else _slow(rows)
     pattern = min(max(slow, float(coarse)), found.relative_error)
-    left = _misfit(sweep, best)
     return None if _slow(left) > FLOOR and not _seems_noise(left) else pattern
 
 

@@ -14,7 +14,12 @@ from discover.effects.base import (
     StateEffect,
 )
 from discover.effects.known import KnownEffect, known_effects
-from discover.effects.library_term import LibraryTerm, library_effects, library_term
+from discover.effects.library_term import (
+    LibraryTerm,
+    library_effects,
+    library_term,
+    simplest_terms,
+)
 from discover.effects.mode_dependence import BY_MODE, ModeDependence
 from discover.effects.registry import (
     effects_table,
@@ -46,6 +51,7 @@ __all__ = [
     "make_effect",
     "named_effects",
     "register_effect",
+    "simplest_terms",
 ]
 
 answer_calls(__name__, effects_table)

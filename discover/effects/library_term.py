@@ -1,5 +1,6 @@
 """Any term of the tensor library as an effect: what nobody has named yet can still be found."""
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
@@ -8,6 +9,8 @@ from tensor_library.terms import CandidateTerm, TermShare
 
 # Terms that are an effect with a name already, or the base law's own
 _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
+
+_SIMPLEST = 16
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,15 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
         explicit_rate="gammadot" in term.name,
         term=term,
     )
+
+
+def simplest_terms(beside: Container[str] = ()) -> list[LibraryTerm]:
+    """Return the sixteen simplest terms of the library, but for those of some names.
+
+    Together they are a law too flexible to be believed, which tells what a law may still change.
+    """
+    simple = (term for term in build_library(degree=1).terms if term.closed_form is None)
+    return [library_term(term) for term in simple if term.name not in beside][:_SIMPLEST]
 
 
 def library_effects(degree: int = 1) -> tuple[LibraryTerm, ...]:

@@ -5,9 +5,7 @@ zeros, never another program. Runs are padded to one grid and mapped over. Trial
 a call of its own, each leaves out the terms that it has at zero.
 """
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from functools import cached_property
 
@@ -30,15 +28,13 @@ from discover.forward.batches import (
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.program import Numbers, Structure, program_of
+from discover.programs import in_threads
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
 
 # A steady state is solved for, a transient followed, a periodic state followed again and again
 _BY_SPEED = (SteadyBatch, RunBatch, StressBatch, OscillationBatch)
-
-# Calls side by side: one uses a single core, whatever the number of runs
-_WORKERS = min(os.cpu_count() or 1, 4)
 
 
 class AugmentedModel:
@@ -235,18 +231,10 @@ class AugmentedModel:
             used = program.in_use(theta)
             return np.asarray(program.predict(self._numbers, used, theta, part))
 
-        trials, out = list(thetas), []
-        # the first of a shape alone, so that the program is compiled once
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        if shape not in program.met:
-            out.append(one(trials.pop(0)))
-            program.met.add(shape)
-        if len(trials) > 1:
-            with ThreadPoolExecutor(_WORKERS) as pool:
-                out += pool.map(one, trials)
-        else:
-            out += map(one, trials)
-        return np.stack(out)
+        found = in_threads(one, thetas, is_compiled=shape in program.met)
+        program.met.add(shape)
+        return np.stack(found)
 
     def residuals(
         self,

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.dataset.run_table import wave_of
-from discover.effects import library_term
+from discover.effects import simplest_terms
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import data_scales, make_batch
 from discover.forward.declared import DeclaredModel
@@ -23,14 +23,12 @@ from discover.statistics.projection import rms
 from discover.statistics.residual import summarise
 from discover.statistics.whiteness import separate_probability
 from discover.words import percent_of
-from tensor_library.library import build_library
 
 _LEAST = 5e-3
 """Scatter over the size of the rate, below which the stress hardly tells it from none."""
 
 _FEWEST = 24
 _SEEMS_NOISE = 0.01
-_MOST_TERMS = 16
 _LIKELIER = 3.0
 """Of log likelihood, from which on smooth rates are believed: twenty times as likely."""
 
@@ -82,9 +80,7 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     ]
     if not scatter:
         return ""
-    simple = [t for t in build_library(degree=1).terms if t.closed_form is None][:_MOST_TERMS]
-    terms = [library_term(term) for term in simple]
-    costs, effective = [], []
+    terms, costs, effective = simplest_terms(), [], []
     for some in (runs, smooth):
         model, batch = AugmentedModel(declared, terms, data_scales(some)), make_batch(some)
         free = [*model.free_positions, *(model.positions(term.name)[0] for term in terms)]

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Run
-from discover.effects import AbstractEffect, library_term
+from discover.effects import AbstractEffect, simplest_terms
 from discover.forward import AugmentedModel, Batch, as_predicted
 from discover.forward.least_squares import jacobians
 from discover.statistics.any_correlation import probability_over_correlations
@@ -21,10 +21,6 @@ from discover.statistics.loadings import ADVICE
 from discover.statistics.projection import rms, without
 from discover.statistics.reading_faults import Reading, Session
 from discover.statistics.residual import STRUCTURE
-from tensor_library.library import build_library
-
-_TERMS = 16
-"""The simplest of the library, which are asked together."""
 
 _SEEN = 1e-2
 """Of what a term changes, what constants and factors leave of it at least."""
@@ -94,8 +90,7 @@ def _of_terms(
     """Return what each term changes in the samples of a session, each of length one."""
     used = {*active, *(known.name for known in model.declared.effects)}
     effects: list[AbstractEffect] = [one for one in model.effects if one.name in used]
-    simple = [t for t in build_library(degree=1).terms if t.closed_form is None]
-    terms = [t for t in map(library_term, simple) if t.name not in used][:_TERMS]
+    terms = simplest_terms(beside=used)
     # without the candidates that were not chosen there is little to compile
     asked = AugmentedModel(model.declared, [*effects, *terms])
     values, shared = asked.zero(), model.declared.size

@@ -1,8 +1,6 @@
 """What laws with constants by mode predict: every mode by itself, and their sum."""
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
 import numpy as np
@@ -15,9 +13,7 @@ from discover.identify.rivals.bands import PredictionBand, bands_of_predictions
 from discover.identify.side_by_side.many_laws import predict_laws
 from discover.inference.draws_by_mode import ConstantsDrawn
 from discover.laws.multimode import Fluid
-from discover.programs import on_device
-
-_WORKERS = min(os.cpu_count() or 1, 4)
+from discover.programs import in_threads, on_device
 
 _AT_A_TIME = 512
 """Modes followed side by side: every length is one more program, and more take more memory."""
@@ -63,11 +59,7 @@ def bands_by_mode(
         modes = _modes([column[at] for column in columns], effects, fluid)
         return predict_laws(modes, protocols, times)
 
-    first, *later = range(0, total, size)
-    each = [part(first)]  # alone, so that the program is compiled once
-    with ThreadPoolExecutor(_WORKERS) as pool:  # one uses a single core
-        each += pool.map(part, later)
-    each = np.concatenate(each)[:total]
+    each = np.concatenate(in_threads(part, range(0, total, size)))[:total]
     predicted = each.reshape(-1, drawn.values.shape[-1], *each.shape[1:]).sum(axis=1)
     found = bands_of_predictions(predicted, drawn.sizes, times)
     return {flow.key: band for flow, band in zip(shown, found, strict=True)}

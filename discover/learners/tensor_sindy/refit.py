@@ -1,8 +1,6 @@
 """Refit of given supports without penalty: nonlinear least squares on integrated trajectories."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import equinox as eqx
@@ -15,12 +13,8 @@ from jaxtyping import Array, Bool, Float
 from discover.learners.trajectories.damped_steps import levenberg_marquardt
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
-from discover.programs import compiled, on_device
+from discover.programs import compiled, in_threads, on_device
 from discover.progress import require_wanted
-
-# One support to a program, and programs side by side in threads: a batch of supports by `vmap`
-# takes as many steps as its slowest member, two to three times the work (`benchmarks/refits.py`).
-_WORKERS = min(os.cpu_count() or 1, 4)
 
 _MAX_STEPS = 40
 SCREENING = 1e-3
@@ -222,9 +216,6 @@ def refit(
     everything = np.ones(problem.target.shape[:2], dtype=bool)
     keeps = [everything] * len(supports) if keeps is None else keeps
     jobs = list(zip(supports, starts, keeps, strict=True))
-    if not jobs:
-        return []
-    # the first alone, so that the program is compiled once
-    fits = [one(*jobs[0])]
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        return fits + list(pool.map(lambda job: one(*job), jobs[1:]))
+    # one support to a program: a batch of them by `vmap` takes as many steps as its slowest member,
+    # two to three times the work (`benchmarks/refits.py`)
+    return in_threads(lambda job: one(*job), jobs)
