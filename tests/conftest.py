@@ -57,7 +57,8 @@ _END_TO_END = {
     "test_profile.py", "test_open_constants.py", "test_bands_of_states.py", "test_coarse_rates.py",
     "test_modes_of_a_stiff_fluid.py", "test_named_effects.py", "test_folds.py",
     "test_other_ways.py", "test_further_laws.py", "test_nameless_terms.py", "test_loadings.py",
-    "test_other_benches.py",
+    "test_other_benches.py", "test_further_mode.py", "test_smaller_laws.py",
+    "test_terms_beside.py", "test_filters_for_terms.py", "test_scattered_rates.py",
 }  # fmt: skip
 
 

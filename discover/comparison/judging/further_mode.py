@@ -15,10 +15,13 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.outcomes.flows import Flow, predict
+from discover.comparison.outcomes.flows import Flow
 from discover.errors import InputError
+from discover.forward.fluids import observed_in_batch
 from discover.laws.each_mode import LawOfEachMode
 from discover.laws.multimode import Fluid
+from discover.simulate.enough_steps import in_enough_steps
+from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics.misread import CLEAR
 from discover.statistics.outliers import stray
 from discover.statistics.projection import rms
@@ -32,6 +35,7 @@ _STARTS = (0.1, 0.3, 3.0)
 """Relaxation times from which the further mode is fitted, over that of the mode declared."""
 
 _SHARE = 0.2  # of the modulus, from which it is
+_NONE = -40.0  # logarithm of the share of a mode that is not there
 _STEP, _MOST_EVALUATIONS = 1e-3, 20
 _RUNS_AWAY = 1e3  # residual, over noise, of parameters with which the law does
 
@@ -108,6 +112,7 @@ class _Asked:
 
     law: MovedLaw
     flows: Sequence[Flow]
+    steps: FlowBatch
     kept: Sequence[np.ndarray]
     weights: Sequence[Float[np.ndarray, " _"]]
 
@@ -117,52 +122,50 @@ class _Asked:
         several = len(law.declared.modulus) > 1 or isinstance(law.declared.law, LawOfEachMode)
         if not flows or not plain or several or law.inner:
             return None
-        asked = cls(law, flows, [np.ones(len(f.times), dtype=bool) for f in flows], [])
+        laid_out = lay_out([f.protocol for f in flows], [f.times for f in flows])
+        steps = in_enough_steps(law.fluid(law.start), laid_out)
+        asked = cls(law, flows, steps, [np.ones(len(f.times), dtype=bool) for f in flows], [])
+        told = asked.predicted(asked.start)
+        if told is None:
+            return None
         kept, weights = [], []
-        for flow in flows:
+        for flow, stress in zip(flows, told, strict=True):
             record = np.asarray(flow.measured, dtype=float)
             even = flow.even(record)
-            told = asked.predicted(asked.start, flow)
-            if told is None:
-                return None
-            kept.append(~stray(even * (told - record), even * record))
+            kept.append(~stray(even * (stress - record), even * record))
             weights.append(even / (rms(even * record) or 1.0))
-        return cls(law, flows, kept, weights)
+        return cls(law, flows, steps, kept, weights)
 
     @property
     def start(self) -> Float[np.ndarray, " q"]:
-        """The law as it is: a further mode without a modulus."""
+        """The law as it is: a further mode of no modulus to speak of."""
         time = float(np.log(self.law.declared.relaxation_time[0]))
-        return np.array([*self.law.start, -np.inf, time])
+        return np.array([*self.law.start, _NONE, time])
 
-    def predicted(self, values: Float[np.ndarray, " q"], flow: Flow) -> np.ndarray | None:
-        """Return σ12; the last two are logarithms of its share of the modulus and of its time."""
+    def predicted(self, values: Float[np.ndarray, " q"]) -> list[np.ndarray] | None:
+        """Return σ12 of each run; the last two are logarithms of a modulus' share and of a time."""
         try:
             one = self.law.fluid(values[:-2])
         except InputError:  # a constant of the declared law beyond its range
             return None
-        told = predict(one, flow)
-        if told is None:
-            return None
-        stress = np.asarray(told["sigma12"], dtype=float)
-        share = float(np.exp(values[-2]))
-        if share > 0.0:
-            modulus, time = np.asarray(one.modulus) * share, np.exp(values[-1:])
-            more = predict(Fluid(one.law, modulus, time, 0.0), flow)
-            if more is None:
-                return None
-            stress = stress + np.asarray(more["sigma12"], dtype=float)
-        return stress if np.all(np.isfinite(stress)) else None
+        modulus = np.append(one.modulus, np.asarray(one.modulus) * np.exp(values[-2]))
+        time = np.append(one.relaxation_time, np.exp(values[-1]))
+        both = Fluid(one.law, modulus, time, one.solvent_viscosity)
+        observed = np.asarray(observed_in_batch(both, self.steps))[..., 0]
+        stress = [row[: len(f.times)] for row, f in zip(observed, self.flows, strict=True)]
+        return stress if all(np.all(np.isfinite(row)) for row in stress) else None
 
     def rows(self, values: Float[np.ndarray, " q"]) -> list[np.ndarray] | None:
         """Return what is left of each run, over the size of its record."""
-        rows = []
-        for flow, kept, weight in zip(self.flows, self.kept, self.weights, strict=True):
-            told = self.predicted(values, flow)
-            if told is None:
-                return None
-            rows.append((weight * (told - np.asarray(flow.measured, dtype=float)))[kept])
-        return rows
+        told = self.predicted(values)
+        if told is None:
+            return None
+        return [
+            (weight * (stress - np.asarray(flow.measured, dtype=float)))[kept]
+            for stress, flow, kept, weight in zip(
+                told, self.flows, self.kept, self.weights, strict=True
+            )
+        ]
 
     def residual(self, values: Float[np.ndarray, " q"]) -> Float[np.ndarray, " m"]:
         """Return the same of all runs, each of as much weight."""
