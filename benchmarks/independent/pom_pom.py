@@ -9,7 +9,7 @@ from independent.material import Rate, RateLaw, StressLaw, rate_tensor, stretche
 
 @dataclass(frozen=True)
 class PomPom(RateLaw):
-    """A▽ = −(A − I/3)/τ_b, S = A/tr A, Λ' = Λ (L:S) − (Λ − 1) e^{2(Λ−1)/q}/τ_s.
+    """A▽ = −(A − I/3)/τ_b, S = A/tr A, Λ' = Λ (L:S) − (Λ − 1) e^{2(Λ−1)/(q−1)}/τ_s.
 
     σ = 3 G Λ² S − G I   [McLeish & Larson 1998, J. Rheol. 42, 81, differential approximation; the
     exponential of Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, which the first have not].
@@ -33,7 +33,7 @@ class PomPom(RateLaw):
         turned = stretched(a, rate) - (a - np.eye(3) / 3) / self.relaxation_time
         drawn = stretch * np.sum(velocity_gradient(rate) * a) / np.trace(a)
         # far outside (0, q) only in trial steps of the integrator
-        fast = np.exp(min(2 / self.arms * (stretch - 1), 50.0)) if self.drag_strain else 1.0
+        fast = np.exp(min(2 / (self.arms - 1) * (stretch - 1), 50.0)) if self.drag_strain else 1.0
         grown = drawn - (stretch - 1) * fast / self.stretch_time
         if grown > 0.0:
             grown *= min(max((self.arms - stretch) / (self.fade * self.arms), 0.0), 1.0)

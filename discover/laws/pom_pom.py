@@ -16,6 +16,9 @@ from tensor_library.isotropic_function import IsotropicFunction, scalars
 _FADES = 0.05
 """Share of q over which growth fades on the way to it, so that steps of fixed length can follow."""
 
+_ONE_ARM = 1e-3
+"""The least of q − 1 in a division."""
+
 
 class PomPom(AbstractConstitutiveLaw):
     """Differential pom-pom law   [McLeish & Larson 1998, J. Rheol. 42, 81].
@@ -26,8 +29,9 @@ class PomPom(AbstractConstitutiveLaw):
         A▽ = −(A − I),    S = A/tr A,    dΛ/dt = Λ L:S − (λ/λ_s) e^{ν(Λ−1)} (Λ − 1),    Λ ≤ q,
         σ = 3 Λ² S − I.
 
-    ν = 0, or 2/q where the drag of the arms couples to the strain at the branch points
-    [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121]. Written for σ, of which Λ² = 1 + tr σ/3,
+    ν = 0, or 2/(q − 1) where the drag of the arms couples to the strain at the branch points
+    [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, as RepTate has it; the extended pom-pom
+    law has 2/q]: a backbone drawn to q retracts e² times as fast, whatever q. Written for σ, of which Λ² = 1 + tr σ/3,
     and with the structure variable y = ln(tr A/3),
 
         h = e^{−y} (σ − tr σ/3 I) − σ + r (σ + I),    r = 2 (λ/λ_s) e^{ν(Λ−1)} (1 − 1/Λ),
@@ -60,8 +64,9 @@ class PomPom(AbstractConstitutiveLaw):
         growth = inner(sigma + one, rate) / (3.0 * stretch**2)  # S:γ̇
         retraction = 2.0 / self.stretch_time_ratio * (1.0 - 1.0 / stretch)
         if self.drag_strain:
-            # far beyond q only in trial steps of an integrator
-            retraction *= jnp.exp(jnp.minimum(2.0 / self.arms * (stretch - 1.0), 50.0))
+            # far beyond q only in trial steps of an integrator; with one arm nothing is drawn
+            drawn = (stretch - 1.0) / jnp.maximum(self.arms - 1.0, _ONE_ARM)
+            retraction *= jnp.exp(jnp.minimum(2.0 * drawn, 50.0))
         left = jnp.clip((self.arms - stretch) / (_FADES * self.arms), 0.0, 1.0)
         halted = (1.0 - left) * jnp.maximum(growth - retraction, 0.0)
         turning = jnp.exp(-jnp.maximum(y, -50.0))
@@ -75,7 +80,7 @@ def _written(drag_strain: bool = False) -> IsotropicFunction:
 
     arms, ratio, y, trace = scalars("q", "stretch_time_ratio", "y", "tr(sigma)")
     stretch, g, r, left, b = scalars("Lambda", "g", "r", "p", "b")
-    held = sympy.exp(2 * (stretch - 1) / arms) if drag_strain else 1
+    held = sympy.exp(2 * (stretch - 1) / sympy.Max(_ONE_ARM, arms - 1)) if drag_strain else 1
     where = {
         "Lambda": sympy.sqrt(1 + trace / 3),
         "g": scalars("tr(sigma.gammadot)") / (3 * stretch**2),

@@ -138,7 +138,7 @@ def test_steady_extension_hardens_to_the_square_of_the_arms(name):
 
 def _stretch(name, drawn):
     """Return the Λ at which (λ/λ_s) e^{ν(Λ−1)} (Λ − 1) = Λ L:S, at most q; bisected."""
-    nu = 2.0 / ARMS if name == "pom_pom_drag_strain" else 0.0
+    nu = 2.0 / (ARMS - 1.0) if name == "pom_pom_drag_strain" else 0.0
     low, high = np.ones_like(drawn), np.full_like(drawn, ARMS)
     for _ in range(60):
         middle = 0.5 * (low + high)
