@@ -9,17 +9,13 @@ from jaxtyping import Array, Bool, Float
 from discover.forward.dynamics import Dynamics, Levels
 from discover.protocols.kinematics import Kinematics
 from discover.simulate.steady_states import (
-    STEPS,
+    MOST_STEPS,
     Approach,
     approach,
     approach_step,
     arrived,
-    pseudo_time_step,
+    moves,
 )
-
-# Width in relaxation times from which on a step is Newton's to a thousandth, and what it moves by
-# rounding
-_LONG, _ROUNDING = 1e3, 1e-13
 
 
 class _Way(NamedTuple):
@@ -63,6 +59,7 @@ def _approach(dynamics: Dynamics, rate, flow):
     stress, levels = dynamics.rest()
     intensity = 1.0 if flow is None else flow.intensity
     weissenberg = intensity * jnp.abs(rate) * modes.relaxation_time
+    scalars = dynamics.variables - 4 * dynamics.tensors
 
     def changes(levels, felt):
         slow = dynamics.combined("time_factor", levels)
@@ -71,7 +68,7 @@ def _approach(dynamics: Dynamics, rate, flow):
     def step(now: _Way) -> _Way:
         index, way, levels, felt = now.index, now.way, now.levels, now.felt
         change = changes(levels, felt)
-        way = approach_step(change, way, index, weissenberg)
+        way = approach_step(change, way, index, weissenberg, scalars)
         sheared, sheared_rate = dynamics.sheared(way.stress, felt, flow)
         sheared = dynamics.combined("modulus_factor", levels) * sheared
         levels = tuple(
@@ -82,8 +79,9 @@ def _approach(dynamics: Dynamics, rate, flow):
             # σ/γ̇ changes more slowly than σ: the iteration converges however strong the slip
             viscosity = dynamics.viscosity + sheared / jnp.where(felt == 0.0, 1.0, felt)
             felt = rate / (1.0 + dynamics.series.slip * viscosity)
-        following = _Way(index + 1.0, way, levels, felt, now.moving)
-        return following._replace(moving=_moves(now, following, weissenberg))
+        beside = [(now.felt, felt), *zip(now.levels, levels, strict=True)]
+        moving = moves(now.way, way, weissenberg, beside)
+        return _Way(index + 1.0, way, levels, felt, moving)
 
     start = _Way(
         jnp.zeros(()),
@@ -92,27 +90,11 @@ def _approach(dynamics: Dynamics, rate, flow):
         jnp.asarray(rate, dtype=stress.dtype),
         jnp.asarray(True),
     )
-    end = jax.lax.while_loop(lambda now: now.moving & (now.index < STEPS), step, start)
+    end = jax.lax.while_loop(lambda now: now.moving & (now.index < MOST_STEPS), step, start)
     way, levels, felt = end.way, end.levels, end.felt
     stress = arrived(changes(levels, felt), way, weissenberg)
     scale = dynamics.combined("modulus_factor", levels)
     return scale * dynamics.recorded(stress, flow), felt
-
-
-def _moves(before: _Way, after: _Way, weissenberg) -> Bool[Array, ""]:
-    """Return whether another step may change anything: one of Newton's from here did, or none was.
-
-    A step that is taken again moves nothing either.
-    """
-    width = pseudo_time_step(before.way.number, weissenberg)
-    newton = jnp.all((after.way.number > before.way.number) & (width > _LONG))
-    pairs = [
-        (before.way.stress, after.way.stress),
-        (before.felt, after.felt),
-        *zip(before.levels, after.levels, strict=True),
-    ]
-    still = [jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a))) for a, b in pairs]
-    return ~(newton & jnp.all(jnp.stack(still)))
 
 
 def _steady_level(effect, values, rate, stress):

@@ -31,8 +31,8 @@ class PomPom(AbstractConstitutiveLaw):
 
     ν = 0, or 2/(q − 1) where the drag of the arms couples to the strain at the branch points
     [Blackwell, McLeish & Harlen 2000, J. Rheol. 44, 121, as RepTate has it; the extended pom-pom
-    law has 2/q]: a backbone drawn to q retracts e² times as fast, whatever q. Written for σ, of which Λ² = 1 + tr σ/3,
-    and with the structure variable y = ln(tr A/3),
+    law has 2/q]: a backbone drawn to q retracts e² times as fast, whatever q. Written for σ, of
+    which Λ² = 1 + tr σ/3, and with the structure variable y = ln(tr A/3),
 
         h = e^{−y} (σ − tr σ/3 I) − σ + r (σ + I),    r = 2 (λ/λ_s) e^{ν(Λ−1)} (1 − 1/Λ),
         dy/dt = S:γ̇ − 1 + e^{−y}.
@@ -67,8 +67,10 @@ class PomPom(AbstractConstitutiveLaw):
             # far beyond q only in trial steps of an integrator; with one arm nothing is drawn
             drawn = (stretch - 1.0) / jnp.maximum(self.arms - 1.0, _ONE_ARM)
             retraction *= jnp.exp(jnp.minimum(2.0 * drawn, 50.0))
-        left = jnp.clip((self.arms - stretch) / (_FADES * self.arms), 0.0, 1.0)
-        halted = (1.0 - left) * jnp.maximum(growth - retraction, 0.0)
+        left = (self.arms - stretch) / (_FADES * self.arms)
+        halted = (1.0 - jnp.clip(left, 0.0, 1.0)) * jnp.maximum(growth - retraction, 0.0)
+        # beyond q, where a long step may end, chains shrink: else all Λ there would be steady
+        halted += jnp.clip(-left, 0.0, 1.0) * retraction
         turning = jnp.exp(-jnp.maximum(y, -50.0))
         deviator = sigma - trace(sigma) / 3.0 * one
         extra = turning * deviator - sigma + (retraction + halted) * (sigma + one)
@@ -78,6 +80,9 @@ class PomPom(AbstractConstitutiveLaw):
 def _written(drag_strain: bool = False) -> IsotropicFunction:
     import sympy
 
+    def between_0_and_1(share):
+        return sympy.Max(0, share) - sympy.Max(0, share - 1)
+
     arms, ratio, y, trace = scalars("q", "stretch_time_ratio", "y", "tr(sigma)")
     stretch, g, r, left, b = scalars("Lambda", "g", "r", "p", "b")
     held = sympy.exp(2 * (stretch - 1) / sympy.Max(_ONE_ARM, arms - 1)) if drag_strain else 1
@@ -85,8 +90,8 @@ def _written(drag_strain: bool = False) -> IsotropicFunction:
         "Lambda": sympy.sqrt(1 + trace / 3),
         "g": scalars("tr(sigma.gammadot)") / (3 * stretch**2),
         "r": 2 / ratio * held * (1 - 1 / stretch),
-        "p": sympy.Max(0, 1 - sympy.Max(0, 1 - (arms - stretch) / (_FADES * arms))),
-        "b": r + (1 - left) * sympy.Max(g - r, 0),
+        "p": (arms - stretch) / (_FADES * arms),
+        "b": r * (1 + between_0_and_1(-left)) + between_0_and_1(1 - left) * sympy.Max(g - r, 0),
     }
     turning = sympy.exp(-y)
     coefficients = {"sigma": turning - 1 + b, "I": b - turning * trace / 3}

@@ -1,11 +1,11 @@
 """Steady states of a fluid, found without waiting for them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
@@ -14,14 +14,26 @@ from tensor_library.kinematics import VelocityGradient
 # A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so
 # many steps before, and widths then grow twice as fast until they have caught up. At most so often,
 # so that there are steps left to arrive
-_BACK, _MOST_AGAIN = 3.0, 20
+_BACK, _MOST_AGAIN = 3.0, 80
 
-# What may be left of the rate of change, of the largest there could be
-_STILL = 1e-3
+# What may be left of the rate of change, of the largest there could be, and of what Newton's step
+# would move every number, of itself. Where nothing is left, no step needs to be possible
+_STILL, _NOTHING, _SMALL = 1e-3, 1e-9, 1e-3
 
-# Pseudo-time steps, from a fraction of the fastest time of the flow to where a step is Newton's
-STEPS = 60
+# By how much a step may move a structure variable. Of chains it is a logarithm, which runs away
+# where it has turned nearly all to zero that should hold it
+_MOST_MOVED = 1.0
+
+# Widths of steps, from a fraction of the fastest time of the flow to where a step is Newton's
+_WIDTHS = 60
 _FIRST, _LAST = 0.05, 1e8
+
+MOST_STEPS = 240
+"""So many are taken where chains stretch far, or nearly to their end; else some forty."""
+
+# Width in relaxation times from which on a step is Newton's to a thousandth, and what it moves by
+# rounding
+_LONG, _ROUNDING = 1e3, 1e-13
 
 
 class Approach(NamedTuple):
@@ -53,21 +65,65 @@ def approach_step(
     way: Approach,
     index: Float[Array, ""],
     weissenberg_number: Float[Array, " k"],
+    scalars: int = 0,
 ) -> Approach:
-    """Return the way after one of `STEPS` steps.
+    """Return the way after one step.
 
     Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
+
+    Parameters
+    ----------
+    change
+        Rate of change of all modes.
+    index
+        Of the step.
+    weissenberg_number
+        Of each mode.
+    scalars
+        How many structure variables that are no part of a tensor stand last in each mode.
     """
     width = pseudo_time_step(way.number, weissenberg_number)
     moved = linearly_implicit_step(change, way.stress, width)
+    if scalars:
+        before = way.stress[-scalars:]
+        near = jnp.clip(moved[-scalars:], before - _MOST_MOVED, before + _MOST_MOVED)
+        moved = moved.at[-scalars:].set(near)
     possible = jnp.all(jnp.isfinite(moved), axis=0) & _is_of_chains(moved)
     taken = possible | (way.again >= _MOST_AGAIN)
-    onward = jnp.minimum(way.number + 2.0, index + 1.0)
+    onward = jnp.minimum(way.number + 2.0, jnp.minimum(index + 1.0, float(_WIDTHS)))
     return Approach(
         jnp.where(taken, moved, way.stress),
         jnp.where(taken, onward, jnp.maximum(way.number - _BACK, 0.0)),
         way.again + jnp.where(taken, 0.0, 1.0),
     )
+
+
+def moves(
+    before: Approach,
+    after: Approach,
+    weissenberg_number: Float[Array, " k"],
+    beside: Sequence[tuple[Array, Array]] = (),
+) -> Bool[Array, ""]:
+    """Return whether another step may change anything: one of Newton's from here did, or none was.
+
+    A step that is taken again moves nothing either.
+
+    Parameters
+    ----------
+    before, after
+        The way at the beginning and at the end of a step.
+    weissenberg_number
+        Of each mode.
+    beside
+        What else is on the way, before and after the step.
+    """
+    width = pseudo_time_step(before.number, weissenberg_number)
+    newton = jnp.all((after.number >= before.number) & (width > _LONG))
+    still = [
+        jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a)))
+        for a, b in [(before.stress, after.stress), *beside]
+    ]
+    return ~(newton & jnp.all(jnp.stack(still)))
 
 
 def arrived(
@@ -80,8 +136,13 @@ def arrived(
     A law may have a state of rest that no flow reaches: of FENE-P, springs of no strength.
     """
     stress = way.stress
-    most = (1.0 + weissenberg_number) * (1.0 + jnp.max(jnp.abs(stress), axis=0))
-    still = jnp.max(jnp.abs(change(stress)), axis=0) <= _STILL * most
+    now, jacobian = _with_jacobian(change, stress)
+    left = jnp.max(jnp.abs(now), axis=0)
+    # of a structure variable nothing says how large it should be
+    most = (1.0 + weissenberg_number) * (1.0 + jnp.max(jnp.abs(stress[:4]), axis=0))
+    # a stress that is small beside N1 may be far from steady where all is still by that measure
+    moved = jnp.abs(_solved(-jacobian, now)) <= _STILL * (_SMALL + jnp.abs(stress))
+    still = (left <= _STILL * most) & (jnp.all(moved, axis=0) | (left <= _NOTHING * most))
     return jnp.where(still & _is_of_chains(stress), stress, jnp.nan)
 
 
@@ -92,7 +153,7 @@ def _is_of_chains(stress):
 def pseudo_time_step(
     number: Float[Array, " k"], weissenberg_number: Float[Array, " k"]
 ) -> Float[Array, " k"]:
-    """Return the width of one of `STEPS` steps of each mode, in its relaxation times.
+    """Return the width of a step of each mode, in its relaxation times.
 
     Parameters
     ----------
@@ -102,7 +163,7 @@ def pseudo_time_step(
         Rate of the flow times the relaxation time of each mode.
     """
     first = _FIRST / (1.0 + weissenberg_number)
-    return first * (_LAST / first) ** (number / (STEPS - 1))
+    return first * (_LAST / first) ** (number / (_WIDTHS - 1))
 
 
 def linearly_implicit_step(
@@ -150,13 +211,15 @@ def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Arr
     """
     scaled = jnp.multiply.outer(fluid.relaxation_time, velocity_gradient)
     of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law)
-    return steady_modes(of_modes, scaled, fluid.rest())
+    scalars = fluid.law.variables - 4 * fluid.law.tensors
+    return steady_modes(of_modes, scaled, fluid.rest(), scalars)
 
 
 def steady_modes(
     stress_rate: Callable[[Float[Array, "k s"], Float[Array, "k ..."]], Float[Array, "k s"]],
     scaled_gradient: Float[Array, " k"] | Float[Array, "k 4"],
     rest: Float[Array, "k s"],
+    scalars: int = 0,
 ) -> Float[Array, "k s"]:
     """Return the dimensionless state of modes in one steady flow.
 
@@ -173,6 +236,10 @@ def steady_modes(
         Dimensionless dσ/dt of all modes, of their σ and their λL.
     scaled_gradient
         λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
+    rest
+        The modes at rest.
+    scalars
+        As in `approach_step`.
     """
     # the shear rate, or of an extension the largest rate of stretching
     weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)
@@ -180,10 +247,18 @@ def steady_modes(
     def change(stress):
         return stress_rate(stress.T, scaled_gradient).T
 
-    def step(way, index):
-        return approach_step(change, way, index, weissenberg), None
+    # no derivative passes through the steps, whose number depends on where they lead
+    converted, numbers = jax.closure_convert(change, rest.T)
+    fixed = jax.lax.stop_gradient(numbers)
 
-    way, _ = jax.lax.scan(step, approach(rest.T), jnp.arange(STEPS, dtype=float))
+    def step(now):
+        index, way, _ = now
+        after = approach_step(lambda s: converted(s, *fixed), way, index, still, scalars)
+        return index + 1.0, after, moves(way, after, still)
+
+    still = jax.lax.stop_gradient(weissenberg)
+    start = jnp.zeros(()), approach(jax.lax.stop_gradient(rest.T)), jnp.asarray(True)
+    _, way, _ = jax.lax.while_loop(lambda now: now[2] & (now[0] < MOST_STEPS), step, start)
     reached = jax.lax.stop_gradient(arrived(change, way, weissenberg))
     now, jacobian = _with_jacobian(change, reached)
     # Newton's step from a solution moves it by nothing, and by θ as the implicit function does

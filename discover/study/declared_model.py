@@ -231,7 +231,7 @@ def _from_earlier(
         spectrum,
         equation.solvent_viscosity,
         (*kept, *own),
-        found.text,
+        found.told(names),
     )
 
 

@@ -1,7 +1,7 @@
 """A law, its modes and its effects as an earlier result found them."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,11 @@ class EarlierResult:
         Terms that effects add to the law of each mode, with constants of its own: for every such
         effect its values in the order of the modes.
     text
-        What was taken, and how far it explained its own data, in words.
+        What was taken, in words.
+    intervals
+        95 % intervals that its constants had, by effect, or "" of a term of the law, and name.
+    doubt
+        That it did not explain its own data, in words, or empty.
     """
 
     file: Path
@@ -46,6 +50,25 @@ class EarlierResult:
     effects: tuple[KnownEffect, ...]
     of_modes: tuple[tuple[KnownEffect, ...], ...]
     text: str
+    intervals: Mapping[tuple[str, str], tuple[float, float]]
+    doubt: str
+
+    def told(self, replaced: Collection[str]) -> str:
+        """Return in words what was taken, and what is not known of it.
+
+        Parameters
+        ----------
+        replaced
+            Effects that are not taken, for a study has its own.
+        """
+        had = ", ".join(
+            f"{name}{f' of {effect}' * bool(effect)} {low:.3g} to {high:.3g}"
+            for (effect, name), (low, high) in self.intervals.items()
+            if effect not in replaced
+        )
+        open_ends = f" (95 %: {had})" if had else ""
+        exact = f" Constants count as exact: no interval here allows for theirs{open_ends}."
+        return f"{self.text}{exact}{self.doubt}"
 
 
 def result_file(written: str, study_file: Path | None) -> Path:
@@ -140,8 +163,16 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
     equation, rows = _with_added_modes(equation, rows, file)
     effects, of_modes = _effects(rows, file, len(equation.modulus))
     text = _text(file, "the loop's declared law", equation, effects, of_modes)
-    doubt = " With them the loop did not explain its data." if unexplained else ""
-    return EarlierResult(file, equation, effects, of_modes, text + doubt)
+    doubt = " With them the loop did not explain its data."
+    return EarlierResult(
+        file,
+        equation,
+        effects,
+        of_modes,
+        text,
+        _intervals(rows, file),
+        doubt if unexplained else "",
+    )
 
 
 def _with_added_modes(
@@ -197,7 +228,9 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
         )
     text = _text(file, "the law of sparse regression", equation, effects)
     doubt = "" if verdict == "explained" else " It did not explain the data that it was found in."
-    return EarlierResult(file, equation, effects, (), text + doubt)
+    of_terms = {("", term.term): term.ci95 for term in equation.terms if term.ci95 is not None}
+    intervals = of_terms | _intervals(sparse.get("effects", ()), file)
+    return EarlierResult(file, equation, effects, (), text, intervals, doubt)
 
 
 def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> EarlierResult:
@@ -212,7 +245,7 @@ def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> Earl
         raise _damaged(file) from None
     effects, of_modes = _effects([*instrument, *added], file, len(equation.modulus))
     text = _text(file, "the law with constants by mode", equation, effects, of_modes)
-    return EarlierResult(file, equation, effects, of_modes, text)
+    return EarlierResult(file, equation, effects, of_modes, text, _intervals(instrument, file), "")
 
 
 def _effects(
@@ -244,6 +277,20 @@ def _effects(
     where = f"[model] from: {file.name}"
     each = ((known_effects({name: one}, where)[0] for one in of) for name, of in of_modes.items())
     return known_effects(written, where), tuple(tuple(of) for of in each)
+
+
+def _intervals(rows: Any, file: Path) -> dict[tuple[str, str], tuple[float, float]]:
+    """Return the intervals of effects' constants, but for those with one for each mode."""
+    found = {}
+    try:
+        for row in rows:
+            for name, constant in row["parameters"].items():
+                if constant.get("ci95") is not None and not constant.get("degree"):
+                    low, high = constant["ci95"]
+                    found[str(row["effect"]), str(name)] = float(low), float(high)
+    except (TypeError, KeyError, ValueError, AttributeError):
+        raise _damaged(file) from None
+    return found
 
 
 def _damaged(file: Path) -> InputError:

@@ -111,6 +111,20 @@ def test_chains_that_end_have_the_steady_state_of_their_start_up_however_fast(na
     np.testing.assert_allclose(model.predict(model.zero(), make_batch([run]))[0], wanted, rtol=1e-6)
 
 
+@pytest.mark.parametrize("ratio", [0.1, 1.0])
+def test_chains_with_few_arms_are_not_steady_beyond_their_end(ratio):
+    """q = 1.5: where a backbone is drawn to q its stress is 3 q² Wi/(3 + 2 Wi²), and no more."""
+    rates = np.array([3.0, 10.0, 100.0, 1e4])
+    law = make_law("pom_pom", {"q": 1.5, "stretch_time_ratio": ratio})
+    flows = lay_out([steady_rates(rates)], [np.arange(1.0, 5.0)])
+    found = np.asarray(solve_batch(Fluid.dimensionless(law), flows))[0, :, 3]
+    ends = 3.0 * 1.5**2 * rates / (3.0 + 2.0 * rates**2)
+    # growth stops at q only if it is faster than retraction there: Wi²/(3 + 2 Wi²) > (1 − 1/q)/θ
+    drawn_to_the_end = rates**2 / (3.0 + 2.0 * rates**2) > (1.0 - 1.0 / 1.5) / ratio
+    np.testing.assert_allclose(found[drawn_to_the_end], ends[drawn_to_the_end], rtol=1e-6)
+    assert np.all(found[~drawn_to_the_end] < ends[~drawn_to_the_end])
+
+
 def test_where_no_steady_state_of_chains_is_reached_none_is_told():
     """At a Weissenberg number of 1e5 the steps end at springs of no strength: that is no answer."""
     fluid = Fluid.dimensionless(make_law("fene_p", {"L2": 50.0}))

@@ -133,6 +133,18 @@ def test_an_effect_of_the_study_stands_in_place_of_the_one_that_was_found(tmp_pa
     assert found.free_constants == ("stress_gain.gain_error",)
 
 
+def test_constants_are_said_to_count_as_exact_with_the_intervals_that_they_had(tmp_path):
+    said = declared(write(tmp_path, "loop.json", LOOP)).source
+    assert "count as exact" in said
+    assert "gain_error of stress_gain -0.12 to -0.08, epsilon of ptt_linear 0.1 to 0.3" in said
+
+
+def test_of_an_effect_that_is_fitted_again_no_interval_is_said_to_be_lost(tmp_path):
+    model = 'from = "earlier"\neffects = { ptt_linear = "fit" }'
+    said = declared(write(tmp_path, "loop.json", LOOP, model)).source
+    assert "epsilon of ptt_linear" not in said
+
+
 def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
     doubtful = {**LOOP, "verdict": "unexplained"}
     assert "did not explain" in declared(write(tmp_path, "loop.json", doubtful)).source
