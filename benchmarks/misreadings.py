@@ -2,7 +2,7 @@
 
     python benchmarks/misreadings.py
 
-Two tables of docs/verdicts.md, by the statistic alone: start-ups and an oscillation of a Giesekus
+Two tables of docs/hostile.md, by the statistic alone: start-ups and an oscillation of a Giesekus
 fluid by scipy, of which three runs are fitted and one is held out. The mobility is fitted to first
 order, and with it the test of `discover.statistics.misread` is asked.
 """

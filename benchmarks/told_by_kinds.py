@@ -2,7 +2,7 @@
 
     python benchmarks/told_by_kinds.py --out told_by_kinds
 
-The table of docs/verdicts.md. The fluid is that of `every_test_records`; modulus and relaxation
+The table of docs/calibration.md. The fluid is that of `every_test_records`; modulus and relaxation
 time are fitted along, and the fastest start-up is held out.
 """
 
