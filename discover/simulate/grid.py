@@ -17,6 +17,10 @@ from discover.simulate.stress_grid import MAX_GRID_POINTS, stress_grid
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
 
+# The same where the relaxation time is not known: a trial law that thins relaxes far faster than
+# the flow turns it
+_COARSEST_OF_ANY = 0.25
+
 # Of a steady flow before the record: steps, their shrinking towards its end, relaxation times
 _FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS, _SETTLED_BEFORE = 100, 0.08, 50.0
 
@@ -105,8 +109,9 @@ def make_grid(
     Every sample and every kink of the protocol is a step; between them no step turns the fluid
     through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
     defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
-    rate before t = 0 is gone through in steps of `COARSEST_STRAIN` that shrink towards its end: a
-    steady state is a fixed point of the method whatever its step, but stable in short ones only.
+    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or a quarter of it where the
+    relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
+    the method whatever its step, but stable in short ones only.
 
     Parameters
     ----------
@@ -118,7 +123,8 @@ def make_grid(
         Largest step in s.
     growth
         While the rate of a table does not change, steps may grow to this fraction of the time since
-        it last did, up to `COARSEST_STRAIN`: what follows a change happens ever more slowly.
+        it last did, up to a quarter of `COARSEST_STRAIN`: what follows a change happens ever more
+        slowly.
         An oscillation of the fluid's own is not resolved in the steps that grow.
     relaxation_time
         Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
@@ -232,7 +238,8 @@ def _steady_history(
     if relaxation_time is not None:
         begins = max(begins, -_SETTLED_BEFORE * relaxation_time)
     strain = abs(history[0] * begins)
-    count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / COARSEST_STRAIN)))
+    coarsest = _COARSEST_OF_ANY if relaxation_time is None else COARSEST_STRAIN
+    count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / coarsest)))
     coarse = np.linspace(begins, 0.0, count + 1)[:-1]
     # the fixed point is only reached in steps that follow the relaxation, however fast it is, so
     # the last ones shrink to the first of the record
@@ -250,7 +257,7 @@ def _grown(
     changes = np.abs(np.diff(at)) > _CHANGE * size
     ends = np.where(changes, anchors[1:], 0.0)
     since = anchors[:-1] - np.concatenate([[0.0], np.maximum.accumulate(ends)[:-1]])
-    coarsest = COARSEST_STRAIN / np.maximum(size, 1e-300)
+    coarsest = _COARSEST_OF_ANY / np.maximum(size, 1e-300)
     return np.where(changes, 0.0, np.minimum(growth * since, coarsest))
 
 
