@@ -19,7 +19,7 @@ COARSEST_STRAIN = 1.0
 
 # The same where the relaxation time is not known: a trial law that thins relaxes far faster than
 # the flow turns it
-_COARSEST_OF_ANY = 0.25
+_COARSEST_OF_ANY = 0.5
 
 # Of a steady flow before the record: steps, their shrinking towards its end, relaxation times
 _FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS, _SETTLED_BEFORE = 100, 0.08, 50.0
@@ -109,7 +109,7 @@ def make_grid(
     Every sample and every kink of the protocol is a step; between them no step turns the fluid
     through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
     defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
-    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or a quarter of it where the
+    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or half of it where the
     relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
     the method whatever its step, but stable in short ones only.
 
@@ -123,8 +123,8 @@ def make_grid(
         Largest step in s.
     growth
         While the rate of a table does not change, steps may grow to this fraction of the time since
-        it last did, up to a quarter of `COARSEST_STRAIN`: what follows a change happens ever more
-        slowly.
+        it last did, up to `COARSEST_STRAIN` where `max_step` limits them too, else half of it: what
+        follows a change happens ever more slowly.
         An oscillation of the fluid's own is not resolved in the steps that grow.
     relaxation_time
         Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
@@ -178,7 +178,9 @@ def make_grid(
     gaps = np.diff(anchors)
     limits = np.full(gaps.shape, limit)
     if growth > 0.0 and not np.any(np.asarray(protocol.amplitudes)) and np.isfinite(limit):
-        limits = np.minimum(max_step, np.maximum(limit, _grown(anchors, knots, rates, growth)))
+        coarsest = COARSEST_STRAIN if np.isfinite(max_step) else _COARSEST_OF_ANY
+        grown = _grown(anchors, knots, rates, growth, coarsest)
+        limits = np.minimum(max_step, np.maximum(limit, grown))
     elif relaxation_time is not None and not np.any(np.asarray(protocol.amplitudes)):
         at = intensity * _table_rate(anchors, knots, rates)
         limits = np.minimum(max_step, _settled(anchors, at, limit, relaxation_time / _SURE))
@@ -249,7 +251,7 @@ def _steady_history(
 
 
 def _grown(
-    anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray, growth: float
+    anchors: np.ndarray, knots: np.ndarray, rates: np.ndarray, growth: float, strain: float
 ) -> Float[np.ndarray, " gaps"]:
     """Return the step that each gap between anchors allows, for the time since a change of rate."""
     at = _table_rate(anchors, knots, rates)
@@ -257,7 +259,7 @@ def _grown(
     changes = np.abs(np.diff(at)) > _CHANGE * size
     ends = np.where(changes, anchors[1:], 0.0)
     since = anchors[:-1] - np.concatenate([[0.0], np.maximum.accumulate(ends)[:-1]])
-    coarsest = _COARSEST_OF_ANY / np.maximum(size, 1e-300)
+    coarsest = strain / np.maximum(size, 1e-300)
     return np.where(changes, 0.0, np.minimum(growth * since, coarsest))
 
 

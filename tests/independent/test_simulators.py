@@ -157,14 +157,15 @@ def test_rolie_poly_loses_its_stretch_as_retraction_becomes_fast():
 
 @pytest.mark.parametrize(("arms", "stretch_time"), [(5.0, 0.4), (1.5, 4.0)])
 def test_pom_pom_steady_shear_obeys_its_algebra(arms, stretch_time):
-    # A is that of UCM: tr A = 1 + (2/3) Wi², A12 = Wi/3; Λ γ̇ S12 τ_s = (Λ − 1) e^{2(Λ−1)/q}, or q
+    # A is that of UCM: tr A = 1 + (2/3) Wi², A12 = Wi/3; Λ is q, or
+    # Λ γ̇ S12 τ_s = (Λ − 1) e^{2(Λ−1)/(q−1)}
     rate = 5.0
     shear, first, second = at_the_end(PomPom(arms, stretch_time, **SCALE), rate, end=20.0)
     wi = LAMBDA * rate
     orientation = wi / (3 + 2 * wi**2)
 
     def missing(x):
-        return (x - 1) * np.exp(2 * (x - 1) / arms) - x * rate * orientation * stretch_time
+        return (x - 1) * np.exp(2 * (x - 1) / (arms - 1)) - x * rate * orientation * stretch_time
 
     free = brentq(missing, 1.0, 20.0)
     stretch = min(free, arms)
