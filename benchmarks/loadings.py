@@ -114,6 +114,7 @@ def main() -> None:
         data, factors = drawn(exact, seed, asked.differ, asked.correlation)
         answer = ANSWERS[asked.task](data, base, asked.told or None, asked.effects.split(","))
         explained += answer.explained
+        print(seed, "explained" if answer.explained else "unexplained", flush=True)
         if answer.mobility is not None:
             named += 1
             low, high = answer.mobility

@@ -45,6 +45,7 @@ from discover.comparison.judging.next_measurement import (
 )
 from discover.comparison.judging.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.other_records import holding_other_records
+from discover.comparison.judging.rates_in_bands import holding_rate_errors
 from discover.comparison.judging.second_normal_stress import with_any_second_normal_stress
 from discover.comparison.judging.small_strain import with_small_strain_told
 from discover.comparison.judging.statements import (
@@ -176,7 +177,8 @@ def judge(
         outcomes, bands, of_records = holding_other_records(
             *seen, corrected=bool(frame.made), computed=study.data.synthetic is not None
         )
-        tested = replace(tested, bands=bands)
+        runs = frame.data.dataset
+        tested = replace(tested, bands=holding_rate_errors(bands, law, frame.flows, runs))
     outcomes = {name: _told(outcome, explanation) for name, outcome in outcomes.items()}
     outcomes = with_small_strain_told(outcomes, explanation, tested.others)
     outcomes = with_gain_in_dense(outcomes, tested.others)

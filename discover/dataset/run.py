@@ -95,6 +95,8 @@ class Run:
         The same of its N1 and N2, where they are fitted beside the stress.
     loading
         How much a factor of its own on its record may differ from one; None where there is none.
+    rate_error
+        Relative standard error of the rate, where that is the mean of rates read with noise.
 
     Examples
     --------
@@ -126,6 +128,7 @@ class Run:
     weight: float = 1.0
     normal_weights: tuple[float, float] = (1.0, 1.0)
     loading: Loading | None = None
+    rate_error: float = 0.0
 
     def __post_init__(self):
         # kinds and shapes are checked here, not by annotation: users build runs by hand

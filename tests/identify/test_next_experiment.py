@@ -6,7 +6,12 @@ import pytest
 from discover.errors import InputError
 from discover.identify.design.experiment_outcome import judge_laws
 from discover.identify.design.experiments import candidate_experiments
-from discover.identify.design.next_experiment import DECISIVE, propose_experiments, squared_distance
+from discover.identify.design.next_experiment import (
+    DECISIVE,
+    MOST_EVIDENCE,
+    propose_experiments,
+    squared_distance,
+)
 from discover.identify.rivals.bands import bands_of_predictions, prediction_bands
 from discover.identify.side_by_side.many_laws import (
     Contender,
@@ -186,6 +191,17 @@ def test_one_draw_of_fifty_that_runs_away_is_counted_and_left_out():
     band = bands_of_predictions(predicted, [50], times)[0]
     assert band.runaways == pytest.approx(1 / 50)
     assert np.all(np.isfinite(band.low))
+
+
+def test_a_rival_that_runs_away_though_its_draws_do_not_falls_in_any_experiment():
+    drawn = np.array([[0.1], [0.11]])
+    rival = Contender("away", {"tr(sigma)*sigma": -1.0}, covariance=SMALL, drawn=drawn)
+    fast = EXPERIMENTS[-1:]
+    proposals = propose_experiments(GIESEKUS, [rival], MAXWELL, fast, NOISE, n_draws=8)
+    assert all(proposal.evidence["away"] == MOST_EVIDENCE for proposal in proposals)
+    stays = Contender("stays", {"tr(sigma)*sigma": 0.1}, covariance=SMALL, drawn=drawn)
+    proposals = propose_experiments(GIESEKUS, [stays], MAXWELL, fast, NOISE, n_draws=8)
+    assert all(proposal.evidence["stays"] < MOST_EVIDENCE for proposal in proposals)
 
 
 def test_an_unknown_class_of_experiment_is_an_input_error():

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from discover.comparison.fitting.other_law_of_a_mode import OtherLaws, other_laws_of_modes
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
@@ -150,10 +151,13 @@ class CoefficientsInModes:
         By spelling of the term.
     bands
         Of laws whose coefficients may differ from mode to mode, by the key of the flow.
+    others
+        Laws of which one mode follows another, that describe the runs as well.
     """
 
     constants: Mapping[str, ConstantByMode]
     bands: Mapping[str, PredictionBand]
+    others: OtherLaws = field(default_factory=OtherLaws)
 
     @property
     def differ(self) -> bool:
@@ -283,7 +287,13 @@ def coefficients_in_modes(
     constants, bands = _told(problem, fit, degrees, seen, model, flows)
     if set(constants) != set(names):
         return None
-    return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands)
+    others = OtherLaws()
+    if len(names) == 1:
+        ((name, constant),) = constants.items()
+        told = [one.relaxation_time_s for one in constant.told if one.ci95 is not None]
+        others = other_laws_of_modes(model, name, told, fitted, flows)
+    bands = others.held_by(bands)
+    return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands, others)
 
 
 def _misread(

@@ -95,8 +95,10 @@ def ask_of_modes(
         if explanation.in_library:
             constants = {} if alike is None else alike.constants
             n_modes = len(model.modulus)
-            each = (said_of_each_mode(t.term, constants.get(t.term), n_modes) for t in terms)
-            said = " ".join(each)
+            others = None if alike is None else alike.others
+            said = " ".join(
+                said_of_each_mode(t.term, constants.get(t.term), n_modes, others) for t in terms
+            )
             if alike is not None and len(terms) == 1 and not alike.differ:
                 return OfModes(alike, None, said)
         elif alike is not None and _holds(frame, alike, explanation):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discover.comparison.fitting.law_by_mode import CoefficientsInModes, LawByMode
+from discover.comparison.fitting.other_law_of_a_mode import OtherLaws
 from discover.comparison.judging.statements import Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
@@ -102,7 +103,9 @@ def _text(statement: Statement, law: LawByMode, in_library: bool, flows: Sequenc
     )
 
 
-def said_of_each_mode(term: str, constant: ConstantByMode | None, n_modes: int) -> str:
+def said_of_each_mode(
+    term: str, constant: ConstantByMode | None, n_modes: int, others: OtherLaws | None = None
+) -> str:
     """Return what is to be said of a coefficient that is taken to be the same in all modes.
 
     Parameters
@@ -113,17 +116,29 @@ def said_of_each_mode(term: str, constant: ConstantByMode | None, n_modes: int) 
         What the runs say of each mode; None where that was not fitted.
     n_modes
         Number of modes.
+    others
+        Laws of which one mode follows another, that describe the runs as well; None for none.
     """
+    names = {} if others is None else others.names
     text = f"The coefficient of {term} is taken to be the same in all {n_modes} modes"
     if constant is None:
         return f"{text}, which was not tested."
     told = [
         f"{plainly(mode.ci95[0])} to {plainly(mode.ci95[1])} at {plainly(mode.relaxation_time_s)} s"
         for mode in constant.told
-        if mode.ci95 is not None
+        if mode.ci95 is not None and mode.relaxation_time_s not in names
     ]
     if not told:
-        return f"{text}. These runs determine it in no single one."
+        return f"{text}. These runs determine it in no single one.{_other_laws(names)}"
     text = f"{text}. If it may differ, these runs allow {listed(told)}"
     left = len(constant.open_times_s)
-    return f"{text}, and leave it open in {left} of them." if left else f"{text}."
+    text = f"{text}, and leave it open in {left} of them." if left else f"{text}."
+    return text + _other_laws(names)
+
+
+def _other_laws(names: Mapping[float, Sequence[str]]) -> str:
+    return "".join(
+        f" The law of the mode of {plainly(time)} s is not determined by these data: with "
+        f"{' or '.join(others)} in it alone they are described as well."
+        for time, others in sorted(names.items())
+    )

@@ -237,9 +237,12 @@ def squared_distance(
 
 
 def spread_of(group: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "k n"]:
-    """Return F with FᵀF the covariance of a law's prediction; the law itself comes first."""
+    """Return F with FᵀF the covariance of a law's prediction; the law itself comes first.
+
+    Of a law that runs away, whatever its draws do, and of fewer than two draws that do not, none.
+    """
     drawn = group[1:]
     drawn = drawn[np.all(np.isfinite(drawn), axis=1)]
-    if len(drawn) < 2:
+    if len(drawn) < 2 or not np.all(np.isfinite(group[0])):
         return np.zeros((0, group.shape[1]))
     return (drawn - group[0]) / np.sqrt(len(drawn))
