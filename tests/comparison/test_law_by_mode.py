@@ -9,12 +9,11 @@ from independent.flow import start_up as independent_start_up
 from independent.giesekus import multimode_giesekus
 
 from discover.comparison.fitting import law_by_mode
-from discover.comparison.fitting.law_by_mode import (
+from discover.comparison.fitting.coefficients_in_modes import (
     CoefficientsInModes,
-    SparseLaw,
     coefficients_in_modes,
-    fit_laws_by_mode,
 )
+from discover.comparison.fitting.law_by_mode import SparseLaw, fit_laws_by_mode
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.asked_of_modes import ask_of_modes

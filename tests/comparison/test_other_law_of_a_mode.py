@@ -5,7 +5,7 @@ import pytest
 from independent import Giesekus, Modes, PhanThienTanner
 from independent import start_up as independent_start_up
 
-from discover.comparison.fitting.law_by_mode import coefficients_in_modes
+from discover.comparison.fitting.coefficients_in_modes import coefficients_in_modes
 from discover.comparison.judging.modes_apart import said_of_each_mode
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run

@@ -6,34 +6,29 @@ from typing import Any
 
 import numpy as np
 
-from discover.comparison.fitting.other_law_of_a_mode import OtherLaws, other_laws_of_modes
-from discover.comparison.fitting.stresses_by_mode import bands_by_mode
+from discover.comparison.fitting.fits_by_mode import (
+    OF_THE_SPECTRUM,
+    effect_of_term,
+    fitted_by_mode,
+    problem_by_mode,
+    told_by_mode,
+)
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
-from discover.effects import ConstitutiveEffect, make_effect
-from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import Fit, intervals
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode
 from discover.inference.degrees import Degree, choose_degrees, one_degree_more
-from discover.inference.draws_by_mode import draw_constants
 from discover.inference.evidence import INDISTINGUISHABLE
-from discover.inference.problem import FitProblem, effect_of
+from discover.inference.problem import FitProblem
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
-from discover.inference.small_faults import with_small_faults
-from discover.inference.varying_constant import freer_fits
-from discover.learners import RecoveredTerm
 from discover.learners.tensor_sindy.rough_problem import enough_to_rank
 from discover.statistics import LackOfFit
 from discover.statistics.misread import Misread, clear_misreading
 from discover.statistics.reading_faults import Reading
 from discover.statistics.residual import Expectation
-from discover.statistics.small_faults import small_faults
 from discover.study.declared_model import DeclaredModel
-
-_WITH_A_NAME = {"sigma.sigma": "giesekus_mobility", "tr(sigma)*sigma": "ptt_linear"}
-"""Terms that a named effect adds, whose range is the one that its law has."""
 
 _SLIP = "non_affine_motion"
 _OWN = ("giesekus_mobility", "ptt_linear", "ptt_exponential")
@@ -41,22 +36,14 @@ _NAMED = (*((name,) for name in (*_OWN, _SLIP)), *((name, _SLIP) for name in _OW
 """What a rheologist lets differ from mode to mode: the constants of the classical laws in which
 modes of a spectrum are independent, with slip of the network and without."""
 
-_OF_THE_SPECTRUM = ("I", "sigma", "gammadot")
-"""Terms that change the modulus or the time of a mode at small strain, which the sweep tells."""
-
 _MOST_TERMS = 3
 
 _STILL_IN = 2.0 * INDISTINGUISHABLE
 """Sets that are so far behind the best on few samples are not fitted on all: more samples raise
 the evidence against them faster than that for a degree which few samples left open."""
 
-_DRAWS = 40
-
 _ARITHMETIC = 1e-4
 """Relative misfit that finite steps of the fit may leave."""
-
-_STARTS = (1.0, 10.0)
-"""Multiples of an effect's first trial, which is the size from which it shows."""
 
 
 @dataclass(frozen=True)
@@ -141,30 +128,6 @@ class LawByMode:
         }
 
 
-@dataclass(frozen=True)
-class CoefficientsInModes:
-    """What the runs say of each mode where the same coefficients in all of them explain the runs.
-
-    Attributes
-    ----------
-    constants
-        By spelling of the term.
-    bands
-        Of laws whose coefficients may differ from mode to mode, by the key of the flow.
-    others
-        Laws of which one mode follows another, that describe the runs as well.
-    """
-
-    constants: Mapping[str, ConstantByMode]
-    bands: Mapping[str, PredictionBand]
-    others: OtherLaws = field(default_factory=OtherLaws)
-
-    @property
-    def differ(self) -> bool:
-        """Whether evidence asks for one that differs from mode to mode."""
-        return any(one.degree for one in self.constants.values())
-
-
 def fit_laws_by_mode(
     model: DeclaredModel,
     path: Sequence[Mapping[str, Any]],
@@ -209,13 +172,13 @@ def fit_laws_by_mode(
     """
     sets = _candidate_sets(path)
     names = [name for of_set in sets for name in of_set]
-    problem = _problem(model, names, fitted, n_candidates)
+    problem = problem_by_mode(model, names, fitted, n_candidates)
     forward = problem.model
     rough, left_out = problem, ""
     few = [enough_to_rank(run) for run in fitted]
     # it has a program of its own to compile
     if not ranks_on_all and 2 * sum(map(len, few)) < sum(map(len, fitted)):
-        rough = _problem(model, names, few, n_candidates)
+        rough = problem_by_mode(model, names, few, n_candidates)
         ranked = _best_first(rough, sets)
         kept = [tuple(one.degrees) for one in ranked if one.behind < _STILL_IN]
         sets, left_out = kept, _left_out(len(sets) - len(kept), len(sets), max(map(len, few)))
@@ -230,7 +193,7 @@ def fit_laws_by_mode(
         # one of more degrees that runs away in runs held out is no better answer than the first
         if is_first or None not in errors.values():
             seen = fitted_readings(forward, problem.batch, fitted, fit)
-            constants, bands = _told(problem, fit, degrees, seen, model, flows)
+            constants, bands = told_by_mode(problem, fit, degrees, seen, model, flows)
             left = problem.lack_of_fit(fit, fitted, expectation)
             if tuple(degrees) not in _NAMED:
                 bands = {key: _without_n2(band) for key, band in bands.items()}
@@ -254,48 +217,6 @@ def fit_laws_by_mode(
         fit = problem.fit(fit.theta, fit.free)
 
 
-def coefficients_in_modes(
-    model: DeclaredModel,
-    terms: Sequence[RecoveredTerm],
-    fitted: Sequence[Run],
-    flows: Sequence[Flow] = (),
-) -> CoefficientsInModes | None:
-    """Return what the runs say of each mode's coefficients, where equal ones explain them.
-
-    A mode that the flow hardly stretches may have any, which the intervals of common coefficients
-    take no account of. None where a term changes what the sweep tells, or cannot be fitted.
-
-    Parameters
-    ----------
-    model
-        The known part: two modes or more.
-    terms
-        Of the law that explains the runs.
-    fitted
-        Runs without what a known instrument did.
-    flows
-        In which laws with coefficients by mode predict.
-    """
-    if any(term.term in _OF_THE_SPECTRUM or term.inner for term in terms):
-        return None
-    names = {_effect_of(term.term, term.coefficient): term.term for term in terms}
-    problem = _problem(model, [*names], fitted, 1)
-    fit, degrees = _fitted(problem, [*names])
-    if not fit.usable:
-        return None
-    seen = fitted_readings(problem.model, problem.batch, fitted, fit)
-    constants, bands = _told(problem, fit, degrees, seen, model, flows)
-    if set(constants) != set(names):
-        return None
-    others = OtherLaws()
-    if len(names) == 1:
-        ((name, constant),) = constants.items()
-        told = [one.relaxation_time_s for one in constant.told if one.ci95 is not None]
-        others = other_laws_of_modes(model, name, told, fitted, flows)
-    bands = others.held_by(bands)
-    return CoefficientsInModes({names[name]: one for name, one in constants.items()}, bands, others)
-
-
 def _misread(
     problem: FitProblem,
     fit: Fit,
@@ -317,45 +238,10 @@ def _misread(
     return clear_misreading(sets, expectation, _ARITHMETIC)
 
 
-def _told(
-    problem: FitProblem,
-    fit: Fit,
-    degrees: Mapping[str, Degree],
-    seen: Sequence[Reading],
-    model: DeclaredModel,
-    flows: Sequence[Flow],
-) -> tuple[dict[str, ConstantByMode], dict[str, PredictionBand]]:
-    """Return the constants of a fit by name, and its bands by the key of the flow."""
-    forward = problem.model
-    freer = freer_fits(forward, problem.batch, fit, degrees)
-    bounds = intervals(forward, problem.batch, fit)
-    small = small_faults(seen)
-    count = len(fit.free)  # factors of loadings come after the constants
-    beside = None if small is None else small.about_the_fit[:count, :count]
-    bounds = with_small_faults(bounds, fit, forward, small)
-    constants = constants_by_mode(forward, problem.batch, fit, bounds, degrees, freer, beside)
-    drawn = draw_constants(problem, fit, degrees, freer, _DRAWS, beside=beside)
-    if drawn is None:
-        return constants, {}
-    found = (effect_of(forward, name) for name in drawn.names)
-    effects = [effect for effect in found if isinstance(effect, ConstitutiveEffect)]
-    inner = {name: fit.theta[forward.positions(name)[1:]] for name in drawn.names}
-    return constants, bands_by_mode(drawn, effects, inner, model.fluid, flows)
-
-
 def _without_n2(band: PredictionBand) -> PredictionBand:
     known = np.where(np.arange(3) == QUANTITIES.index("N2"), np.nan, 1.0)
     names = ("chosen", "low", "high", "rivals_low", "rivals_high")
     return replace(band, **{name: known * getattr(band, name) for name in names})
-
-
-def _problem(
-    model: DeclaredModel, names: Sequence[str], fitted: Sequence[Run], n_candidates: int
-) -> FitProblem:
-    effects = {name: make_effect(name) for name in names}
-    declared = model.without_effects(by_mode=tuple(effects))
-    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
-    return FitProblem(forward, make_batch(fitted), n_candidates)
 
 
 def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
@@ -363,19 +249,10 @@ def _candidate_sets(path: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
     sets: list[tuple[str, ...]] = [*_NAMED]
     for row in path:
         terms = row["support"]
-        if not 0 < len(terms) <= _MOST_TERMS or set(terms) & {*_OF_THE_SPECTRUM} or row["inner"]:
+        if not 0 < len(terms) <= _MOST_TERMS or set(terms) & {*OF_THE_SPECTRUM} or row["inner"]:
             continue
-        sets.append(tuple(map(_effect_of, terms, row["coefficients"])))
+        sets.append(tuple(map(effect_of_term, terms, row["coefficients"])))
     return list(dict.fromkeys(sets))
-
-
-def _effect_of(term: str, coefficient: float) -> str:
-    """Return the effect that adds a term with this coefficient."""
-    named = _WITH_A_NAME.get(term)
-    if named is None:
-        return term
-    amplitude = make_effect(named).parameters[0]
-    return named if amplitude.low <= coefficient <= amplitude.high else term
 
 
 def _left_out(count: int, total: int, samples: int) -> str:
@@ -399,7 +276,7 @@ class _Ranked:
 
 def _best_first(problem: FitProblem, sets: Sequence[Sequence[str]]) -> list[_Ranked]:
     """Return the sets of effects that can be fitted, those of the least criterion first."""
-    found = [_fitted(problem, of_set) for of_set in sets]
+    found = [fitted_by_mode(problem, of_set) for of_set in sets]
     usable = [(fit, degrees) for fit, degrees in found if fit.usable]
     if not usable:
         return []
@@ -410,22 +287,6 @@ def _best_first(problem: FitProblem, sets: Sequence[Sequence[str]]) -> list[_Ran
         for one, behind in zip(usable, np.array(worth) - min(worth), strict=True)
     ]
     return sorted(ranked, key=lambda one: one.behind)
-
-
-def _fitted(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, Degree]]:
-    """Return the fit of these effects, each with the degree that evidence asks for."""
-    model = problem.model
-    free = [position for name in names for position in model.positions(name)]
-    starts = []
-    for factor in _STARTS:
-        start = model.zero()
-        for name in names:
-            amplitude = effect_of(model, name).parameters[0]
-            start[model.positions(name)[0]] = factor * amplitude.first_trial
-        starts.append(start)
-    fit = problem.best_fit(starts, free)
-    degrees = {name: Degree() for name in names}
-    return choose_degrees(problem, fit, degrees) if fit.usable else (fit, degrees)
 
 
 def _worth_of(law: SparseLaw, problem: FitProblem, runs: Sequence[Run], effective: float) -> float:

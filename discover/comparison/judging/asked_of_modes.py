@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discover.comparison.fitting.law_by_mode import (
+from discover.comparison.fitting.coefficients_in_modes import (
     CoefficientsInModes,
-    LawByMode,
-    SparseLaw,
     coefficients_in_modes,
-    fit_laws_by_mode,
 )
+from discover.comparison.fitting.law_by_mode import LawByMode, SparseLaw, fit_laws_by_mode
 from discover.comparison.instrument import Frame
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.misread_runs import as_misread

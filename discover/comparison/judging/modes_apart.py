@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from discover.comparison.fitting.law_by_mode import CoefficientsInModes, LawByMode
+from discover.comparison.fitting.coefficients_in_modes import CoefficientsInModes
+from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.fitting.other_law_of_a_mode import OtherLaws
 from discover.comparison.judging.statements import Statement
 from discover.comparison.outcomes.flows import Flow
