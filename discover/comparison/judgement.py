@@ -318,6 +318,7 @@ def _statements(
         tested.bands,
         study.compare.use_normal_stresses,
         0 if chosen is None else len(chosen.terms),
+        study.compare.loading is not None,
     )
     if explanation.verdict != "no_signal":
         apart = contested(outcomes, judged, frame.bands(tested.bands))

@@ -191,6 +191,19 @@ def good(responses) -> tuple[Explanation, list[Flow]]:
     return explain(outcomes, flows, Expectation()), flows
 
 
+def test_runs_that_are_loadings_of_their_own_determine_nothing_of_a_law_of_half_as_many_terms(good):
+    """One term stays determined: that is the control."""
+    explanation, flows = good
+    terms = {True: (len(flows) + 1) // 2, False: 1}
+    for many, count in terms.items():
+        found = make_statements(
+            explanation, flows, [], STRUCTURE, bands(flows), n_terms=count, own_loadings=True
+        )
+        of_n1 = next(s for s in found if s.quantity == "N1")
+        assert of_n1.determined == ("no" if many else IN_LIBRARY)
+        assert ("tells no level" in of_n1.text) is many
+
+
 def test_n1_is_determined_on_a_condition_and_n2_is_not(good):
     explanation, flows = good
     statements = make_statements(explanation, flows, [], STRUCTURE, bands(flows))

@@ -47,6 +47,11 @@ _AS_MANY_TERMS = (
     "terms follow so few flows of a fluid that the library does not hold, and {} is not "
     "determined. Fit more runs."
 )
+_AS_MANY_LOADINGS = (
+    "The law has {} terms, and no more than {} flows were measured, fitted and held out. Each is a "
+    "loading of its own and tells no level, so it tests half as much, and {} is not determined. "
+    "Fit more runs."
+)
 IN_NOISE = 2.0
 """A measurement may stand off a band by so many times the noise of the records."""
 
@@ -183,6 +188,7 @@ def make_statements(
     bands: Mapping[str, PredictionBand] | None = None,
     normal_stresses_used: bool = False,
     n_terms: int = 0,
+    own_loadings: bool = False,
 ) -> list[Statement]:
     """Return what the training data say of N1 and N2, with the reason.
 
@@ -203,6 +209,8 @@ def make_statements(
         Whether measured normal stresses were part of the fit.
     n_terms
         Of the sparse law.
+    own_loadings
+        Whether each run is a loading of its own, with a factor on its record.
     """
     if explanation.verdict == "no_signal":
         text = "The records hold no signal, so they say nothing of {}."
@@ -218,10 +226,9 @@ def make_statements(
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
     untested = no_flow_left(flows, n_terms)
-    as_many = n_terms > 0 and _flows_measured(flows) <= n_terms
-    if (untested or as_many) and not states:
-        what = "σ12 in them"
-        text = _UNTESTED.format(what) if untested else _AS_MANY_TERMS.format(n_terms, what)
+    few = _few_flows(_flows_measured(flows), n_terms, own_loadings)
+    if (untested or few) and not states:
+        text = (_UNTESTED if untested else few).format("σ12 in them")
         found = [Statement("sigma12", "no", text, in_others=True)]
     for quantity in at.quantities:
         if quantity.verdict == "measured":
@@ -232,8 +239,8 @@ def make_statements(
             text = ONLY_STATES
         elif not quantity.open and untested:
             text = _UNTESTED.format(quantity.quantity)
-        elif not quantity.open and as_many:
-            text = _AS_MANY_TERMS.format(n_terms, quantity.quantity)
+        elif not quantity.open and few:
+            text = few.format(quantity.quantity)
         elif not quantity.open:
             noise = explanation.lack_of_fit["tensor_sindy"].noise
             check = check_band(quantity.quantity, flows, bands or {}, noise)
@@ -241,6 +248,15 @@ def make_statements(
             text = f"{text} {_of_band(quantity.quantity, check)}"
         found.append(Statement(quantity.quantity, determined, text))
     return found
+
+
+def _few_flows(measured: int, n_terms: int, own_loadings: bool) -> str:
+    """Return why so few flows test no law of so many terms, with a place for the quantity."""
+    if n_terms > 0 and measured <= n_terms:
+        return _AS_MANY_TERMS.format(n_terms, "{}")
+    if own_loadings and n_terms > 1 and measured <= 2 * n_terms:
+        return _AS_MANY_LOADINGS.format(n_terms, 2 * n_terms, "{}")
+    return ""
 
 
 def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
