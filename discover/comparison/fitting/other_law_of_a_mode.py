@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from discover.comparison.fitting.fits_by_mode import problem_by_mode
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
-from discover.effects import ConstitutiveEffect, make_effect
-from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.effects import ConstitutiveEffect
+from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, LARGEST
 from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
@@ -83,7 +84,7 @@ def other_laws_of_modes(
     """
     if name not in _ONE_CONSTANT:
         return OtherLaws()
-    problem = _problem(model, fitted)
+    problem = problem_by_mode(model, _ONE_CONSTANT, fitted, 1)
     forward = problem.model
     start = forward.zero()
     amplitude = forward.positions(name)[0]
@@ -101,12 +102,6 @@ def other_laws_of_modes(
             found[float(time)] = tuple(as_well)
             fits.extend(as_well.values())
     return OtherLaws(found, _moved(problem, fits, model, flows) if found else {})
-
-
-def _problem(model: DeclaredModel, fitted: Sequence[Run]) -> FitProblem:
-    declared = model.without_effects(by_mode=_ONE_CONSTANT)
-    effects = [make_effect(one) for one in _ONE_CONSTANT]
-    return FitProblem(AugmentedModel(declared, effects, data_scales(fitted)), make_batch(fitted))
 
 
 def _as_good(problem: FitProblem, same: Fit, name: str, mode: int) -> dict[str, Fit]:
