@@ -17,9 +17,9 @@ from discover.simulate.stress_grid import MAX_GRID_POINTS, stress_grid
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
 
-# The same where the relaxation time is not known: a trial law that thins relaxes far faster than
-# the flow turns it
-_COARSEST_OF_ANY = 0.5
+# The same where the relaxation time is not known, in a record and before it, where a steady state
+# is to be reached: a trial law that thins relaxes far faster than the flow turns it
+_COARSEST_OF_ANY, _COARSEST_BEFORE = 0.5, 0.25
 
 # Of a steady flow before the record: steps, their shrinking towards its end, relaxation times
 _FEWEST_HISTORY_STEPS, _HISTORY_SHRINKS, _SETTLED_BEFORE = 100, 0.08, 50.0
@@ -109,7 +109,7 @@ def make_grid(
     Every sample and every kink of the protocol is a step; between them no step turns the fluid
     through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
     defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
-    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or half of it where the
+    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or a quarter where the
     relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
     the method whatever its step, but stable in short ones only.
 
@@ -240,7 +240,7 @@ def _steady_history(
     if relaxation_time is not None:
         begins = max(begins, -_SETTLED_BEFORE * relaxation_time)
     strain = abs(history[0] * begins)
-    coarsest = _COARSEST_OF_ANY if relaxation_time is None else COARSEST_STRAIN
+    coarsest = _COARSEST_BEFORE if relaxation_time is None else COARSEST_STRAIN
     count = max(_FEWEST_HISTORY_STEPS, int(np.ceil(strain / coarsest)))
     coarse = np.linspace(begins, 0.0, count + 1)[:-1]
     # the fixed point is only reached in steps that follow the relaxation, however fast it is, so

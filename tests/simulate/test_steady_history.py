@@ -36,7 +36,7 @@ def test_a_law_that_thins_is_followed_through_the_flow_before_whatever_its_time(
     np.testing.assert_allclose(found, exact, atol=1e-3 * exact[0])
 
 
-@pytest.mark.parametrize(("time", "most", "strain"), [(None, 750, 0.5), (6.0, 450, 1.0)])
+@pytest.mark.parametrize(("time", "most", "strain"), [(None, 1400, 0.25), (6.0, 450, 1.0)])
 def test_steady_flow_before_a_run_takes_some_hundred_steps(time, most, strain):
     flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
     grid, _ = make_grid(flow, TIMES, relaxation_time=time)
