@@ -211,8 +211,7 @@ def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Arr
     """
     scaled = jnp.multiply.outer(fluid.relaxation_time, velocity_gradient)
     of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law)
-    scalars = fluid.law.variables - 4 * fluid.law.tensors
-    return steady_modes(of_modes, scaled, fluid.rest(), scalars)
+    return steady_modes(of_modes, scaled, fluid.rest(), fluid.law.scalars)
 
 
 def steady_modes(

@@ -163,16 +163,9 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
     equation, rows = _with_added_modes(equation, rows, file)
     effects, of_modes = _effects(rows, file, len(equation.modulus))
     text = _text(file, "the loop's declared law", equation, effects, of_modes)
-    doubt = " With them the loop did not explain its data."
-    return EarlierResult(
-        file,
-        equation,
-        effects,
-        of_modes,
-        text,
-        _intervals(rows, file),
-        doubt if unexplained else "",
-    )
+    doubt = " With them the loop did not explain its data." if unexplained else ""
+    intervals = _intervals(rows, file)
+    return EarlierResult(file, equation, effects, of_modes, text, intervals, doubt)
 
 
 def _with_added_modes(

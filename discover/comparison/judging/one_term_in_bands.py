@@ -54,11 +54,8 @@ def holding_one_term_more(
             if quantity in at.one_more:
                 moved = at.one_more[quantity].per_noise * noise * growth
                 more[:, column] = moved * np.abs(band.chosen[:, _N1])
-        found[key] = replace(
-            band,
-            rivals_low=band.chosen - np.hypot(band.chosen - band.rivals_low, more),
-            rivals_high=band.chosen + np.hypot(band.rivals_high - band.chosen, more),
-        )
+        low, high = band.ends_with(band.rivals_low, band.rivals_high, more)
+        found[key] = replace(band, rivals_low=low, rivals_high=high)
     return found
 
 

@@ -43,11 +43,6 @@ def holding_rate_errors(
 
 
 def _wider(band: PredictionBand, half: np.ndarray) -> PredictionBand:
-    def ends(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # what is not a number stays so: no band stays no band
-        below = band.chosen - np.hypot(band.chosen - low, half)
-        return below, band.chosen + np.hypot(high - band.chosen, half)
-
-    low, high = ends(band.low, band.high)
-    rivals_low, rivals_high = ends(band.rivals_low, band.rivals_high)
+    low, high = band.ends_with(band.low, band.high, half)
+    rivals_low, rivals_high = band.ends_with(band.rivals_low, band.rivals_high, half)
     return replace(band, low=low, high=high, rivals_low=rivals_low, rivals_high=rivals_high)

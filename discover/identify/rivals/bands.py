@@ -51,6 +51,16 @@ class PredictionBand:
     reason: str = ""
     directions: Float[np.ndarray, "draws n"] | None = None
 
+    def ends_with(
+        self, low: Float[np.ndarray, "n 3"], high: Float[np.ndarray, "n 3"], half: np.ndarray
+    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+        """Return ends of a band about the chosen law that is off by another half-width too.
+
+        The two are independent. What is not a number stays so: no band stays no band.
+        """
+        below = self.chosen - np.hypot(self.chosen - low, half)
+        return below, self.chosen + np.hypot(high - self.chosen, half)
+
     def widths(self, with_rivals: bool = True) -> dict[str, float]:
         """Return the root-mean-square width of each band over that of the chosen prediction.
 

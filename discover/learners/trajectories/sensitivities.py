@@ -191,8 +191,7 @@ def _steady_run(problem, active, coefficients, inner, protocol, grid):
 def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
     gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
     law = _known_less_terms(problem, active, coefficients, inner)
-    scalars = problem.base.variables - 4 * problem.base.tensors
-    state = steady_modes(law, gradient, _rest(problem), scalars)
+    state = steady_modes(law, gradient, _rest(problem), problem.base.scalars)
     return _observed(problem, protocol, time, state)
 
 
