@@ -22,7 +22,9 @@ threadpool_limits(1, "blas")
 gc.set_threshold(100_000, 50, 100)
 
 # the mutations of files are the benchmark's
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "benchmarks")]
+
+first_calls = importlib.import_module("first_calls")
 
 # What is first imported inside a module under the hook below is compiled anew, in every worker.
 _LARGE = ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic")
@@ -33,6 +35,7 @@ def _import_what_tests_need() -> None:
         importlib.import_module(large)
     # Shapes written on public functions are checked while the tests run. The hook must come before
     # the packages are imported.
+    first_calls.install()
     jaxtyping.install_import_hook(["tensor_library", "discover"], "beartype.beartype")
     importlib.import_module("discover.precision").enable_x64()
     # shared by the workers of one test run, and by the next run
@@ -40,34 +43,10 @@ def _import_what_tests_need() -> None:
     importlib.import_module("discover.compilation_cache").enable_compilation_cache(folder)
 
 
-# whole commands and studies, where shapes are checked some hundred thousand times; what they call
-# is checked in the tests of each part
-_END_TO_END = {
-    "test_measured.py", "test_commands.py", "test_contract_script.py", "test_planting.py",
-    "test_loop.py", "test_law_choice.py", "test_constants_by_mode.py", "test_explanations.py",
-    "test_extension.py", "test_known_instrument.py", "test_free_form.py", "test_next_tests.py",
-    "test_free_in_model.py",
-    "test_first_steps_too_far.py", "test_other_controls.py", "test_measured_rates.py",
-    "test_no_signal.py", "test_other_times.py", "test_known_effects_in_the_loop.py",
-    "test_search_checkpoint.py", "test_mode_dependence.py", "test_held_out_pattern.py",
-    "test_aliases.py", "test_known_laws_of_chains.py", "test_reports.py", "test_export.py",
-    "test_kills_and_clusters.py", "test_law_by_mode.py", "test_added_mode_apart.py",
-    "test_limits_of_effects.py", "test_one_flow.py", "test_tests_together.py",
-    "test_constants_beside_other_times.py", "test_own_noise.py", "test_comparison.py",
-    "test_profile.py", "test_open_constants.py", "test_bands_of_states.py", "test_coarse_rates.py",
-    "test_modes_of_a_stiff_fluid.py", "test_named_effects.py", "test_folds.py",
-    "test_other_ways.py", "test_further_laws.py", "test_nameless_terms.py", "test_loadings.py",
-    "test_other_benches.py", "test_further_mode.py", "test_smaller_laws.py",
-    "test_terms_beside.py", "test_filters_for_terms.py", "test_scattered_rates.py",
-}  # fmt: skip
-
-
 @pytest.fixture(autouse=True, scope="module")
-def _shapes(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Check shapes in all files but those of whole commands and studies."""
-    jaxtyping.config.update("jaxtyping_disable", request.path.name in _END_TO_END)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
+def _shapes() -> None:
+    """Check shapes on the first calls of every function in each file."""
+    first_calls.begin_file()
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
-"""Shapes written on functions are checked while the tests run; only whole commands go without."""
+"""Shapes written on functions are checked while the tests run, on first calls in each file."""
 
+import first_calls
 import jaxtyping
 import numpy as np
 import pytest
@@ -12,3 +13,17 @@ def test_a_shape_that_does_not_fit_is_an_error():
     assert not jaxtyping.config.jaxtyping_disable
     with pytest.raises(jaxtyping.TypeCheckError):
         make_grid(start_up(1.0), np.zeros((2, 2)))
+
+
+def test_each_file_checks_its_first_calls_again_and_no_more():
+    flow, wrong = start_up(1.0), np.zeros((2, 2))
+    first_calls.begin_file()
+    for _ in range(first_calls.CALLS):
+        with pytest.raises(jaxtyping.TypeCheckError):
+            make_grid(flow, wrong)
+    with pytest.raises(Exception, match=r".") as later:
+        make_grid(flow, wrong)
+    assert not isinstance(later.value, jaxtyping.TypeCheckError)
+    first_calls.begin_file()
+    with pytest.raises(jaxtyping.TypeCheckError):
+        make_grid(flow, wrong)

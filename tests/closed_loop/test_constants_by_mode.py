@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
+from discover.forward.least_squares import Fit
 from discover.inference.by_mode import _at_upper_end
 from discover.inference.varying_constant import VaryingConstant
 from discover.protocols import in_flow, start_up
@@ -94,7 +94,8 @@ def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
     law = FreeParameter("q", 5.0, 1.0, 100.0)
     places = np.array([0.0, -1.0, -2.0])
     # link 25 s² at the mean's −3
-    fit = SimpleNamespace(theta=np.array([5.0, 0.0, 25.0, 0.0, 0.0, 0.0]))
+    nothing = np.zeros((0, 0, 0))
+    fit = Fit(np.array([5.0, 0.0, 25.0, 0.0, 0.0, 0.0]), (), nothing[0], nothing)
     constant = VaryingConstant(law, 0, 1, places)
     values = constant.of_modes(fit)
     assert values[0] == pytest.approx(5.0)

@@ -1,0 +1,57 @@
+"""Shapes checked on the first calls of every function in each file of tests, and no more.
+
+The decorator that `jaxtyping`'s hook puts on every function builds its checks at once, so importing
+the packages under it takes six times as long; and a function of a loop is called some hundred
+thousand times with the same shapes. Here checks are built at a function's first call, and made on
+its first calls in each file.
+"""
+
+import functools
+import inspect
+from collections import Counter
+from collections.abc import Callable
+
+import jaxtyping
+
+CALLS = 20
+"""How many calls of a function are checked in each file of tests."""
+
+_seen: Counter = Counter()
+
+
+def begin_file() -> None:
+    """Check the first calls again."""
+    _seen.clear()
+
+
+def install() -> None:
+    """Let the hook of `jaxtyping` decorate functions so. Call it before what it decorates."""
+    every_call = jaxtyping.jaxtyped
+
+    def jaxtyped(*, typechecker: Callable) -> Callable:
+        return functools.partial(_decorated, check=every_call(typechecker=typechecker))
+
+    jaxtyping.jaxtyped = jaxtyped  # pyright: ignore
+
+
+def _decorated(what, check: Callable):
+    if inspect.isclass(what):
+        init = vars(what).get("__init__")
+        if hasattr(what, "__dataclass_fields__") and inspect.isfunction(init):
+            what.__init__ = _decorated(init, check)
+        return what
+    if not inspect.isfunction(what):
+        return check(what)
+    # a function inside another is a new one at every call of that, of the same code
+    code, built = what.__code__, []
+
+    @functools.wraps(what)
+    def on_first_calls(*args, **kwargs):
+        if _seen[code] >= CALLS or jaxtyping.config.jaxtyping_disable:
+            return what(*args, **kwargs)
+        _seen[code] += 1
+        if not built:
+            built.append(check(what))
+        return built[0](*args, **kwargs)
+
+    return on_first_calls
