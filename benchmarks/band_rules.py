@@ -24,7 +24,7 @@ from independent.worlds import MODULUS, TIME, draw_world
 
 import discover as dc
 from discover.comparison import judgement
-from discover.comparison.judging.dense_library import DENSE
+from discover.comparison.judging.bands.dense_library import DENSE
 from discover.learners import weighted_laws
 
 DEVELOPMENT = range(1, 10)

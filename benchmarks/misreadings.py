@@ -4,7 +4,7 @@
 
 Two tables of docs/hostile.md, by the statistic alone: start-ups and an oscillation of a Giesekus
 fluid by scipy, of which three runs are fitted and one is held out. The mobility is fitted to first
-order, and with it the test of `discover.statistics.misread` is asked.
+order, and with it the test of `discover.statistics.reading.misread` is asked.
 """
 
 import argparse
@@ -16,9 +16,9 @@ from hostile_fluids_records import FLOWS, GIESEKUS, SCALE
 from independent import Giesekus
 from independent.noise import rms
 
-from discover.statistics.misread import CLEAR, POSSIBLE, Misread, misread
-from discover.statistics.reading_faults import Reading
-from discover.statistics.small_faults import small_faults
+from discover.statistics.reading.misread import CLEAR, POSSIBLE, Misread, misread
+from discover.statistics.reading.reading_faults import Reading
+from discover.statistics.reading.small_faults import small_faults
 
 MOBILITY, STEP = GIESEKUS.mobility, 1e-3
 HELD_OUT = "held.csv"

@@ -17,7 +17,7 @@ from discover.dataset.importing.mapping import (
 )
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import make_folder, write_text
 

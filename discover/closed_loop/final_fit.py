@@ -26,8 +26,8 @@ from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.search import Search
 from discover.closed_loop.searching import SearchResult
 from discover.dataset import Run
-from discover.dataset.coarse_rates import CoarseRates
-from discover.dataset.repeats import repeats_among
+from discover.dataset.records.coarse_rates import CoarseRates
+from discover.dataset.records.repeats import repeats_among
 from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
 from discover.forward.least_squares import Fit, intervals
 from discover.forward.modulus_errors import modulus_shifts
@@ -38,10 +38,10 @@ from discover.inference.profile import profiled
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
-from discover.statistics.loadings import LoadingFound
-from discover.statistics.misread import Misread, not_ruled_out
-from discover.statistics.reading_faults import Reading
-from discover.statistics.small_faults import small_faults
+from discover.statistics.reading.loadings import LoadingFound
+from discover.statistics.reading.misread import Misread, not_ruled_out
+from discover.statistics.reading.reading_faults import Reading
+from discover.statistics.reading.small_faults import small_faults
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ from discover.closed_loop.search.checkpoint import Store
 from discover.closed_loop.searching import SearchResult, SearchTask
 from discover.closed_loop.verdict import FinalVerdict, verdict_on
 from discover.dataset import Dataset, Run
-from discover.dataset.own_loadings import with_loadings
+from discover.dataset.records.own_loadings import with_loadings
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel

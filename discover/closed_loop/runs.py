@@ -8,9 +8,9 @@ from discover.closed_loop.judging.before_after import cut_to_strain
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
 from discover.dataset import Dataset, Run
-from discover.dataset.copies import require_no_copies
-from discover.dataset.spikes import without_spikes
-from discover.dataset.thinning import thin_run
+from discover.dataset.records.copies import require_no_copies
+from discover.dataset.records.spikes import without_spikes
+from discover.dataset.records.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import with_rate_steps

@@ -10,11 +10,11 @@ import pandas as pd
 from discover.comparison.equations import outcome_equation
 from discover.comparison.fitting.classical import ClassicalFit
 from discover.comparison.fitting.law_by_mode import LawByMode
+from discover.comparison.judging.bands.room_left import room_left
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.loadings import OwnLoadings
 from discover.comparison.judging.next_measurement import NextMeasurement
-from discover.comparison.judging.room_left import room_left
+from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import (
     Flow,

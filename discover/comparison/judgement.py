@@ -9,45 +9,48 @@ from discover.comparison.fitting.law_by_mode import LawByMode
 from discover.comparison.fitting.named_effects import fit_named_effects
 from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known
-from discover.comparison.judging.asked_of_modes import OfModes, ask_of_modes
-from discover.comparison.judging.beside_other_constants import with_other_coefficients
-from discover.comparison.judging.constants_in_bands import law_with_fitted, with_fitted_constants
-from discover.comparison.judging.declared_constants import (
-    OtherConstant,
-    other_constants,
-    with_other_constants,
-    with_other_gain,
+from discover.comparison.judging.bands.constants_in_bands import (
+    law_with_fitted,
+    with_fitted_constants,
 )
-from discover.comparison.judging.dense_library import (
+from discover.comparison.judging.bands.dense_library import (
     DENSE,
     open_where_dense_is_wide,
     with_gain_in_dense,
     without_refuted_bands,
 )
-from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
-from discover.comparison.judging.explanation import Explanation, explain
-from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.late_answers import hold_against_late_answers
-from discover.comparison.judging.loadings import OwnLoadings
-from discover.comparison.judging.misread_runs import hold_against_misreading
-from discover.comparison.judging.modes_apart import (
+from discover.comparison.judging.bands.named_bands import with_named_effects
+from discover.comparison.judging.bands.one_term_in_bands import holding_one_term_more
+from discover.comparison.judging.bands.rates_in_bands import holding_rate_errors
+from discover.comparison.judging.bands.second_normal_stress import with_any_second_normal_stress
+from discover.comparison.judging.constants.asked_of_modes import OfModes, ask_of_modes
+from discover.comparison.judging.constants.beside_other_constants import with_other_coefficients
+from discover.comparison.judging.constants.declared_constants import (
+    OtherConstant,
+    other_constants,
+    with_other_constants,
+    with_other_gain,
+)
+from discover.comparison.judging.constants.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
     with_intervals_of_modes,
 )
-from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.constants.modes_error import left_open_by_modes
+from discover.comparison.judging.constants.small_strain import with_small_strain_told
+from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
+from discover.comparison.judging.explanation import Explanation, explain
+from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.judging.named_bands import with_named_effects
 from discover.comparison.judging.next_measurement import (
     NextMeasurement,
     bands_of_law,
     next_measurement,
 )
-from discover.comparison.judging.one_term_in_bands import holding_one_term_more
-from discover.comparison.judging.other_records import holding_other_records
-from discover.comparison.judging.rates_in_bands import holding_rate_errors
-from discover.comparison.judging.second_normal_stress import with_any_second_normal_stress
-from discover.comparison.judging.small_strain import with_small_strain_told
+from discover.comparison.judging.other_causes.late_answers import hold_against_late_answers
+from discover.comparison.judging.other_causes.loadings import OwnLoadings
+from discover.comparison.judging.other_causes.misread_runs import hold_against_misreading
+from discover.comparison.judging.other_causes.other_records import holding_other_records
 from discover.comparison.judging.statements import (
     Statement,
     claimed,
@@ -58,7 +61,7 @@ from discover.comparison.judging.unseen_runs import hold_against_unseen
 from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.flows import DRAWN, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.repeats import repeats_among
+from discover.dataset.records.repeats import repeats_among
 from discover.identify import Structure
 from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.kinematics import ONLY_STATES

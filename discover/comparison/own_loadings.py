@@ -8,11 +8,11 @@ from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known
 from discover.comparison.judgement import Judgement, judge
 from discover.comparison.judging.as_predicted import SPARSE
-from discover.comparison.judging.constants_in_bands import law_with_fitted
-from discover.comparison.judging.loadings import OwnLoadings
+from discover.comparison.judging.bands.constants_in_bands import law_with_fitted
+from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.own_loadings import with_loadings
+from discover.dataset.records.own_loadings import with_loadings
 from discover.study.data import StudyData
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary

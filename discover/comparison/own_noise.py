@@ -13,7 +13,7 @@ from discover.comparison.outcomes.expected import expectation_of
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.own_loadings import loadings_of
-from discover.dataset.repeats import repeats_among
+from discover.dataset.records.repeats import repeats_among
 from discover.dataset.run import Run
 from discover.dataset.run_table import kind_of_record
 from discover.learners.trajectories.problem import OBSERVED

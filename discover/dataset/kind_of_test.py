@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from discover.dataset.table import Table
+from discover.dataset.tables.table import Table
 from discover.errors import InputError
 from discover.protocols.kinematics import KINDS
 

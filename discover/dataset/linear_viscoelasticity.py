@@ -10,11 +10,11 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from discover.dataset.columns import as_column
+from discover.dataset.tables.columns import as_column
 from discover.errors import InputError
-from discover.statistics.independent_samples import independent_samples
+from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability
 from discover.statistics.residual import slow_part
-from discover.statistics.whiteness import FEWEST_FAST, noise_probability, separate_probability
 
 MOST_MODES = 30
 TOLERANCE = 1.5

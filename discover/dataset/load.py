@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import units
 from discover.dataset.dataset import Dataset
-from discover.dataset.differentiation import DEFAULT_WINDOW
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.sequence import in_sequence
-from discover.dataset.table import Table, read_bytes, read_table, shown
-from discover.dataset.thinning import thin_sweep
+from discover.dataset.records.differentiation import DEFAULT_WINDOW
+from discover.dataset.records.sequence import in_sequence
+from discover.dataset.records.thinning import thin_sweep
+from discover.dataset.tables import units
+from discover.dataset.tables.table import Table, read_bytes, read_table, shown
 from discover.errors import InputError
 
 DATA_VARIABLE = "DISCOVER_DATA"

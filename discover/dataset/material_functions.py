@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import units
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.run import Run
-from discover.dataset.table import Table, read_table
+from discover.dataset.tables import units
+from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
 from discover.protocols.control import (
     imposed_stress,

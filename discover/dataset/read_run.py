@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset import units
-from discover.dataset.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.kind_of_test import DeclaredTest, declared_test
+from discover.dataset.records.differentiation import DEFAULT_WINDOW, differentiate
+from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
-from discover.dataset.table import Table, read_table
-from discover.dataset.thinning import MOST_SAMPLES, thin
+from discover.dataset.tables import units
+from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
 from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import imposed_stress

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.columns import as_column
 from discover.dataset.loading import Loading
+from discover.dataset.tables.columns import as_column
 from discover.errors import InputError
 from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow

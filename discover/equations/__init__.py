@@ -2,12 +2,12 @@
 
 from discover.equations.augmented_law import AugmentedLaw
 from discover.equations.equation import Box, Equation, Tested
+from discover.equations.formats.json_format import equation_from_json, equation_to_json
+from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.from_law import combined, effect_terms, law_terms
 from discover.equations.has_equation import HasEquation
-from discover.equations.json_format import equation_from_json, equation_to_json
 from discover.equations.named_part import NamedPart
 from discover.equations.parts import law_parts
-from discover.equations.rheotool_reader import read_rheotool
 from discover.equations.state_part import StatePart
 from discover.equations.term import EquationTerm
 from discover.equations.write import FORMATS, write_equation

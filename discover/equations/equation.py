@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from discover.equations.latex import SEPARATOR, law_latex
-from discover.equations.mathml import law_element
 from discover.equations.named_part import NamedPart
+from discover.equations.spelling.latex import SEPARATOR, law_latex
+from discover.equations.spelling.mathml import law_element
 from discover.equations.state_part import StatePart
 from discover.equations.term import EquationTerm, Interval
 from discover.errors import InputError
@@ -197,7 +197,7 @@ class Equation(NotebookView):
 
     def sympy(self) -> "sympy.Expr":
         """Return h of a mode as a SymPy expression over non-commuting tensors."""
-        from discover.equations.symbolic import extra_term_expression
+        from discover.equations.spelling.symbolic import extra_term_expression
 
         return extra_term_expression(self.terms, self.named)
 

@@ -5,9 +5,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.equations.equation import Equation
-from discover.equations.json_format import equation_from_json
+from discover.equations.formats.json_format import equation_from_json
 from discover.errors import InputError
 
 COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from discover.equations.code import numpy_code, sympy_code
 from discover.equations.equation import Equation
-from discover.equations.in_a_solver import in_a_solver
-from discover.equations.json_format import equation_to_json
-from discover.equations.latex_file import equation_latex
-from discover.equations.rheotool import rheotool_text
-from discover.equations.ufl import ufl_code
+from discover.equations.formats.code import numpy_code, sympy_code
+from discover.equations.formats.in_a_solver import in_a_solver
+from discover.equations.formats.json_format import equation_to_json
+from discover.equations.formats.latex_file import equation_latex
+from discover.equations.formats.rheotool import rheotool_text
+from discover.equations.formats.ufl import ufl_code
 from discover.errors import InputError
 from discover.plain_json import json_text
 
@@ -39,7 +39,7 @@ def write_equation(
     form
         Key of `FORMATS`.
     density_kg_m3, tolerance
-        For ``rheotool`` only; see `discover.equations.rheotool.rheotool_text`.
+        For ``rheotool`` only; see `discover.equations.formats.rheotool.rheotool_text`.
 
     Raises
     ------

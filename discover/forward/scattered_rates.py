@@ -19,9 +19,9 @@ from discover.forward.declared import DeclaredModel
 from discover.forward.least_squares import fit_batch
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of
+from discover.statistics.noise.whiteness import separate_probability
 from discover.statistics.projection import rms
 from discover.statistics.residual import summarise
-from discover.statistics.whiteness import separate_probability
 from discover.words import percent_of
 
 _LEAST = 5e-3

@@ -1,4 +1,7 @@
-"""Runs as a fit has them, for the question how they were read (`discover.statistics.misread`)."""
+"""Runs as a fit has them, for the question how they were read.
+
+See `discover.statistics.reading.misread`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,8 +13,8 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, as_predicted, even, loadings_of
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts
-from discover.statistics.outliers import stray
-from discover.statistics.reading_faults import Reading
+from discover.statistics.noise.outliers import stray
+from discover.statistics.reading.reading_faults import Reading
 
 _STEP = 1e-2  # relative, of a modulus
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
-from discover.statistics.small_faults import Allowance
+from discover.statistics.reading.small_faults import Allowance
 
 
 def with_small_faults(

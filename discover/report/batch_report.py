@@ -4,7 +4,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from discover.equations.mathml import number, term_mathml
+from discover.equations.spelling.mathml import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
 from discover.report.wording import FIGURE_SYMBOLS, RULES, effect_title

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from discover.closed_loop import RunRecord
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
-from discover.dataset.table import read_table, shown
+from discover.dataset.tables.table import read_table, shown
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared

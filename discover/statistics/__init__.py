@@ -1,11 +1,11 @@
 """What residuals say of noise, and noise of parameters."""
 
-from discover.statistics.covariance import HALF_BAND, least_squares_covariance, root_of
-from discover.statistics.dead_records import holds_signal
-from discover.statistics.independent_samples import independent_samples
 from discover.statistics.lack_of_fit import FitVerdict, LackOfFit, lack_of_fit
-from discover.statistics.noise_model import NoiseModel, noise_model
-from discover.statistics.outliers import isolated
+from discover.statistics.noise.covariance import HALF_BAND, least_squares_covariance, root_of
+from discover.statistics.noise.dead_records import holds_signal
+from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.noise_model import NoiseModel, noise_model
+from discover.statistics.noise.outliers import isolated
 from discover.statistics.told_by_tests import Sized, Told, told_by_tests
 
 __all__ = [

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.dead_records import holds_signal
 from discover.statistics.likeness import likeness
-from discover.statistics.outliers import stray
+from discover.statistics.noise.dead_records import holds_signal
+from discover.statistics.noise.outliers import stray
+from discover.statistics.noise.same_correlation import same_correlation_probability
+from discover.statistics.noise.same_place import repeated
+from discover.statistics.noise.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
-from discover.statistics.same_correlation import same_correlation_probability
-from discover.statistics.same_place import repeated
-from discover.statistics.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
 from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.converter_steps import step_of_converter
-from discover.statistics.wandering import wandering
+from discover.statistics.noise.converter_steps import step_of_converter
+from discover.statistics.noise.wandering import wandering
 from discover.words import percent_of
 
 _WITHIN = 0.8

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from discover.statistics.noise.whiteness import FEWEST_FAST, FEWEST_TESTED
 from discover.statistics.residual import STRUCTURE, fast_part
-from discover.statistics.whiteness import FEWEST_FAST, FEWEST_TESTED
 
 _ALIKE = 2.0
 """Noises within this factor are weighed alike: of two records of one size, equal weights where one

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
-from discover.statistics.independent_samples import independent_samples
-from discover.statistics.whiteness import (
+from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.whiteness import (
     FEWEST_FAST,
     FEWEST_TESTED,
     SIGNIFICANCE,

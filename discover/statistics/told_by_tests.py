@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import t as student
 
-from discover.statistics.covariance import least_squares_covariance
+from discover.statistics.noise.covariance import least_squares_covariance
 
 
 @dataclass(frozen=True)

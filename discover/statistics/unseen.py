@@ -15,6 +15,7 @@ from scipy.linalg import solve_triangular, toeplitz
 from scipy.stats import chi2
 
 from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.noise.whiteness import SIGNIFICANCE
 from discover.statistics.residual import (
     FEWEST_FAST,
     STRUCTURE,
@@ -23,7 +24,6 @@ from discover.statistics.residual import (
     slow_part,
     tells_noise,
 )
-from discover.statistics.whiteness import SIGNIFICANCE
 
 _SMALLEST_SHARE = 1e-2  # of noise, in what changes from sample to sample
 

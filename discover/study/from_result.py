@@ -11,7 +11,7 @@ import numpy as np
 
 from discover.effects import KnownEffect, ModeEffect, known_effects, make_effect
 from discover.equations import Equation
-from discover.equations.json_format import equation_from_json
+from discover.equations.formats.json_format import equation_from_json
 from discover.equations.read import COMPARISON, LOOP, read_json
 from discover.errors import InputError
 from discover.laws.registry import LAWS

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import PART_SUFFIX, make_folder, write_text
 from discover.study.lock import lock_folder

@@ -23,8 +23,8 @@ from discover.equations import (
     equation_to_json,
 )
 from discover.equations import Tested as Where
+from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.read import read_result_laws
-from discover.equations.rheotool_reader import read_rheotool
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 

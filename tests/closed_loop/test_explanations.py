@@ -22,7 +22,7 @@ from discover.closed_loop.results.run_record import RunRecord
 from discover.errors import InputError
 from discover.report.predictions import loop_predictions
 from discover.statistics.lack_of_fit import LackOfFit
-from discover.statistics.whiteness import SIGNIFICANCE
+from discover.statistics.noise.whiteness import SIGNIFICANCE
 from discover.study import parse_study
 
 pytestmark = pytest.mark.usefixtures("effects_alone")

@@ -17,7 +17,7 @@ from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.report.loop.certainty import how_sure
 from discover.report.loop.next_step import what_to_measure_next
-from discover.statistics.misread import Misread
+from discover.statistics.reading.misread import Misread
 
 pytestmark = pytest.mark.usefixtures("effects_alone")
 

@@ -6,8 +6,8 @@ import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.dataset import Dataset, Run
-from discover.dataset.sequence import in_sequence
-from discover.dataset.thinning import thin_run
+from discover.dataset.records.sequence import in_sequence
+from discover.dataset.records.thinning import thin_run
 from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch

@@ -6,7 +6,7 @@ from independent import KBKZ, start_up
 from scipy.integrate import solve_ivp
 
 import discover as dc
-from discover.dataset.repeats import count_flows
+from discover.dataset.records.repeats import count_flows
 from discover.protocols.control import steady_rates
 from discover.report.loop.verdict import loop_verdict
 

@@ -8,8 +8,8 @@ import pytest
 from independent import Giesekus, UpperConvectedMaxwell, oscillation, start_up
 from independent.instruments import Instrument
 
-from discover.comparison.judging.beside_other_constants import with_other_coefficients
-from discover.comparison.judging.declared_constants import (
+from discover.comparison.judging.constants.beside_other_constants import with_other_coefficients
+from discover.comparison.judging.constants.declared_constants import (
     beside,
     other_constants,
     with_other_constants,

@@ -11,12 +11,12 @@ from independent import start_up as start_up_of_scipy
 from independent.instruments import Instrument
 from independent.thixotropic import Thixotropic
 
-from discover.comparison.judging.declared_constants import OtherConstant
-from discover.comparison.judging.dense_library import (
+from discover.comparison.judging.bands.dense_library import (
     open_where_dense_is_wide,
     with_gain_in_dense,
     without_refuted_bands,
 )
+from discover.comparison.judging.constants.declared_constants import OtherConstant
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome

@@ -5,7 +5,10 @@ import pytest
 from independent import Giesekus, PhanThienTanner, oscillation, start_up
 from scipy.integrate import cumulative_trapezoid
 
-from discover.comparison.judging.filters_for_terms import filter_for_terms, holding_filters
+from discover.comparison.judging.other_causes.filters_for_terms import (
+    filter_for_terms,
+    holding_filters,
+)
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions

@@ -7,7 +7,10 @@ import pytest
 from scipy.optimize import curve_fit
 
 import discover as dc
-from discover.comparison.judging.constants_in_bands import law_with_fitted, with_fitted_constants
+from discover.comparison.judging.bands.constants_in_bands import (
+    law_with_fitted,
+    with_fitted_constants,
+)
 from discover.comparison.outcomes.flows import run_flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand

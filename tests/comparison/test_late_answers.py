@@ -8,7 +8,7 @@ from independent import Giesekus, start_up
 from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.late_answers import hold_against_late_answers
+from discover.comparison.judging.other_causes.late_answers import hold_against_late_answers
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions

@@ -16,14 +16,14 @@ from discover.comparison.fitting.coefficients_in_modes import (
 from discover.comparison.fitting.law_by_mode import SparseLaw, fit_laws_by_mode
 from discover.comparison.fitting.stresses_by_mode import bands_by_mode
 from discover.comparison.instrument import Frame
-from discover.comparison.judging.asked_of_modes import ask_of_modes
-from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.modes_apart import (
+from discover.comparison.judging.constants.asked_of_modes import ask_of_modes
+from discover.comparison.judging.constants.modes_apart import (
     holding_modes_apart,
     open_where_modes_differ,
     said_of_each_mode,
     with_intervals_of_modes,
 )
+from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome

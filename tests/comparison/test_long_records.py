@@ -11,7 +11,7 @@ from discover.comparison import compare
 from discover.comparison.description import data_in_words
 from discover.comparison.fitting.prepared import thinned_to
 from discover.dataset import Dataset, Run
-from discover.dataset.thinning import evenly_chosen, followed_rate, thin_run
+from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
 from discover.protocols import measured_rate
 from discover.study import parse_study
 from discover.study.data import StudyData

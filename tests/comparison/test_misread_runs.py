@@ -7,13 +7,13 @@ import pytest
 from independent import Giesekus, oscillation, start_up
 
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.misread_runs import (
+from discover.comparison.judging.moved_law import MovedLaw
+from discover.comparison.judging.other_causes.misread_runs import (
     hold_against_misreading,
     holding_misreading,
     readings_of,
 )
-from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.judging.small_faults import holding_small_faults
+from discover.comparison.judging.other_causes.small_faults import holding_small_faults
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions

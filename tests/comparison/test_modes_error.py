@@ -1,6 +1,6 @@
 """Intervals beside modes that a noisy sweep gave: what is said, on a path written by hand."""
 
-from discover.comparison.judging.modes_error import left_open_by_modes
+from discover.comparison.judging.constants.modes_error import left_open_by_modes
 
 PATH = [
     {"size": 0, "misfit": 1.0},

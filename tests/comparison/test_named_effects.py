@@ -16,12 +16,12 @@ from discover.comparison.fitting.named_effects import (
     _sets,
     fit_named_effects,
 )
-from discover.comparison.judging.dense_library import (
+from discover.comparison.judging.bands.dense_library import (
     DENSE,
     NAMED_BESIDE,
     without_refuted_bands,
 )
-from discover.comparison.judging.named_bands import with_named_effects
+from discover.comparison.judging.bands.named_bands import with_named_effects
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discover.comparison.judging.bands.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.identifiability import FOUND
-from discover.comparison.judging.one_term_in_bands import holding_one_term_more
 from discover.comparison.outcomes.flows import Flow
 from discover.identify import HiddenStresses, LawTerms
 from discover.identify.rivals.bands import PredictionBand

@@ -8,14 +8,14 @@ from independent import Giesekus, start_up
 
 import discover as dc
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.loadings import OwnLoadings
+from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.own_loadings import with_own_loadings
 from discover.dataset import Dataset, Run
 from discover.protocols import imposed_stress
 from discover.protocols import start_up as protocol
 from discover.report.comparison.certainty import how_sure
 from discover.statistics import LackOfFit
-from discover.statistics.loadings import LoadingFound
+from discover.statistics.reading.loadings import LoadingFound
 from discover.study.in_memory import data_in_memory
 
 GROWTH = np.linspace(0.1, 8.0, 60)

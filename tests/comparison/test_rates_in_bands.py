@@ -6,8 +6,8 @@ import numpy as np
 from independent import Giesekus
 from independent import start_up as independent_start_up
 
+from discover.comparison.judging.bands.rates_in_bands import holding_rate_errors
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.judging.rates_in_bands import holding_rate_errors
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.dataset import Run
 from discover.identify.rivals.bands import PredictionBand

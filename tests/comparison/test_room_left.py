@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discover.comparison.judging.bands.room_left import room_left
 from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.room_left import room_left
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up

@@ -9,7 +9,7 @@ from independent.instruments import Instrument
 
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.moved_law import MovedLaw
-from discover.comparison.judging.smaller_laws import (
+from discover.comparison.judging.other_causes.smaller_laws import (
     hold_against_smaller_laws,
     holding_smaller_laws,
 )

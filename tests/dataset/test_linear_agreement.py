@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.dataset.linear_agreement import linear_agreements
-from discover.dataset.linear_spectra import creep_compliance, modes_of_retardation, spectrum_of
-from discover.dataset.linear_tests import LinearTest, read_linear_tests
+from discover.dataset.linear.linear_agreement import linear_agreements
+from discover.dataset.linear.linear_spectra import (
+    creep_compliance,
+    modes_of_retardation,
+    spectrum_of,
+)
+from discover.dataset.linear.linear_tests import LinearTest, read_linear_tests
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.report.data.linear_agreement import agreement_words
 

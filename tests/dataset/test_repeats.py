@@ -7,7 +7,7 @@ import pytest
 from independent import Giesekus, oscillation, start_up
 
 import discover as dc
-from discover.dataset.repeats import count_flows, repeated_tests, repeats_among
+from discover.dataset.records.repeats import count_flows, repeated_tests, repeats_among
 
 TIMES = np.linspace(0.05, 8.0, 60)
 

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import load_dataset
-from discover.dataset.linear_tests import LinearTest, over_time
+from discover.dataset.linear.linear_tests import LinearTest, over_time
+from discover.dataset.linear.superposition import superpose
 from discover.dataset.linear_viscoelasticity import LinearSweep
-from discover.dataset.superposition import superpose
 from discover.errors import InputError
 from discover.report.data.superposition import superposition_words
 

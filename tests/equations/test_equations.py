@@ -22,7 +22,7 @@ from discover.equations import (
     write_equation,
 )
 from discover.equations import Tested as WhereTested
-from discover.equations.rheotool import rheotool_model
+from discover.equations.formats.rheotool import rheotool_model
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.protocols import start_up

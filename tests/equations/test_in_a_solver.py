@@ -5,7 +5,7 @@ import pytest
 
 from discover.equations import Box, Equation, EquationTerm, NamedPart, write_equation
 from discover.equations import Tested as Where
-from discover.equations.in_a_solver import in_a_solver
+from discover.equations.formats.in_a_solver import in_a_solver
 
 WI = 3.0
 # oscillation so fast that start-up goes furthest

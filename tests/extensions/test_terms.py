@@ -8,8 +8,8 @@ import pytest
 import sympy
 
 from discover.equations import Equation, EquationTerm, equation_from_json, equation_to_json
-from discover.equations.code import numpy_code, sympy_code
-from discover.equations.mathml import law_element
+from discover.equations.formats.code import numpy_code, sympy_code
+from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
 from discover.programs.fingerprint import NotDescribable, fingerprint
 from discover.study import read_study

@@ -6,7 +6,7 @@ import pytest
 from independent import Giesekus, of_rate, oscillation
 
 from discover.dataset.from_dataframe import from_dataframe
-from discover.dataset.thinning import thin_run
+from discover.dataset.records.thinning import thin_run
 from discover.protocols import (
     after_steady_flow,
     another_between_samples,

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.path import Path
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import DENSE, NAMED_BESIDE
+from discover.comparison.judging.bands.dense_library import DENSE, NAMED_BESIDE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up

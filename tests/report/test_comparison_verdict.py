@@ -10,7 +10,7 @@ from made_up_comparison import TIMES, left, made_up, page_of
 
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.statements import IN_LIBRARY, Statement, no_flow_left
-from discover.dataset.repeats import Repeats
+from discover.dataset.records.repeats import Repeats
 from discover.protocols.control import oscillations, steady_rates
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.comparison.verdict import comparison_verdict

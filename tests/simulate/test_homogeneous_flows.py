@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from independent.homogeneous import UNIT, GiesekusFluid
 
+from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
-from discover.dataset.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.statistics import holds_signal, lack_of_fit
+from discover.statistics.noise.whiteness import cycle, noise_probability, separate_probability
 from discover.statistics.residual import Expectation
-from discover.statistics.whiteness import cycle, noise_probability, separate_probability
 
 SAMPLES = 300
 TIMES = np.linspace(0.1, 60.0, SAMPLES)

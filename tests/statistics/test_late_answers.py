@@ -7,7 +7,7 @@ from independent.noise import correlated
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lfilter
 
-from discover.statistics.late_answers import AGREED, Response, late_answer
+from discover.statistics.reading.late_answers import AGREED, Response, late_answer
 
 _GROWTH, _WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 _FLOWS = [

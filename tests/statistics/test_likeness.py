@@ -10,8 +10,8 @@ from discover.closed_loop.judging.reasons import Grounds, reasons
 from discover.closed_loop.judging.unseen_runs import UnseenRuns
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.likeness import likeness
+from discover.statistics.noise.wandering import wandering
 from discover.statistics.residual import Expectation
-from discover.statistics.wandering import wandering
 
 LENGTHS = (80, 80, 120)
 DRAWS = 40

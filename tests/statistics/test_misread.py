@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from independent import Giesekus, Modes, oscillation, start_up
 
-from discover.statistics.misread import CLEAR, POSSIBLE, misread, reads
-from discover.statistics.reading_faults import Reading
+from discover.statistics.reading.misread import CLEAR, POSSIBLE, misread, reads
+from discover.statistics.reading.reading_faults import Reading
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from discover.statistics.misread import CLEAR, misread
-from discover.statistics.reading_faults import Reading
+from discover.statistics.reading.misread import CLEAR, misread
+from discover.statistics.reading.reading_faults import Reading
 
 TIMES = np.linspace(0.1, 8.0, 80)
 RATES = (0.3, 1.0, 3.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.statistics.outliers import isolated, stray
+from discover.statistics.noise.outliers import isolated, stray
 
 TIMES = np.linspace(0.05, 10.0, 200)
 WAVE = np.sin(2.0 * TIMES)

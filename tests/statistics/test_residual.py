@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from planting import Noise
 
+from discover.statistics.noise.whiteness import noise_probability
 from discover.statistics.residual import (
     Expectation,
     is_noise,
@@ -11,7 +12,6 @@ from discover.statistics.residual import (
     noise_floor,
     tells_noise,
 )
-from discover.statistics.whiteness import noise_probability
 
 RUNS, SAMPLES = 6, 60
 WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))

@@ -7,8 +7,8 @@ from scipy.signal import lfilter
 from discover.protocols import start_up, steady_rates
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import lack_of_fit
-from discover.statistics.same_correlation import same_correlation_probability
-from discover.statistics.whiteness import SIGNIFICANCE
+from discover.statistics.noise.same_correlation import same_correlation_probability
+from discover.statistics.noise.whiteness import SIGNIFICANCE
 
 LENGTHS = (80, 80, 120)
 EVERY = 0.1

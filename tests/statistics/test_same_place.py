@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.noise.same_place import same_place_probability
 from discover.statistics.residual import Expectation, noise_floor
-from discover.statistics.same_place import same_place_probability
 
 NOISE, SAMPLES = 0.01, 61
 WEIGHT = np.full((5, SAMPLES), 1.0 / np.sqrt(SAMPLES))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.noise.whiteness import noise_probability
 from discover.statistics.residual import noise_floor
-from discover.statistics.whiteness import noise_probability
 
 TIMES = np.linspace(0.33, 5.0, 15)
 

@@ -6,7 +6,7 @@ from independent import Giesekus, Modes, UpperConvectedMaxwell, oscillation, sta
 from independent.noise import correlated, proportional, rms, white
 
 from discover.statistics import lack_of_fit
-from discover.statistics.smooth_misfit import smooth_misfit_probability
+from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
 
 GROWTH, WAVE = np.geomspace(0.05, 10.0, 60), np.linspace(0.0, 12.0, 121)
 FLOWS = [(start_up(0.5), GROWTH), (start_up(2.0), GROWTH), (oscillation(2.0, 1.0), WAVE)]

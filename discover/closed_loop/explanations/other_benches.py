@@ -17,7 +17,7 @@ from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.search import Search
 from discover.forward.least_squares import Fit, Prior
 from discover.inference.evidence import INDISTINGUISHABLE, WINDOW
-from discover.statistics.small_faults import WIDTHS
+from discover.statistics.reading.small_faults import WIDTHS
 from discover.words import percent_of
 
 BENCH = "small_bench_faults"

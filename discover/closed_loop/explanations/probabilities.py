@@ -9,9 +9,9 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.forward import AugmentedModel
+from discover.statistics.noise.whiteness import SIGNIFICANCE
 from discover.statistics.residual import STRUCTURE
 from discover.statistics.unseen import CARRIED
-from discover.statistics.whiteness import SIGNIFICANCE
 
 _CERTAIN = float(np.log(1000.0))
 """Logarithm of odds beyond which no test of noise is to be believed."""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from discover.dataset import Run
-from discover.dataset.repeats import count_flows
+from discover.dataset.records.repeats import count_flows
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES

@@ -10,7 +10,7 @@ from discover.closed_loop.judging.finer_steps import change_on_finer_steps, cons
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
-from discover.dataset.coarse_rates import CoarseRates, samples_a_cycle, worth_a_look
+from discover.dataset.records.coarse_rates import CoarseRates, samples_a_cycle, worth_a_look
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.protocols import unknown_between_samples

@@ -15,8 +15,8 @@ from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, uncertainty, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics import HALF_BAND
-from discover.statistics.independent_samples import independent_samples
-from discover.statistics.loadings import ADVICE, LoadingFound, as_too_far, too_far
+from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.reading.loadings import ADVICE, LoadingFound, as_too_far, too_far
 
 
 def factors_of_loadings(

@@ -1,7 +1,8 @@
 """A model that explains records only up to how each was read: in the verdict, and in constants.
 
-See `discover.statistics.misread`. A fault that describes the runs clearly better refutes the model.
-One that is not ruled out by the fitted runs moves the constants, whose intervals hold either.
+See `discover.statistics.reading.misread`. A fault that describes the runs clearly better refutes
+the model. One that is not ruled out by the fitted runs moves the constants, whose intervals hold
+either.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit
-from discover.statistics.misread import (
+from discover.statistics.reading.misread import (
     POSSIBLE,
     Misread,
     advice,
@@ -21,7 +22,7 @@ from discover.statistics.misread import (
     misread,
     reads,
 )
-from discover.statistics.reading_faults import Reading
+from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.residual import STRUCTURE, Expectation
 
 Bounds = dict[int, tuple[float, float]]

@@ -9,7 +9,7 @@ from discover.closed_loop.judging.finer_steps import change_on_finer_steps
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
-from discover.statistics.converter_steps import step_of_converter
+from discover.statistics.noise.converter_steps import step_of_converter
 from discover.statistics.residual import judging
 
 COMPUTED = 1e-6

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from discover.closed_loop.judging.fitted_runs import FittedRuns
 from discover.closed_loop.judging.silence import Silence
 from discover.closed_loop.judging.unseen_runs import UnseenRuns
+from discover.statistics.noise.whiteness import SIGNIFICANCE
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation
-from discover.statistics.whiteness import SIGNIFICANCE
 from discover.words import percent_of
 
 _MISSING = "Some effect is still missing"

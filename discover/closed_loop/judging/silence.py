@@ -12,7 +12,7 @@ from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics import holds_signal
-from discover.statistics.dead_records import CHANCE
+from discover.statistics.noise.dead_records import CHANCE
 from discover.statistics.residual import judged_cost, judging, summarise
 
 Silence = Literal["records", "fluid"]

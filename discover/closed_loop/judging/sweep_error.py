@@ -6,8 +6,8 @@ import numpy as np
 
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.statistics.beyond_sweep import ADVICE, REASON, beyond_the_sweep
-from discover.statistics.reading_faults import Reading
+from discover.statistics.reading.beyond_sweep import ADVICE, REASON, beyond_the_sweep
+from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.residual import STRUCTURE
 from discover.words import percent_of
 

@@ -16,10 +16,10 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect, simplest_terms
 from discover.forward import AugmentedModel, Batch, as_predicted
 from discover.forward.least_squares import jacobians
-from discover.statistics.any_correlation import probability_over_correlations
-from discover.statistics.loadings import ADVICE
 from discover.statistics.projection import rms, without
-from discover.statistics.reading_faults import Reading, Session
+from discover.statistics.reading.any_correlation import probability_over_correlations
+from discover.statistics.reading.loadings import ADVICE
+from discover.statistics.reading.reading_faults import Reading, Session
 from discover.statistics.residual import STRUCTURE
 
 _SEEN = 1e-2

@@ -13,8 +13,8 @@ from discover.forward.least_squares import Fit
 from discover.protocols.kinematics import STATES
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
+from discover.statistics.noise.whiteness import SIGNIFICANCE, separate_probability
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, slow_part, tells_noise
-from discover.statistics.whiteness import SIGNIFICANCE, separate_probability
 from discover.words import percent_of
 
 

@@ -16,8 +16,8 @@ from discover.inference.draws_by_mode import draw_constants
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.small_faults import with_small_faults
 from discover.inference.varying_constant import freer_fits
-from discover.statistics.reading_faults import Reading
-from discover.statistics.small_faults import small_faults
+from discover.statistics.reading.reading_faults import Reading
+from discover.statistics.reading.small_faults import small_faults
 from discover.study.declared_model import DeclaredModel
 
 _WITH_A_NAME = {"sigma.sigma": "giesekus_mobility", "tr(sigma)*sigma": "ptt_linear"}

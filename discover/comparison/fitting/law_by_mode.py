@@ -25,8 +25,8 @@ from discover.inference.problem import FitProblem
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.learners.tensor_sindy.rough_problem import enough_to_rank
 from discover.statistics import LackOfFit
-from discover.statistics.misread import Misread, clear_misreading
-from discover.statistics.reading_faults import Reading
+from discover.statistics.reading.misread import Misread, clear_misreading
+from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from discover.dataset import Run
 from discover.dataset.material_functions import as_compared
-from discover.dataset.spikes import without_spikes
-from discover.dataset.thinning import thin_run
+from discover.dataset.records.spikes import without_spikes
+from discover.dataset.records.thinning import thin_run
 from discover.errors import InputError
 from discover.learners.runs import waiting
 from discover.study.data import StudyData

@@ -7,7 +7,12 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.coarse_rates import CoarseRates, coarse_in, samples_a_cycle, worth_a_look
+from discover.dataset.records.coarse_rates import (
+    CoarseRates,
+    coarse_in,
+    samples_a_cycle,
+    worth_a_look,
+)
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 from discover.learners.recovered_term import RecoveredTerm

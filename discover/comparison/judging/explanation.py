@@ -10,7 +10,7 @@ from discover.comparison.fitting.sampled_rates import coarse_rates_of
 from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.repeats import Repeats
+from discover.dataset.records.repeats import Repeats
 from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY
 from discover.protocols.kinematics import FOLLOWED

@@ -1,6 +1,6 @@
 """What a complete law may leave of a study's runs: noise, the sweep's own error, repeats."""
 
-from discover.dataset.repeats import Repeats
+from discover.dataset.records.repeats import Repeats
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset import units
 from discover.dataset.checking.among_runs import doubts_among_runs, doubts_of_temperature
 from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
@@ -38,7 +37,8 @@ from discover.dataset.material_functions import (
 from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
-from discover.dataset.table import Table, read_table, shown
+from discover.dataset.tables import units
+from discover.dataset.tables.table import Table, read_table, shown
 from discover.errors import InputError
 
 _RUN_QUANTITIES = (

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 from discover.dataset.fetching.catalogue import PublicDataset
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
 _PIECE = 1 << 16  # bytes unpacked at a time

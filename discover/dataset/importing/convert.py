@@ -17,7 +17,7 @@ from discover.dataset.importing.registry import blocks_of_importer
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.importing.waveforms import waves_of, without_names
-from discover.dataset.table import read_bytes, shown
+from discover.dataset.tables.table import read_bytes, shown
 from discover.errors import InputError
 
 

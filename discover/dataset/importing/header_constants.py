@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from discover.dataset.unit_text import read_unit
+from discover.dataset.tables.unit_text import read_unit
 
 _VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9]).{0,19})?"
 _ALONE = re.compile(_VALUE)

@@ -8,7 +8,7 @@ from urllib.parse import quote, unquote_to_bytes
 
 from pydantic import Field, model_validator
 
-from discover.dataset.toml_file import read_toml, toml_string
+from discover.dataset.tables.toml_file import read_toml, toml_string
 from discover.validation import Section, validated
 
 MAPPING_FILE = "import.toml"

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 
-from discover.dataset import units
 from discover.dataset.importing.names import NAMES, plain
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
-from discover.dataset.table import shown
-from discover.dataset.unit_text import read_heading, read_unit
-from discover.dataset.units import Quantity
+from discover.dataset.tables import units
+from discover.dataset.tables.table import shown
+from discover.dataset.tables.unit_text import read_heading, read_unit
+from discover.dataset.tables.units import Quantity
 from discover.errors import InputError
 
 QUANTITIES: dict[str, Quantity] = {

@@ -18,7 +18,7 @@ from discover.dataset.importing.quantities import (
 )
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.table import shown
+from discover.dataset.tables.table import shown
 from discover.errors import InputError
 
 INSTRUMENT = {

@@ -13,7 +13,7 @@ import numpy as np
 from discover.dataset.importing.header_constants import Constant, constants_of
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
 _TIME, _RATE, _STRESS = ("time", "s"), ("gdot", "1/s"), ("stress", "Pa")

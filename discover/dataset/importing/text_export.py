@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from discover.dataset.importing.header_constants import Constant, constants_of, name_and_unit
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.unit_text import read_unit
+from discover.dataset.tables.unit_text import read_unit
 from discover.errors import InputError
 
 Rows = Sequence[Sequence[str]]

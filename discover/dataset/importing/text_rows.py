@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from discover.dataset.table import read_bytes
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
 Decimal = Literal[".", ","]

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
 
+from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
-from discover.dataset.thinning import evenly_chosen
 from discover.errors import InputError
 from discover.forward.fluids import observed_in_batch
 from discover.laws.base import AbstractConstitutiveLaw

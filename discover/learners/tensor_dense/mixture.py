@@ -28,7 +28,7 @@ from discover.learners.tensor_dense.reference_laws import (
 from discover.learners.trajectories.modulus_errors import modulus_columns
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
-from discover.statistics.noise_model import noise_model
+from discover.statistics.noise.noise_model import noise_model
 
 WIDTHS = (0.01, 0.03, 0.1, 0.3)
 """Widths κ of the prior, in units of one over the size of a term along the trajectories."""

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
-from discover.dataset.thinning import thin_run
 from discover.learners.rough_grid import AFFORDABLE, WORTH_IT, rough_limits
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.protocols.kinematics import STATES

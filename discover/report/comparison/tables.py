@@ -8,12 +8,12 @@ import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.identifiability import EXACT, Rival
-from discover.comparison.judging.loadings import OwnLoadings
+from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.outcomes.constant import in_words as constant_in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.equations import Equation
-from discover.equations.mathml import law_element, term_element, term_mathml
+from discover.equations.spelling.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY, learner_title

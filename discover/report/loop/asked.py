@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.dataset.coarse_rates import CoarseRates, coarse_in
+from discover.dataset.records.coarse_rates import CoarseRates, coarse_in
 
 MOST_NAMES = 3
 

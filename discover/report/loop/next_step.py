@@ -6,7 +6,7 @@ import numpy as np
 
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Stage
-from discover.dataset.coarse_rates import MORE_SAMPLES
+from discover.dataset.records.coarse_rates import MORE_SAMPLES
 from discover.report.loop.asked import EXPLAINED, coarse_rates, several, untested_by
 from discover.report.wording import (
     A_TRANSIENT,

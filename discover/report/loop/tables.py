@@ -10,7 +10,7 @@ from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
-from discover.equations.mathml import law_element
+from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
 from discover.inference.constants import ConstantByMode
 from discover.report.loop.found import KINDS, named

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.dense_library import DENSE, GREEN_BAND, NAMED_BESIDE
+from discover.comparison.judging.bands.dense_library import DENSE, GREEN_BAND, NAMED_BESIDE
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay

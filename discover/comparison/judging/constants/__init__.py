@@ -1,0 +1,1 @@
+"""Constants of the declared model: what of them is open, and whether modes share them."""

@@ -1,0 +1,1 @@
+"""Linear tests at several temperatures, and what they say of one another."""

@@ -1,0 +1,214 @@
+"""Time–temperature superposition: tests at several temperatures as one, and how well that holds.
+
+Neighbouring tests are laid over each other by log a_T, and log b_T if asked for, that make the logs
+of their values agree best where they overlap; shifts add up from the reference temperature [Ferry
+1980, Viscoelastic Properties of Polymers, ch. 11]. b_T divides moduli and multiplies compliances,
+a_T multiplies frequencies and divides times. Sweeps lead where there are sweeps: they see the
+temperature in two curves, and a table over time in one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import norm
+
+from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests, of_sweep
+from discover.dataset.linear.overlap import lay_over, overlap_misfit
+from discover.dataset.linear.shift_laws import ShiftLaw, fit_shift_laws
+from discover.dataset.linear_viscoelasticity import LinearSweep
+from discover.errors import InputError
+
+SUPERPOSED, FAILED = 0.05, 0.1
+"""Root-mean-square relative misfit in an overlap up to which tests superpose, about what two
+loadings of one sample differ by, and from which on they do not."""
+
+_TWO_SIDED = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Superposition:
+    """Tests at several temperatures, moved to one.
+
+    Attributes
+    ----------
+    reference
+        In °C.
+    celsius
+        Temperatures, increasing, shape (n,).
+    tests
+        As measured, by kind and temperature.
+    leading
+        The kinds that the shifts were found from.
+    log_shift, log_vertical
+        log10 of a_T and b_T, shape (n,).
+    error
+        Standard errors of both, shape (n, 2).
+    laws
+        WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
+    apart
+        Temperatures in °C whose tests share no kind with the others', and are not moved.
+    """
+
+    reference: float
+    celsius: Float[np.ndarray, " n"]
+    tests: Tests
+    leading: tuple[str, ...]
+    log_shift: Float[np.ndarray, " n"]
+    log_vertical: Float[np.ndarray, " n"]
+    error: Float[np.ndarray, "n 2"]
+    laws: tuple[ShiftLaw, ...]
+    apart: tuple[float, ...] = ()
+
+    def moved(self, kind: str, celsius: float) -> LinearTest:
+        """Return the test at a temperature as it would be at the reference."""
+        at = int(np.flatnonzero(self.celsius == celsius)[0])
+        return self.tests[kind][celsius].moved(
+            float(self.log_shift[at]), float(self.log_vertical[at])
+        )
+
+    def misfits(self, kind: str) -> dict[tuple[float, float], float]:
+        """Return the root-mean-square relative misfit of neighbours where they overlap."""
+        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
+        found = {}
+        for cold, warm in pairwise(there):
+            misfit = overlap_misfit(self.moved(kind, cold), self.moved(kind, warm))
+            if misfit is not None:
+                found[cold, warm] = misfit
+        return found
+
+    def verdict_of(self, kind: str) -> str:
+        """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind.
+
+        Doubtful too where nothing overlaps: no misfit is not a small one.
+        """
+        misfits = self.misfits(kind)
+        worst = max(misfits.values(), default=0.0)
+        if misfits and worst <= SUPERPOSED:
+            return "superposed"
+        return "doubtful" if worst < FAILED else "not_superposed"
+
+    @property
+    def verdict(self) -> str:
+        """The worst verdict of the kinds that the shifts were found from."""
+        found = {self.verdict_of(kind) for kind in self.leading}
+        ranked = ("not_superposed", "doubtful", "superposed")
+        return next(one for one in ranked if one in found)
+
+    def factors(self, at: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return a_T and b_T at a temperature, each with its 95 % interval."""
+        both = zip((self.log_shift[at], self.log_vertical[at]), self.error[at], strict=True)
+        a, b = (
+            tuple(float(10.0 ** (value + side * _TWO_SIDED * error)) for side in (0, -1, 1))
+            for value, error in both
+        )
+        return a, b  # pyright: ignore[reportReturnType]
+
+    def master(self, kind: str) -> LinearTest | None:
+        """Return all moved tests of a kind as one; None where they do not become one."""
+        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
+        if not there or "not_superposed" in (self.verdict, self.verdict_of(kind)):
+            return None
+        moved = [self.moved(kind, celsius) for celsius in there]
+        argument = np.concatenate([one.argument for one in moved])
+        order = np.argsort(argument, kind="stable")
+        if kind != SWEEP:  # a table over time has no time twice
+            order = order[np.diff(argument[order], prepend=0.0) > 0.0]
+        return LinearTest(
+            kind,
+            argument[order],
+            np.concatenate([one.values for one in moved], axis=1)[:, order],
+            np.concatenate([one.spread for one in moved])[order],
+        )
+
+
+def superpose(
+    tests: Tests | Mapping[float, LinearSweep],
+    reference: float | None = None,
+    vertical: bool = False,
+) -> Superposition:
+    """Return tests at several temperatures moved to one of them.
+
+    Parameters
+    ----------
+    tests
+        By kind and by temperature in °C; or sweeps by temperature.
+    reference
+        One of them; the middle one if None.
+    vertical
+        Whether moduli and compliances too may be moved.
+
+    Raises
+    ------
+    InputError
+        If the reference is none of the temperatures, or neighbours share too few values.
+    """
+    known = _by_kind(tests)
+    several = {kind: at for kind, at in known.items() if len(at) > 1}
+    if not several:
+        raise InputError("Shifting needs tests of one kind at two temperatures; got none.")
+    main = several.get(SWEEP) or next(iter(several.values()))
+    middle = sorted(main)[len(main) // 2]
+    reference = middle if reference is None else reference
+    every = sorted({celsius for at in known.values() for celsius in at})
+    if reference not in every:
+        listed = ", ".join(f"{t:g}" for t in every)
+        raise InputError(f"There is no test at {reference:g} °C. Take one of {listed}.")
+    found, leading = _walk(several, reference, vertical)
+    celsius = np.array(sorted(found))
+    shifts = np.array([found[t][0] for t in celsius])
+    errors = np.sqrt([np.diag(found[t][1]) for t in celsius])
+    at = int(np.flatnonzero(celsius == reference)[0])
+    laws = fit_shift_laws(celsius, shifts[:, 0], at)
+    apart = tuple(t for t in every if t not in found)
+    return Superposition(
+        reference, celsius, known, leading, shifts[:, 0], shifts[:, 1], errors, laws, apart
+    )
+
+
+def _by_kind(tests: Tests | Mapping[float, LinearSweep]) -> Tests:
+    sweeps = {t: of_sweep(one) for t, one in tests.items() if isinstance(one, LinearSweep)}
+    return {SWEEP: sweeps} if sweeps else tests  # pyright: ignore[reportReturnType]
+
+
+def _walk(several: Tests, reference: float, vertical: bool):
+    """Return the sum of shifts and of their covariances by temperature, and the leading kinds.
+
+    From the reference on, the next temperature is one that a sweep ties to those reached, then one
+    that any other test does, the nearest first.
+    """
+    reached = {reference: (np.zeros(2), np.zeros((2, 2)))}
+    leading: dict[str, None] = {}
+    links = [
+        (kind != SWEEP, warm - cold, cold, warm)
+        for kind, at in several.items()
+        for cold, warm in pairwise(sorted(at))
+    ]
+    while open_ := [link for link in links if (link[2] in reached) != (link[3] in reached)]:
+        table, _, cold, warm = min(open_)
+        kinds = [k for k in several if (k != SWEEP) == table and {cold, warm} <= set(several[k])]
+        leading.update(dict.fromkeys(kinds))
+        below, above = ({kind: several[kind][t] for kind in kinds} for t in (cold, warm))
+        laid = lay_over(below, above, vertical, f"{cold:g} and {warm:g} °C")
+        start, end, sign = (cold, warm, 1.0) if cold in reached else (warm, cold, -1.0)
+        shift, covariance = reached[start]
+        reached[end] = (shift + sign * laid.shift, covariance + laid.covariance)
+    return reached, tuple(leading)
+
+
+def shift_table(found: Superposition) -> str:
+    """Return temperatures, shift factors and misfits as the text of ``shift_factors.csv``."""
+    head = ["temperature_C", "a_T", "a_T_low95", "a_T_high95", "b_T", "b_T_low95", "b_T_high95"]
+    misfits = {kind: found.misfits(kind) for kind in found.tests}
+    names = ["misfit_to_next" if kind == SWEEP else f"{kind}_misfit_to_next" for kind in misfits]
+    rows = [[*head, *names]]
+    for i, degrees in enumerate(found.celsius):
+        off = [
+            next((f"{m:.4g}" for (cold, _), m in pairs.items() if cold == degrees), "")
+            for pairs in misfits.values()
+        ]
+        numbers = [repr(value) for factor in found.factors(i) for value in factor]
+        rows.append([f"{degrees:g}", *numbers, *off])
+    return "\n".join(",".join(row) for row in rows) + "\n"

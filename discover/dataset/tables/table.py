@@ -1,0 +1,329 @@
+"""Text tables, read safely and with errors that name file, column and line."""
+
+import csv
+import difflib
+import io
+import os
+import re
+import stat
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset.tables.units import Quantity, find_column
+from discover.errors import InputError
+
+LARGEST_FILE = 300_000_000
+"""Bytes; some five million samples. More cannot be looked at, let alone fitted."""
+
+LARGEST_VALUE = 1e15
+"""No rheometer quantity in SI units is larger; squares of such numbers still compute."""
+
+SMALLEST_VALUE = 1e-100
+"""What is nearer to zero is zero: no instrument tells them apart, and its square is no number."""
+
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
+_IMPORT = "discover data import"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A CSV file as text.
+
+    Attributes
+    ----------
+    name
+        Name of the file, for messages.
+    lines
+        Line of the file on which each row stands; blank lines count but are no rows.
+    """
+
+    name: str
+    columns: Mapping[str, Sequence[str]]
+    lines: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def listed(self) -> str:
+        """Names of the columns, as they can be printed in a message."""
+        names = [shown(column) for column in self.columns]
+        more = f" and {len(names) - 12} more" if len(names) > 12 else ""
+        return ", ".join(names[:12]) + more
+
+    def rows(self, chosen: Sequence[int]) -> "Table":
+        """Return the table of some rows, counted from 0."""
+        columns = {name: [cells[i] for i in chosen] for name, cells in self.columns.items()}
+        return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
+
+    def numbers(self, column: str) -> Float[np.ndarray, " n"]:
+        """Return a column as finite numbers, those next to nothing as 0.
+
+        Raises
+        ------
+        InputError
+            If a cell is not a finite number, or is larger than any measurement.
+        """
+        text = self.columns[column]
+        # as Python reads them: pandas before 3 drops the last of many digits
+        values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
+        finite = np.isfinite(values)
+        if not np.all(finite):
+            row = int(np.argmin(finite))
+            missing = int(np.sum(~finite))
+            more = f" ({missing - 1} more lines are like it.)" if missing > 1 else ""
+            raise InputError(
+                f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
+                f"{shown(text[row])}. {_remedy(text[row], row)}{more}"
+            )
+        large = np.abs(values) > LARGEST_VALUE
+        if np.any(large):
+            row = int(np.argmax(large))
+            raise InputError(
+                f"{column} in {self.name} holds {values[row]:g} on line {self.lines[row]}, more "
+                f"than any measurement (the limit is {LARGEST_VALUE:g}). Correct or remove that "
+                "line."
+            )
+        return np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values)
+
+    def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
+        """Return a known quantity in SI units, or None if no column holds it.
+
+        Raises
+        ------
+        InputError
+            If its unit or a cell is wrong.
+        """
+        try:
+            found = find_column(tuple(self.columns), quantity)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from error
+        if found is None:
+            return None
+        column, factor = found
+        values = self.numbers(column) * factor
+        if np.any(np.abs(values) > LARGEST_VALUE):
+            row = int(np.argmax(np.abs(values)))
+            raise InputError(
+                f"{column} in {self.name} holds {self.columns[column][row]} on line "
+                f"{self.lines[row]}, which is {values[row]:g} {quantity.unit}, more than any "
+                "measurement. Correct that line, or the unit in the heading."
+            )
+        return values
+
+    def required(self, quantity: Quantity) -> Float[np.ndarray, " n"]:
+        """Return a known quantity in SI units.
+
+        Raises
+        ------
+        InputError
+            If no column holds it, or its unit or a cell is wrong.
+        """
+        values = self.quantity(quantity)
+        if values is None:
+            raise InputError(
+                f"{self.name} has no column {quantity.column}; its columns are "
+                f"{self.listed}. {_rename(quantity, self.columns)}"
+            )
+        return values
+
+
+def read_bytes(
+    path: Path,
+    name: str,
+    if_missing: str = "Check its path.",
+    largest: int = LARGEST_FILE,
+    too_large: str = "Keep fewer samples of it.",
+) -> bytes:
+    """Return the content of a regular file of reasonable size.
+
+    Parameters
+    ----------
+    name
+        Its name in messages.
+    if_missing
+        Remedy where there is no such file.
+    largest, too_large
+        Bytes that it may have, and the remedy where it has more.
+
+    Raises
+    ------
+    InputError
+        If it is missing, cannot be read, is no regular file (a pipe would never end), or is larger
+        than it may be.
+    """
+    try:
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
+            raise InputError(f"{name} is a folder; a file is wanted there. Name the file itself.")
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(f"{name} is a pipe or device, not a file. Save the data in a file.")
+        if status.st_size > largest:
+            raise InputError(
+                f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. "
+                f"{too_large}"
+            )
+        return Path(path).read_bytes()
+    except InputError:
+        raise
+    except (FileNotFoundError, NotADirectoryError):
+        folder = path.parent.name
+        place = f" in {folder}" if folder and str(path) != name else ""
+        raise InputError(f"There is no file {name}{place}. {if_missing}") from None
+    except OSError as error:
+        raise InputError(
+            f"{name} cannot be read: {error.strerror or error}. Check the file and who may read it."
+        ) from None
+    except ValueError:
+        raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+
+
+def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
+    """Return a CSV file with a header line as text.
+
+    A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
+    commas and other encodings are recognised and refused, since guessing at numbers is no help.
+
+    Parameters
+    ----------
+    name
+        Its name in messages; the file's own by default.
+    if_missing
+        Remedy where there is no such file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, empty or not a table.
+    """
+    name = path.name if name is None else name
+    text = _decode(read_bytes(path, name, if_missing), name)
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True, strict=True)
+    header: list[str] = []
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    start = 1
+    try:
+        for cells in reader:
+            first, start = start, reader.line_num + 1
+            if not any(cell.strip() for cell in cells):
+                continue
+            if not header:
+                header = _header(cells, first, name)
+                continue
+            if len(cells) != len(header):
+                raise InputError(_ragged(name, cells, len(header), first))
+            rows.append(cells)
+            lines.append(first)
+    except csv.Error as error:
+        raise InputError(
+            f"{name} is not a comma-separated table: line {start} ({error}). Mend the quotes there."
+        ) from None
+    if not header:
+        raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
+    if not rows:
+        raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
+    return Table(
+        name,
+        {column: [row[i].strip() for row in rows] for i, column in enumerate(header)},
+        lines,
+    )
+
+
+def _decode(content: bytes, name: str) -> str:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(
+            f"{name} is in UTF-16, as some instruments export it; UTF-8 is wanted. Save it as CSV "
+            f"UTF-8, or use {_IMPORT}."
+        )
+    if b"\0" in content:
+        line = content[: content.index(b"\0")].count(b"\n") + 1
+        raise InputError(
+            f"{name} is not text: line {line} holds a zero byte, as spreadsheets and other binary "
+            "files do. Save it as CSV."
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{name} is not a comma-separated table in UTF-8: line {line} holds the byte "
+            f"0x{content[error.start]:02x}. Save it as CSV UTF-8, or use {_IMPORT}."
+        ) from None
+
+
+def _header(cells: list[str], line: int, name: str) -> list[str]:
+    columns = [cell.strip() for cell in cells]
+    if all(_NUMBER.fullmatch(column) for column in columns):
+        raise InputError(
+            f"{name} begins with numbers on line {line}, not with the names of its columns. Add a "
+            "header such as time_s,shear_rate_1_s,stress_Pa."
+        )
+    if len(columns) == 1:
+        for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in columns[0]:
+                raise InputError(
+                    f"{name} separates its columns by {word} (line {line}), not commas. Save it "
+                    f"with commas and decimal points, or use {_IMPORT}."
+                )
+    for i, column in enumerate(columns):
+        if not column:
+            raise InputError(f"Column {i + 1} of {name} has no name. Name it or remove it.")
+        if columns.index(column) != i:
+            raise InputError(f"{name} has two columns named {shown(column)}; keep one.")
+    return columns
+
+
+def _ragged(name: str, cells: list[str], wanted: int, line: int) -> str:
+    if len(cells) > wanted and all(_NUMBER.fullmatch(cell.strip()) for cell in cells):
+        why = " Decimal commas look so too: write decimal points."
+    else:
+        why = " Correct that line."
+    return (
+        f"{name} is not a comma-separated table: line {line} has {len(cells)} cells, the header "
+        f"{wanted}.{why}"
+    )
+
+
+def _remedy(cell: str, row: int) -> str:
+    if _DECIMAL_COMMA.fullmatch(cell):
+        return f"Write decimal points, not commas, or use {_IMPORT}."
+    if row == 0 and cell and not any(c.isdigit() for c in cell.replace("1/", "")):
+        return (
+            "That looks like a row of units: put them into the header, as in time_s, and remove "
+            f"the row, or use {_IMPORT}."
+        )
+    if cell and _NUMBER.fullmatch(cell):
+        return "That is beyond what a computer holds as a number; correct that line."
+    return "Correct that line or remove it."
+
+
+def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:
+    """Point to the column that was probably meant."""
+    stem = quantity.stem.lower()
+    for column in columns:
+        plain = column.lower()
+        if plain == quantity.column.lower():
+            return f"Names are case-sensitive: rename {column} to {quantity.column}."
+        if plain == stem or re.match(rf"{re.escape(stem)}\W", plain):
+            return f"Rename {shown(column)} to {quantity.column}, if that is its unit."
+        if plain.startswith(stem + "_"):
+            return (
+                f"{shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
+                "or put another unit after the underscore."
+            )
+    near = difflib.get_close_matches(quantity.column, list(columns), 1)
+    if near:
+        return f"Is {shown(near[0])} meant? Then rename it."
+    return "Add it, or rename the column that holds it."
+
+
+def shown(cell: str) -> str:
+    """Return a cell as it can be printed: short and without control characters."""
+    plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cell.strip())
+    return (plain[:40] + "…" if len(plain) > 40 else plain) or "nothing"

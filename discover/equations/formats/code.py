@@ -1,0 +1,385 @@
+"""Laws as Python text that needs nothing of this package: with numpy, or with SymPy.
+
+The text is put together from tables and from `repr` of numbers; no name of a file or study reaches
+it except in comments. Matrices of numpy and of SymPy share ``@`` and ``trace()``, so that one table
+serves both; UFL, in a file of its own, changes a few entries of it.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from discover.equations.equation import Equation
+from discover.equations.formats.latex_file import header_lines
+from discover.equations.formats.structure_code import NOTHING, stepped, structure_fields
+from tensor_library.notation import Notation, printed
+from tensor_library.terms import parse_term
+
+
+class CodeNotation(Notation[str]):
+    """numpy, and what the other texts in Python share with it."""
+
+    def tensor(self, name: str) -> str:
+        """Return the variable that holds the tensor."""
+        return {"I": "unit", "sigma": "s", "gammadot": "d"}[name]
+
+    def contraction(self, tensors: Sequence[str]) -> str:
+        """Return the matrix product."""
+        return " @ ".join(tensors)
+
+    def sum(self, summands: Sequence[str]) -> str:
+        """Return the bracketed sum."""
+        return f"({' + '.join(summands)})"
+
+    def trace(self, tensor: str) -> str:
+        """Return a call of the method of matrices."""
+        return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
+
+    def power(self, scalar: str, exponent: int) -> str:
+        """Return the power."""
+        return f"{scalar} ** {exponent}"
+
+    def number(self, value: float) -> str:
+        """Return all digits of a number, bracketed if negative."""
+        return f"({float(value)!r})" if value < 0 else repr(float(value))
+
+    def letter(self, name: str) -> str:
+        """Refuse: every term of an equation has its numbers."""
+        raise ValueError(f"Code needs a number for {name}.")
+
+    def exponential(self, rate: str, trace: str) -> str:
+        """Return exp − 1 with the cap of the library: beyond it a law is absurd, not infinite."""
+        return f"np.expm1(min({rate} * {trace}, 60.0))"
+
+    def saturating(self, level: str, trace: str) -> str:
+        """Return the bracketed fraction."""
+        return f"({trace} / (1 + {level} * abs({trace})))"
+
+    def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
+        """Return the expression as SymPy prints it."""
+        text, _ = printed(expression, letters, self._text)
+        return f"({text})" if factor else text
+
+    def product(self, factors: Sequence[str]) -> str:
+        """Return the product."""
+        return " * ".join(factors)
+
+    def _text(self, expression: Any) -> str:
+        from sympy.printing.numpy import NumPyPrinter
+
+        class Printer(NumPyPrinter):
+            def _print_Max(self, expr: Any) -> str:  # of numbers, not of arrays
+                return f"max({', '.join(map(self._print, expr.args))})"
+
+        return str(Printer().doprint(expression)).replace("numpy.", "np.")
+
+
+class _SympyCodeNotation(CodeNotation):
+    def exponential(self, rate: str, trace: str) -> str:
+        return f"(sympy.exp({rate} * {trace}) - 1)"
+
+    def saturating(self, level: str, trace: str) -> str:
+        return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
+
+    def _text(self, expression: Any) -> str:
+        from sympy.printing.pycode import SymPyPrinter
+
+        class Printer(SymPyPrinter):
+            def _print_Max(self, expr: Any) -> str:
+                return f"sympy.Max({', '.join(map(self._print, expr.args))})"
+
+        return re.sub(r"sympy\.functions(\.\w+)+\.", "sympy.", str(Printer().doprint(expression)))
+
+
+_NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.
+
+{header}
+
+For every mode k, with s = stress_k / G_k, L = lambda_k * velocity_gradient and d = L + L^T,
+
+    lambda_k / G_k * d(stress_k)/dt = d + L s + s L^T{relaxation} - h(s, d)
+
+velocity_gradient[i, j] is the derivative of v_i by x_j; simple shear has only [0, 1] = rate.
+N1 = stress[0, 0] - stress[1, 1], N2 = stress[1, 1] - stress[2, 2].
+"""
+
+import numpy as np
+
+MODULUS_PA = np.array({modulus})
+RELAXATION_TIME_S = np.array({time})
+SOLVENT_VISCOSITY_PA_S = {solvent}
+TESTED = {tested}
+{constants}{structure}
+
+def extra_term(s, d{mode}{also}):
+    """Return h, dimensionless, shape (3, 3), of scaled stress s and scaled rate d."""
+    unit = np.eye(3)
+{where}    return {extra}
+
+{variables_rate}
+def stress_rate(stress, velocity_gradient{also}{structured}):
+    """Return d(stress)/dt of every mode in Pa/s, shape (modes, 3, 3).
+
+    stress: of every mode in Pa, shape (modes, 3, 3); zero at rest.
+    velocity_gradient: in 1/s, shape (3, 3).{of_variables}{structure_of}
+    """
+    rate = np.empty_like(stress)
+    for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times})):
+        s, gradient = stress[k] / modulus, time * velocity_gradient
+        d = gradient + gradient.T
+        change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode}{also_k})
+        rate[k] = modulus / time * change
+    return rate
+
+
+def total_stress(stress, velocity_gradient{structured}):
+    """Return the extra stress in Pa, shape (3, 3): all modes and the solvent."""
+    return {total}
+
+
+def simulate_shear(shear_rate, times, step=0.02):
+    """Return shear stress, N1 and N2 in Pa at times in s, each of their shape.
+
+    shear_rate: function of time in s, in 1/s. times: increasing from 0, where the fluid is at rest.
+    step: of the fourth-order Runge-Kutta method, in units of the shortest relaxation time or of
+    the time of unit strain. Modes much shorter than the flow need many steps.
+    """
+
+    def gradient(t):
+        g = np.zeros((3, 3))
+        g[0, 1] = shear_rate(t)
+        return g
+
+    def change(t, state):
+        stress = state[:, :9].reshape(-1, 3, 3){taken}
+        return {change}
+
+    def components(t, state):
+        total = total_stress(state[:, :9].reshape(-1, 3, 3), gradient(t){last})
+        return total[0, 1], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]
+
+    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size})){begun}
+    rows = [components(t, state)]
+    for end in times[1:]:
+        fastest = max({fastest}, abs(shear_rate(t)), abs(shear_rate(end)))
+        n = max(1, int(np.ceil((end - t) * fastest / step)))
+        h = (end - t) / n
+        for _ in range(n):
+            k1 = change(t, state)
+            k2 = change(t + 0.5 * h, state + 0.5 * h * k1)
+            k3 = change(t + 0.5 * h, state + 0.5 * h * k2)
+            k4 = change(t + h, state + h * k3)
+            state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            t += h
+        t = float(end)
+        rows.append(components(t, state))
+    return tuple(np.array(rows).T)
+'''
+
+_SYMPY_TEMPLATE = '''"""Constitutive law in SymPy, written by discover. Needs sympy only.
+
+{header}
+
+`extra_term` is h, 3 by 3, in the components of the scaled stress s = stress_k / G_k and of the
+scaled rate d = L + L^T with L = lambda_k * velocity_gradient. `stress_rate` is ds/dt with time in
+lambda_k. Every mode obeys the same law, but for constants in `values`, where there are some.
+`modes` holds pairs of G_k in Pa and lambda_k in s.
+"""
+
+import sympy
+
+stress_symbols = s11, s12, s13, s22, s23, s33 = sympy.symbols("s11 s12 s13 s22 s23 s33")
+gradient_symbols = sympy.symbols("L11 L12 L13 L21 L22 L23 L31 L32 L33")
+
+s = sympy.Matrix([[s11, s12, s13], [s12, s22, s23], [s13, s23, s33]])
+gradient = sympy.Matrix(3, 3, gradient_symbols)
+d = gradient + gradient.T
+unit = sympy.eye(3)
+
+modes = {modes}
+solvent_viscosity_Pa_s = {solvent}
+tested = {tested}
+{constants}
+{where}extra_term = {extra}
+stress_rate = d + gradient @ s + s @ gradient.T{relaxation} - extra_term
+{variables_rate}{structure}'''
+
+_NUMPY_RATES = '''
+def variables_rate(stress, velocity_gradient, variables{structured}):
+    """Return the rates of change of {names} in 1/s, shape (modes, {count}).
+
+    Parameters as of `stress_rate`.
+    """
+    return np.array([
+        scaled_rates(
+            stress[k] / modulus, time * (velocity_gradient + velocity_gradient.T), k, variables[k]
+        ) / time
+        for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times}))
+    ])
+
+
+def scaled_rates(s, d, mode, variables):
+    """Return the rates of change of {names}, times the relaxation time."""
+    unit = np.eye(3)
+{where}    return np.array([{rates}])
+
+'''
+_SYMPY_RATES = """# of the structure variables, with time in lambda_k; each is 0 at rest
+variables = [{names}]
+variables_rate = [{rates}]
+"""
+
+
+def numpy_code(equation: Equation) -> str:
+    """Return a module with the law as a function of numpy arrays.
+
+    Raises
+    ------
+    InputError
+        If the equation has a named law of which nobody said how it is written.
+    """
+    return filled(
+        _NUMPY_TEMPLATE,
+        equation,
+        CodeNotation(),
+        "np.zeros((3, 3))",
+        rates=_NUMPY_RATES,
+        structure=structure_fields(equation, CodeNotation(), "numpy"),
+    )
+
+
+def sympy_code(equation: Equation) -> str:
+    """Return a module with the law as SymPy expressions in components.
+
+    Raises
+    ------
+    InputError
+        As for `numpy_code`.
+    """
+    named = equation.named
+    constants = ""
+    if named is not None and named.function.constants:
+        letters = [f'"{n}": sympy.Symbol("{n}", real=True)' for n in named.function.constants]
+        constants = (
+            f"constant = {{{', '.join(letters)}}}\n"
+            "# of each mode: stress_rate.subs(values[0])\n"
+            "values = [\n    {constant[n]: v for n, v in one.items()}\n"
+            f"    for one in {_constants(equation)}\n]\n"
+        )
+    for name in () if named is None else named.function.rates:
+        constants += f'{name} = sympy.Symbol("{name}", real=True)\n'
+    return filled(
+        _SYMPY_TEMPLATE,
+        equation,
+        _SympyCodeNotation(),
+        "sympy.zeros(3, 3)",
+        constants,
+        "",
+        _SYMPY_RATES,
+        structure_fields(equation, _SympyCodeNotation(), "sympy"),
+    )
+
+
+_OF_VARIABLES = """
+    variables: {names} of every mode, dimensionless, shape (modes, number); zero at rest."""
+
+
+def filled(
+    template: str,
+    equation: Equation,
+    notation: CodeNotation,
+    nothing: str,
+    constants: str | None = None,
+    indent: str = "    ",
+    rates: str = "",
+    structure: Mapping[str, str] = NOTHING,
+) -> str:
+    """Return a module: a template with the law in a notation.
+
+    Parameters
+    ----------
+    template
+        With the fields below.
+    equation, notation
+        What to write, and how.
+    nothing
+        h where there is none.
+    constants
+        What holds the constants of a named law; by default a list of one table for each mode.
+    indent
+        Of the lines before h.
+    rates
+        A template of what says how structure variables change, for a law that has some.
+    structure
+        Fields of the states of the whole fluid, from `structure_fields`.
+    """
+    named = equation.named
+    pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
+    lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
+    where, table, changing, variables = "", "", "", ()
+    if named is not None:
+        function = named.function
+        variables = tuple(function.rates)
+        letters = {name: f'constant["{name}"]' for name in function.constants}
+        letters |= {name: name for name in (*function.where, *variables)}
+        defined, summands = function.spell(notation, letters)
+        where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
+        lines = summands + lines
+        table = f"CONSTANTS = {_constants(equation)}\n"
+        if indent:
+            given = "".join(f"{indent}{n} = variables[{i}]\n" for i, n in enumerate(variables))
+            where = f"{indent}constant = CONSTANTS[mode]\n" + given + where
+        if variables:
+            changing = rates.format(
+                names=", ".join(variables),
+                count=len(variables),
+                where=where,
+                rates=", ".join(text for _, text in function.spell_rates(notation, letters)),
+                **structure,
+            )
+    return template.format(
+        header="\n".join(header_lines(equation)) or "No record of where it was tested.",
+        relaxation=" - s" if equation.linear_relaxation else "",
+        modulus=_numbers(equation.modulus),
+        time=_numbers(equation.relaxation_time),
+        modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
+        solvent=repr(float(equation.solvent_viscosity)),
+        tested=_tested(equation),
+        constants=table if constants is None else constants,
+        mode=", mode" if variables else ", mode=0" if named else "",
+        of_mode=", k" if named else "",
+        also=", variables" if variables else "",
+        also_k=", variables[k]" if variables else "",
+        of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
+        variables_rate=changing,
+        **structure,
+        **stepped(equation, len(variables)),
+        where=where,
+        extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
+    )
+
+
+def _constants(equation: Equation) -> str:
+    """Return the constants of the named law, one table for each mode."""
+    assert equation.named is not None
+    each = [equation.named.of_mode(k) for k in range(len(equation.modulus))]
+    rows = [", ".join(f'"{n}": {float(v)!r}' for n, v in one.items()) for one in each]
+    return "[" + ", ".join(f"{{{row}}}" for row in rows) + "]"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"
+
+
+def _tested(equation: Equation) -> str:
+    if equation.tested is None:
+        return "None"
+    boxes = {"learned_in": equation.tested.learned_in, "judged_in": equation.tested.judged_in}
+    parts = []
+    for name, box in boxes.items():
+        if box is None:
+            parts.append(f'"{name}": None')
+        else:
+            spans = (f'"Wi": {_numbers(box.weissenberg)}', f'"De": {_numbers(box.deborah)}')
+            parts.append(f'"{name}": {{{", ".join(spans)}}}')
+    return "{" + ", ".join(parts) + "}"

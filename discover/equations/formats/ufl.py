@@ -1,0 +1,108 @@
+"""Laws as UFL, the language of weak forms that FEniCSx reads."""
+
+from typing import Any
+
+from discover.equations.equation import Equation
+from discover.equations.formats.code import CodeNotation, filled
+from discover.equations.formats.structure_code import structure_fields
+
+_TEMPLATE = '''"""Constitutive law in UFL, written by discover. Needs ufl, which comes with FEniCSx.
+
+{header}
+
+For every mode k, with s = stress_k / G_k, L = lambda_k * velocity_gradient and d = L + L^T,
+
+    lambda_k / G_k * D(stress_k)/Dt = d + L s + s L^T{relaxation} - h(s, d)
+
+with D/Dt the material derivative: the weak form of a mode is
+inner(Dt(stress_k) - stress_rate(stress_k, velocity_gradient, k), test) * dx = 0. Tensors are 3 by 3
+in plane flow too (the 33 component of the stress need not vanish), and velocity_gradient[i, j] is
+the derivative of v_i by x_j, as ufl.grad has it; `in_space` fills up that of a plane flow.
+"""
+
+import ufl
+from ufl import dot, exp, max_value, tr
+
+MODULUS_PA = {modulus}
+RELAXATION_TIME_S = {time}
+SOLVENT_VISCOSITY_PA_S = {solvent}
+TESTED = {tested}
+{constants}{structure}
+
+def extra_term(s, d{mode}{also}):
+    """Return h, dimensionless, of scaled stress s and scaled rate d."""
+    unit = ufl.Identity(3)
+{where}    return {extra}
+
+{variables_rate}
+def stress_rate(stress, velocity_gradient, k{also}{structured}):
+    """Return the material derivative of the stress of mode k, from 0, in Pa/s."""
+    modulus, time = MODULUS_PA[k], {time_factor}RELAXATION_TIME_S[k]
+    s, gradient = stress / modulus, time * velocity_gradient
+    d = gradient + gradient.T
+    change = d + dot(gradient, s) + dot(s, gradient.T){relaxation} - extra_term(s, d{of_mode}{also})
+    return modulus / time * change
+
+
+def total_stress(stresses, velocity_gradient{structured}):
+    """Return the extra stress in Pa of the stresses of all modes, a list, and the solvent."""
+    rate = velocity_gradient + velocity_gradient.T
+    return {sum_of_all}
+
+
+def in_space(plane):
+    """Return the 3 by 3 velocity gradient of a plane flow from its 2 by 2 one."""
+    return ufl.as_tensor([[plane[0, 0], plane[0, 1], 0], [plane[1, 0], plane[1, 1], 0], [0, 0, 0]])
+'''
+
+
+_RATES = '''
+def variables_rate(stress, velocity_gradient, mode, variables{structured}):
+    """Return the material derivatives of {names} of a mode in 1/s, a list; each is 0 at rest.
+
+    variables: {names} of this mode, scalar fields of their own.
+    """
+    modulus, time = MODULUS_PA[mode], {time_factor}RELAXATION_TIME_S[mode]
+    s, gradient = stress / modulus, time * velocity_gradient
+    d, unit = gradient + gradient.T, ufl.Identity(3)
+{where}    return [rate / time for rate in [{rates}]]
+
+'''
+
+
+class _UflNotation(CodeNotation):
+    def contraction(self, tensors):
+        first, *others = tensors
+        return f"dot({first}, {self.contraction(others)})" if others else first
+
+    def trace(self, tensor: str) -> str:
+        return f"tr({tensor})"
+
+    def exponential(self, rate: str, trace: str) -> str:
+        return f"(exp({rate} * {trace}) - 1)"
+
+    def _text(self, expression: Any) -> str:
+        from sympy.printing.pycode import PythonCodePrinter
+
+        class Printer(PythonCodePrinter):
+            def _print_Max(self, expr: Any) -> str:
+                first, *others = map(self._print, expr.args)
+                for other in others:
+                    first = f"max_value({first}, {other})"
+                return first
+
+        return str(Printer().doprint(expression)).replace("math.", "ufl.")
+
+
+def ufl_code(equation: Equation) -> str:
+    """Return a module with the law as UFL expressions.
+
+    Raises
+    ------
+    InputError
+        If the equation has a named law of which nobody said how it is written.
+    """
+    nothing = "ufl.as_tensor([[0.0] * 3] * 3)"
+    notation = _UflNotation()
+    fields = structure_fields(equation, notation, "ufl")
+    return filled(_TEMPLATE, equation, notation, nothing, rates=_RATES, structure=fields)

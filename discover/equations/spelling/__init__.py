@@ -1,0 +1,1 @@
+"""Terms spelled as mathematics: LaTeX, MathML, SymPy."""

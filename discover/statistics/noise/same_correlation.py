@@ -1,0 +1,127 @@
+"""Is the noise of several runs correlated alike? A misfit depends on the flow; noise does not.
+
+What a law that is nearly right leaves of one run may pass for noise that is correlated there. But
+the same instrument recorded the other runs, and where its noise is white in them it is no other.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+from scipy.stats import chi2, gamma
+
+from discover.statistics.noise.whiteness import FEWEST_TESTED
+
+_CORRELATIONS = np.linspace(0.0, 0.95, 39)
+_DRAWS = 200
+_PLAIN = 0.05  # probability above which nothing needs to be drawn
+
+
+def same_correlation_probability(
+    rows: Sequence[Float[np.ndarray, " _"]], intervals: Sequence[float]
+) -> float:
+    """Return how probable correlations that differ as much as those of rows are, if all are one.
+
+    Of the likelihoods of first-order correlated noise the product of the largest of each row is
+    held against the largest with one correlation, either from sample to sample or over time,
+    ρ^(interval): whichever suits better   [Wilks 1938, Ann. Math. Stat. 9, 60]. Where it may be
+    small, it is found on the innovations of the rows themselves with signs drawn by lot, so it
+    holds whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma
+    distribution is put through the ratios drawn. Always the same lots are drawn.
+
+    Parameters
+    ----------
+    rows
+        Residuals of each run, in order, in any unit.
+    intervals
+        Time between neighbouring samples of each; not a number of what is recorded otherwise than
+        the other runs, which is left out, as runs of fewer than 24 samples are.
+    """
+    told = [
+        (np.asarray(row, dtype=float), float(interval))
+        for row, interval in zip(rows, intervals, strict=True)
+        if np.isfinite(interval) and len(row) >= FEWEST_TESTED and np.any(row)
+    ]
+    if len(told) < 2:
+        return 1.0
+    each = [row[None] for row, _ in told]
+    powers = np.array([interval for _, interval in told])
+    powers = powers / np.exp(np.mean(np.log(powers)))
+    probability = 1.0
+    for exponents in (np.ones(len(told)), powers):
+        ratio, common = _ratio(each, exponents)
+        own = float(chi2.sf(ratio[0], len(told) - 1))
+        if own <= _PLAIN:
+            own = _by_lot([row for row, _ in told], common[0] ** exponents, exponents, ratio[0])
+        probability = own if exponents is not powers else max(probability, own)
+    return probability
+
+
+def common_likelihood(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
+    """Return the log of the largest likelihood of noise with one first-order correlation.
+
+    Its size each row has of its own; but for a constant.
+
+    Parameters
+    ----------
+    rows
+        Residuals of each run, in order, in any unit.
+    """
+    return float(np.max(sum(_likelihood(row[None], _CORRELATIONS)[0] for row in rows)))
+
+
+def _by_lot(
+    rows: Sequence[np.ndarray], correlations: np.ndarray, exponents: np.ndarray, ratio: float
+) -> float:
+    """Return how often signs drawn by lot give as large a ratio."""
+    generator = np.random.default_rng(0)
+    drawn = []
+    for row, rho in zip(rows, correlations, strict=True):
+        new = row - rho * np.append(0.0, row[:-1])
+        new[0] *= np.sqrt(1.0 - rho**2)
+        signs = generator.choice([-1.0, 1.0], (_DRAWS, len(row))) * new
+        signs[:, 0] /= np.sqrt(1.0 - rho**2)
+        drawn.append(np.asarray(lfilter([1.0], [1.0, -rho], signs)))
+    by_chance, _ = _ratio(drawn, exponents)
+    mean, variance = float(np.mean(by_chance)), float(np.var(by_chance))
+    if variance <= 0.0:
+        return 1.0
+    return float(gamma.sf(ratio, mean**2 / variance, scale=variance / mean))
+
+
+def _ratio(
+    stacks: Sequence[Float[np.ndarray, "draws _"]], exponents: Float[np.ndarray, " runs"]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return twice the logarithm of the ratio of likelihoods of each draw, and the one correlation.
+
+    Parameters
+    ----------
+    stacks
+        For each run any number of sequences; the first of every run belong together.
+    exponents
+        Of the one correlation in each run.
+    """
+    apart, together = 0.0, 0.0
+    for rows, exponent in zip(stacks, exponents, strict=True):
+        apart = apart + np.max(_likelihood(rows, _CORRELATIONS), axis=1)
+        together = together + _likelihood(rows, _CORRELATIONS**exponent)
+    together = np.asarray(together)
+    best = np.argmax(together, axis=1)
+    ratio = 2.0 * (apart - np.take_along_axis(together, best[:, None], axis=1)[:, 0])
+    return np.maximum(ratio, 0.0), _CORRELATIONS[best]
+
+
+def _likelihood(
+    rows: Float[np.ndarray, "draws n"], rho: Float[np.ndarray, " q"]
+) -> Float[np.ndarray, "draws q"]:
+    """Return the logarithm of the likelihood of each row under each correlation, its size fitted.
+
+    Σ (r_t − ρ r_{t−1})² + (1 − ρ²) r_0² of three sums.
+    """
+    n = rows.shape[1]
+    inside = np.sum(rows[:, 1:-1] ** 2, axis=1)
+    ends = rows[:, 0] ** 2 + rows[:, -1] ** 2
+    product = np.sum(rows[:, 1:] * rows[:, :-1], axis=1)
+    squares = (ends + inside)[:, None] - 2.0 * rho * product[:, None] + rho**2 * inside[:, None]
+    return -0.5 * n * np.log(np.maximum(squares, 1e-300) / n) + 0.5 * np.log(1.0 - rho**2)

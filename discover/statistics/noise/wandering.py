@@ -1,0 +1,73 @@
+"""Does a residual wander as a random walk does? What a zero that drifts at random leaves.
+
+A law that is not quite right leaves a smooth misfit, which comes to rest where the stress does. A
+zero that wanders never rests, and its steps are small and independent.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.fft import dct
+
+from discover.statistics.noise.whiteness import FEWEST_TESTED
+
+_SHARES = np.append(0.0, np.geomspace(1e-3, 1e5, 60))  # of the slow part, over the noise's
+_HALF_SWINGS = np.array([1.0, 2.0, 4.0, 8.0])  # of a smooth misfit along a run
+_CLEAR = 2.0
+"""Gain in log likelihood over a smooth misfit from which on a row is said to wander."""
+
+_AFTER_START = 3  # a third of a run, in which a misfit of a start has come to rest
+
+
+def wandering(rows: Sequence[Float[np.ndarray, " _"]]) -> float | None:
+    """Return how far rows wander, root-mean-square at the end of one; None where they do not.
+
+    White noise with a random walk beside it, the same in all rows, is held against white noise
+    with a smooth misfit, whose size each row has of its own, by Whittle's likelihood in the cosine
+    transform: the spectrum of the one is 1/(4 sin²(πk/2n)), that of the other 1/(1 + (k/k₀)⁴)
+    [Whittle 1953, Ark. Mat. 2, 423]. The walk must be likelier by a factor of e² along whole rows
+    and without their first third too, since what a wrong start leaves falls off like a walk.
+
+    Parameters
+    ----------
+    rows
+        Residuals of each run, in order, in a unit in which runs compare.
+    """
+    long = [np.asarray(row, dtype=float) for row in rows if len(row) >= 2 * FEWEST_TESTED]
+    long = [row for row in long if np.any(row)]
+    if not long:
+        return None
+    gain, share = _gain(long)
+    after_start, _ = _gain([row[len(row) // _AFTER_START :] for row in long])
+    if gain < _CLEAR or after_start < 0.5 * _CLEAR:
+        return None
+    level = [np.mean(_power(row) / (1.0 + share * _walk(len(row)))) for row in long]
+    return float(np.sqrt(share * np.mean([n * len(r) for n, r in zip(level, long, strict=True)])))
+
+
+def _gain(rows: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Return how much likelier a walk is than a smooth misfit, and its share, in logarithms."""
+    walk, smooth = 0.0, 0.0
+    for row in rows:
+        power, k = _power(row), np.arange(1, len(row))
+        walk = walk + _likelihood(power, 1.0 + _SHARES[:, None] * _walk(len(row)))
+        slow = 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
+        each = _likelihood(power, 1.0 + _SHARES[:, None, None] * slow)
+        smooth = smooth + np.max(each, axis=0)
+    return float(np.max(walk) - np.max(smooth)), float(_SHARES[int(np.argmax(walk))])
+
+
+def _power(row: np.ndarray) -> np.ndarray:
+    # without the mean: where a walk began is anywhere
+    return np.square(np.asarray(dct(row, type=2, norm="ortho")))[1:]
+
+
+def _walk(n: int) -> np.ndarray:
+    return 0.25 / np.sin(0.5 * np.pi * np.arange(1, n) / n) ** 2
+
+
+def _likelihood(power: np.ndarray, spectra: np.ndarray) -> np.ndarray:
+    """Return the logarithm of the likelihood under each spectrum, its level fitted."""
+    level = np.maximum(np.mean(power / spectra, axis=-1), 1e-300)
+    return -0.5 * len(power) * np.log(level) - 0.5 * np.sum(np.log(spectra), axis=-1)

@@ -1,0 +1,319 @@
+"""Is a residual noise? Tests that hold whatever the noise's size does along a run.
+
+Noise may be white or have one first-order correlation, and may be louder in some stretches than in
+others: in a start-up, or where the stress is large. A stretch counts by its order and not by its
+size, so that a loud one neither hides a pattern nor is one.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.ndimage import median_filter
+from scipy.special import gammaincc, ndtr
+
+from discover.statistics.noise.same_place import same_place_probability
+from discover.statistics.noise.smooth_misfit import LARGEST_CORRELATION, smooth_misfit_probability
+
+LAGS = 12
+"""Neighbours up to which noise is tested for correlation."""
+
+FEWEST_TESTED = 2 * LAGS
+"""Samples of a run from which on that is done; and of all shorter runs, to be tested together."""
+
+FEWEST_FAST = 7
+"""Samples of a run from which on its noise can be told by third differences."""
+
+SIGNIFICANCE = 0.01
+"""Noise is taken for structure this often, at most. To call a misfit noise is the graver mistake,
+and of what noise leaves once in a thousand times nobody would say that it is noise."""
+
+_SAMPLES_PER_LAG = 4
+_NEAREST, _LOTS = 3, 4000
+_TRIED = 10
+_LARGEST = 3.0  # robust standard deviations up to which one innovation counts
+_NEIGHBOURHOOD = FEWEST_TESTED + 1
+_REPEATED = 0.5  # autocorrelation of a record that repeats itself
+_AS_WELL = 0.9
+_FEWEST_CYCLES = 2
+
+
+def noise_probability(
+    residual: Float[np.ndarray, "runs n"],
+    weight: Float[np.ndarray, "runs n"],
+    measured: Float[np.ndarray, "runs n"] | None = None,
+    further: Sequence[float] = (),
+) -> float | None:
+    """Return how probable residuals as structured as these are, if they are noise.
+
+    Under every first-order correlation up to 0.9 the innovations e_t = r_t − ρ r_{t−1} are held
+    against independent ones of any size; the ρ that looks most like noise counts. Of independent
+    symmetric numbers Σ e_t e_{t−k} has mean zero and variance Σ e_t² e_{t−k}², however their size
+    changes   [Lobato, Nankervis & Savin 2001, Int. Econ. Rev. 42, 187]. Seven tests follow:
+
+    - a portmanteau over 12 lags, of all runs together   [after Ljung & Box 1978, Biometrika 65,
+      297], and one run by run, which finds patterns of their own;
+    - the fast part: third differences of noise with correlation ρ have a variance that is known,
+      20 − 30ρ + 12ρ² − 2ρ³ times the noise's, and a smooth residual has less. Of the innovations
+      it is 20 times;
+    - the sum over runs, sample by sample: noise of one run knows nothing of another's;
+    - where a record repeats itself, the product of innovations a whole number of cycles apart;
+    - whether a smooth misfit beside the noise says more than noise alone, which is what a law that
+      is nearly right leaves; see `smooth_misfit_probability`;
+    - single samples that stand out at the same place of several runs; see `same_place_probability`.
+
+    Runs of fewer than 24 samples have one test together: whether neighbours agree in them, see
+    `separate_probability`. The correlation is that of the longer runs; without any, their noise is
+    taken to have none, for so few samples do not tell correlated noise from a misfit.
+
+    The smallest probability counts as often as there are tests. None if all runs together are too
+    short.
+
+    Parameters
+    ----------
+    residual
+        Prediction minus measurement of each run, in any unit, padded.
+    weight
+        Positive where there is a sample.
+    measured
+        The measurement, by which cycles are found; without it they are not looked for.
+    further
+        Probabilities by other tests of the longer runs, which count as these do.
+    """
+    arrays = [residual, weight] if measured is None else [residual, weight, measured]
+    exact = [np.ascontiguousarray(values, dtype=float) for values in arrays]
+    return _remembered(tuple((one.shape, one.tobytes()) for one in exact), tuple(further))
+
+
+@lru_cache(maxsize=32)
+def _remembered(
+    arrays: tuple[tuple[tuple[int, ...], bytes], ...], further: tuple[float, ...]
+) -> float | None:
+    """Return the same; how large a residual may be and what it holds are asked one by one."""
+    residual, weight, *measured = (np.frombuffer(data).reshape(shape) for shape, data in arrays)
+    return _probability(residual, weight, measured[0] if measured else None, further)
+
+
+def _probability(
+    residual: Float[np.ndarray, "runs n"],
+    weight: Float[np.ndarray, "runs n"],
+    measured: Float[np.ndarray, "runs n"] | None,
+    further: Sequence[float],
+) -> float | None:
+    rows, records, short = [], [], []
+    for i, (values, seen) in enumerate(zip(residual, weight, strict=True)):
+        row = np.asarray(values)[np.asarray(seen) > 0]
+        if len(row) >= FEWEST_TESTED and np.any(row):
+            rows.append(row / _spread(row))
+            records.append(None if measured is None else np.asarray(measured[i])[seen > 0])
+        elif len(row) >= FEWEST_FAST and np.any(row):
+            short.append(row)
+    if sum(map(len, short)) < FEWEST_TESTED:
+        short = []  # too few to say anything
+    if not rows:
+        return separate_probability(short) if short else None
+    size = max(len(row) for row in rows)
+    padded = np.array([np.append(row, np.zeros(size - len(row))) for row in rows])
+    count = np.array([len(row) for row in rows])
+    rho = _correlation(padded, count)
+    white = _innovations(padded, count, rho)
+    products, variances = _products(white)
+    tests = [
+        _portmanteau(np.sum(products, axis=0), np.sum(variances, axis=0)),
+        _portmanteau(products, variances),
+        _fast_part(np.sum(products, axis=0), np.sum(variances, axis=0)),
+    ]
+    if len(rows) > 1:
+        tests.append(_alike(padded, count))
+        seen = [np.asarray(w) > 0 for w in weight]
+        tests.append(
+            same_place_probability([r[s] for r, s in zip(residual, seen, strict=True) if any(r[s])])
+        )
+    cycles = [cycle(record) if record is not None else None for record in records]
+    if any(length is not None for length in cycles):
+        tests.append(_repeats(white, count, cycles))
+    tests += [smooth_misfit_probability(rows), *further]
+    if short:
+        tests.append(
+            separate_probability([_differences(r[None], np.array([rho]))[0, 0] for r in short])
+        )
+    return float(min(1.0, len(tests) * min(tests)))
+
+
+def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
+    """Return how probable neighbours that agree as much as these are, if each sample is separate.
+
+    The points of a flow curve or of a sweep are experiments of their own: their noise has no
+    correlation, however smooth what a law leaves of them is, and few points tell it. Products of
+    the nearest neighbours are held against those of the same numbers with signs drawn by lot, so it
+    holds whatever their size does along the series   [Liu 1988, Ann. Stat. 16, 1696]. Always the
+    same lots are drawn.
+
+    Parameters
+    ----------
+    rows
+        Residuals of each series in the order of its rates, in any unit.
+    """
+    generator = np.random.default_rng(0)
+    own, drawn = 0.0, np.zeros(_LOTS)
+    for values in rows:
+        row = values / _spread(values)
+        lots = generator.choice([-1.0, 1.0], (_LOTS, len(row))) * row
+        for lag in range(1, (_NEAREST if len(row) >= FEWEST_TESTED else 1) + 1):
+            own += float(row[lag:] @ row[:-lag])
+            drawn += np.einsum("dt,dt->d", lots[:, lag:], lots[:, :-lag])
+    return float((1 + np.count_nonzero(drawn >= own)) / (1 + _LOTS))
+
+
+def cycle(record: Float[np.ndarray, " n"]) -> float | None:
+    """Return after how many samples a record repeats itself; None if it does not.
+
+    From the first maximum of its autocorrelation after that has lost its sign; evenly sampled
+    oscillations have one.
+    """
+    n = len(record)
+    values = record - np.mean(record)
+    power = float(values @ values)
+    if power == 0.0:
+        return None
+    spectrum = np.abs(np.fft.rfft(values, 2 * n)) ** 2
+    lags = np.arange(n // _FEWEST_CYCLES + 1)
+    # of pairs, not of samples, or a slow cycle would seem to fade
+    correlation = np.fft.irfft(spectrum)[lags] / power * n / (n - lags)
+    lost = np.flatnonzero(correlation < 0.0)
+    if not len(lost):
+        return None
+    after = correlation[lost[0] :]
+    alike = np.flatnonzero(after >= max(_REPEATED, _AS_WELL * float(np.max(after))))
+    if not len(alike):
+        return None
+    # several cycles repeat about as well as one: the first maximum counts
+    best = lost[0] + int(alike[0])
+    while best < lags[-1] and correlation[best + 1] > correlation[best]:
+        best += 1
+    if best == lags[-1]:
+        return None
+    left, top, right = correlation[best - 1 : best + 2]
+    bend = left - 2.0 * top + right
+    return float(best + (0.5 * (left - right) / bend if bend < 0.0 else 0.0))
+
+
+def _spread(values: Float[np.ndarray, " n"]) -> float:
+    """Return a standard deviation that a loud stretch hardly moves."""
+    return 1.4826 * float(np.median(np.abs(values))) or float(np.sqrt(np.mean(values**2))) or 1.0
+
+
+def _local_spread(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return the robust standard deviation in the neighbourhood of each sample."""
+    own = 1.4826 * median_filter(np.abs(values), min(_NEIGHBOURHOOD, len(values)), mode="reflect")
+    return np.maximum(own, 1e-3 * _spread(values))
+
+
+def _innovations(
+    rows: Float[np.ndarray, "runs n"], count: Int[np.ndarray, " runs"], rho: float
+) -> Float[np.ndarray, "runs n"]:
+    """Return what each sample adds to noise with a correlation, limited; zero at padding."""
+    white = _differences(rows, np.array([rho]))[0]
+    for row, n in zip(white, count, strict=True):
+        row[:n] /= _local_spread(row[:n])
+        row[n:] = 0.0
+    return np.clip(white, -_LARGEST, _LARGEST)
+
+
+def _differences(
+    rows: Float[np.ndarray, "runs n"], rho: Float[np.ndarray, " q"]
+) -> Float[np.ndarray, "q runs n"]:
+    """Return r_t − ρ r_{t−1} for several ρ; the first sample has the same variance."""
+    white = np.repeat(rows[None], len(rho), axis=0)
+    white[..., 1:] -= rho[:, None, None] * rows[:, :-1]
+    white[..., 0] *= np.sqrt(1.0 - rho[:, None] ** 2)
+    return white
+
+
+def _products(white: Float[np.ndarray, "*q runs n"]):
+    """Return Σ e_t e_{t−k} of each run at lags 1, 2, … (last axis), and their variances."""
+    square = white**2
+    n_lags = min(LAGS, white.shape[-1] // _SAMPLES_PER_LAG)
+    products, variances = np.empty((2, *white.shape[:-1], n_lags))
+    for k in range(1, n_lags + 1):
+        products[..., k - 1] = np.einsum("...t,...t->...", white[..., k:], white[..., :-k])
+        variances[..., k - 1] = np.einsum("...t,...t->...", square[..., k:], square[..., :-k])
+    return products, np.maximum(variances, 1e-300)
+
+
+def _correlation(rows: Float[np.ndarray, "runs n"], count: Int[np.ndarray, " runs"]) -> float:
+    """Return the first-order correlation under which rows look most like noise."""
+
+    def structure(rho: np.ndarray) -> np.ndarray:
+        white = _differences(rows, rho)
+        for i, n in enumerate(count):
+            spread = 1.4826 * np.median(np.abs(white[:, i, :n]), axis=1)
+            own = np.where(spread > 0.0, spread, np.sqrt(np.mean(white[:, i, :n] ** 2, axis=1)))
+            white[:, i] /= np.where(own > 0.0, own, 1.0)[:, None]
+            white[:, i, n:] = 0.0
+        products, variances = _products(np.clip(white, -_LARGEST, _LARGEST))
+        return np.sum(np.sum(products, axis=1) ** 2 / np.sum(variances, axis=1), axis=1)
+
+    coarse = np.linspace(0.0, LARGEST_CORRELATION, _TRIED)
+    best = coarse[int(np.argmin(structure(coarse)))]
+    fine = best + (coarse[1] - coarse[0]) * np.linspace(-1.0, 1.0, _TRIED)
+    fine = np.clip(fine, 0.0, LARGEST_CORRELATION)
+    return float(fine[int(np.argmin(structure(fine)))])
+
+
+def _chi_square(value: float, freedom: int | float) -> float:
+    return float(gammaincc(0.5 * freedom, 0.5 * value))
+
+
+def _portmanteau(products: np.ndarray, variances: np.ndarray) -> float:
+    # one degree of freedom is the correlation's
+    return _chi_square(float(np.sum(products**2 / variances)), products.size - 1)
+
+
+def _fast_part(products: np.ndarray, variances: np.ndarray) -> float:
+    """Return how probable third differences as small as these are in independent innovations."""
+    missing = np.array([30.0, -12.0, 2.0])  # 20 Σ e² less the squares of third differences
+    deviation = float(np.sqrt(missing**2 @ variances[:3]))
+    return float(ndtr(-(missing @ products[:3]) / deviation))
+
+
+def _alike(rows: Float[np.ndarray, "runs n"], count: Int[np.ndarray, " runs"]) -> float:
+    """Return how probable it is that runs agree, sample by sample, as much as these do.
+
+    Given their sizes, the sum of R symmetric numbers has a square of mean Σ e² and variance
+    2 ((Σ e²)² − Σ e⁴); the sum over samples is taken for a gamma variable of that mean and
+    variance. Their correlation is that of what the runs do not share.
+    """
+    length = int(np.min(count))
+    shared = np.full(len(rows), length)
+    cut = rows[:, :length]
+    rho = _correlation(cut - np.mean(cut, axis=0), shared)
+    white = _innovations(cut, shared, rho)
+    square = np.sum(white**2, axis=0)
+    told = square > 0.0
+    if not np.any(told):
+        return 1.0
+    agreement = np.sum(white[:, told], axis=0) ** 2 / square[told]
+    spread = 2.0 * (1.0 - np.sum(white[:, told] ** 4, axis=0) / square[told] ** 2)
+    mean, variance = float(np.count_nonzero(told)), max(float(np.sum(spread)), 1e-12)
+    scale = 0.5 * variance / mean
+    return _chi_square(float(np.sum(agreement)) / scale, mean / scale)
+
+
+def _repeats(
+    white: Float[np.ndarray, "runs n"],
+    count: Int[np.ndarray, " runs"],
+    cycles: Sequence[float | None],
+) -> float:
+    """Return how probable innovations are that repeat after whole cycles as much as these do."""
+    product, variance = 0.0, 0.0
+    for row, n, length in zip(white, count, cycles, strict=True):
+        if length is None or length <= LAGS:
+            continue  # neighbours are tested already
+        for turns in range(1, int((n - 2) / length) + 1):
+            whole = round(turns * length)
+            for lag in (whole - 1, whole, whole + 1):
+                product += float(row[lag:n] @ row[: n - lag])
+                variance += float(row[lag:n] ** 2 @ row[: n - lag] ** 2)
+    return float(ndtr(-product / np.sqrt(variance))) if variance > 0.0 else 1.0

@@ -1,0 +1,1 @@
+"""What faults of reading leave in residuals."""
