@@ -94,7 +94,7 @@ def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
     law = FreeParameter("q", 5.0, 1.0, 100.0)
     places = np.array([0.0, -1.0, -2.0])
     # link 25 s² at the mean's −3
-    nothing = np.zeros((0, 0, 0))
+    nothing = np.zeros((1, 1, 1))
     fit = Fit(np.array([5.0, 0.0, 25.0, 0.0, 0.0, 0.0]), (), nothing[0], nothing)
     constant = VaryingConstant(law, 0, 1, places)
     values = constant.of_modes(fit)
