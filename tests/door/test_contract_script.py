@@ -140,6 +140,7 @@ def test_an_estimator_from_a_file_is_compared_with_its_runs_at_hand(after):
         (lambda s: dc.close_loop(s["train"], s["base"], free=["alpha"]), "cannot be fitted"),
     ],
 )
+@pytest.mark.usefixtures("as_users_run_it")
 def test_what_cannot_be_compared_is_refused(after, call, message):
     with pytest.raises(dc.InputError, match=message):
         call(after)
