@@ -214,8 +214,8 @@ def test_modes_followed_one_by_one_add_up_to_the_fluid_that_scipy_solves():
     model = known_part()
     fluid = Fluid(model.law, model.modulus, model.relaxation_time, solvent_viscosity=7.0)
     flows = flows_of(records(MOBILITIES, (3.0,)), "test")
-    effects = [make_effect("giesekus_mobility")]
-    (band,) = bands_by_mode(exact, effects, {"giesekus_mobility": np.zeros(0)}, fluid, flows).values()
+    effects, inner = [make_effect("giesekus_mobility")], {"giesekus_mobility": np.zeros(0)}
+    (band,) = bands_by_mode(exact, effects, inner, fluid, flows).values()
     truth = normal_stresses(MOBILITIES, 3.0)
     predicted = columns_of(band.chosen)
     for quantity in ("N1", "N2"):
