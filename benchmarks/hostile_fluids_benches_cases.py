@@ -25,6 +25,7 @@ from hostile_fluids_laboratory import each
 from hostile_fluids_mixtures_cases import CASES as MIXTURES_AND_BEFORE
 from hostile_fluids_mixtures_cases import batches
 from hostile_fluids_records import (
+    DAMPED,
     FITTED,
     FLOWS,
     GIESEKUS,
@@ -117,7 +118,8 @@ BENCHES = {
     "repeats": Case("Giesekus, every fitted run twice, loadings that differ by 4 %",
                     Repeated(GIESEKUS), loaded(0.04), **_FLAWED),
     "repeats_k_bkz": Case("K-BKZ, every fitted run twice, loadings that differ by 4 %",
-                          Repeated(KBKZ(0.25, **SCALE)), loaded(0.04), outside=True),
+                          Repeated(KBKZ(0.25, **SCALE)), loaded(0.04), planted=DAMPED,
+                          outside=True),
     "repeats_pom_pom": Case("pom-pom, every fitted run twice, loadings that differ by 4 %",
                             Repeated(POM_POM), loaded(0.04), outside=True),
     "far_rolie": Case("Rolie–Poly of stretch time 0.05, fitted up to 1 1/s, held out 10 1/s",

@@ -33,6 +33,7 @@ from hostile_fluids_materials import (
 )
 from hostile_fluids_records import (
     ALL,
+    DAMPED,
     FEW,
     FITTED,
     GIESEKUS,
@@ -172,7 +173,7 @@ DECLARED = {
 FLUIDS = {
     "saramito": Case("Saramito, a yield stress", recorded(SARAMITO),
                      planted={"yield_stress": {"yield_strain": 0.4}}),
-    "k_bkz": Case("K-BKZ", recorded(KBKZ(0.25, **SCALE)), outside=True),
+    "k_bkz": Case("K-BKZ", recorded(KBKZ(0.25, **SCALE)), planted=DAMPED, outside=True),
     "elastoplastic": Case("Hébraud–Lequeux", recorded(Elastoplastic()), outside=True),
     "elastoplastic_fitted": Case("Hébraud–Lequeux", recorded(Elastoplastic()), outside=True,
                                  model=FITTED),
@@ -239,7 +240,7 @@ SAMPLING = {
     "one_run_pom_pom_held": Case("pom-pom, one start-up fitted", recorded(POM_POM, ONE_HELD),
                                  outside=True),
     "one_run_k_bkz": Case("K-BKZ, one start-up", recorded(KBKZ(0.25, **SCALE), ONE), held_out=(),
-                          outside=True),
+                          planted=DAMPED),
     "one_run_fractional": Case("fractional Maxwell, one start-up, constants fitted",
                                recorded(fractional(), ONE), held_out=(), outside=True,
                                model=FITTED, same_as=("relaxation_mode",)),
@@ -249,12 +250,13 @@ SAMPLING = {
 NONE_HELD = {
     f"{which}_{name}": Case(
         f"{material.truth}, {which} runs, none held out", recorded(material.fluid, flows),
-        outside=True, same_as=material.same_as, held_out=(),
+        outside=True, same_as=material.same_as,
+        planted=material.planted, held_out=(),
     )
     for which, flows in (("three", ALL), ("two", TWO))
     for name, material in {
         "pom_pom": _Strange("pom-pom", POM_POM),
-        "k_bkz": _Strange("K-BKZ", KBKZ(0.25, **SCALE)),
+        "k_bkz": _Strange("K-BKZ", KBKZ(0.25, **SCALE), planted=DAMPED),
         "elastoplastic": _Strange("Hébraud–Lequeux", Elastoplastic()),
         "white_metzner": _Strange("White–Metzner", WhiteMetzner(0.5, **SCALE)),
         "heated": _Strange("Maxwell that warms", Heated(), ("viscous_heating",)),
@@ -267,7 +269,7 @@ TESTS = {
     "alternation_pom_pom": Case("pom-pom in steady alternation, at a phase", alternating(POM_POM),
                                 outside=True),
     "alternation_k_bkz": Case("K-BKZ in steady alternation", alternating(KBKZ(0.25, **SCALE)),
-                              outside=True),
+                              planted=DAMPED, outside=True),
     "alternation_saramito": Case("Saramito in steady alternation", alternating(SARAMITO),
                                  planted={"yield_stress": {"yield_strain": 0.4}}),
     "creep_pom_pom": Case("pom-pom in creep", creeping(POM_POM), outside=True, **_CREEP),
@@ -284,8 +286,8 @@ TESTS = {
     "curve_white_metzner": Case("White–Metzner, a flow curve",
                                 only("held.csv", WhiteMetzner(0.5, **SCALE)), outside=True,
                                 tables=curve(WhiteMetzner(0.5, **SCALE))),
-    "curve_k_bkz": Case("K-BKZ, a flow curve", only("held.csv", KBKZ(0.25, **SCALE)), outside=True,
-                        tables=curve(KBKZ(0.25, **SCALE))),
+    "curve_k_bkz": Case("K-BKZ, a flow curve", only("held.csv", KBKZ(0.25, **SCALE)),
+                        tables=curve(KBKZ(0.25, **SCALE)), planted=DAMPED),
 }  # fmt: skip
 
 _RATES = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.0}
@@ -330,9 +332,9 @@ LABORATORY = {
                        tables=sweep_of((60.0, 60.0), (1.0, 0.2)), model=TOLD_BY_SWEEP, outside=True,
                        same_as=("giesekus_mobility", "ptt_linear")),
     "few_log_k_bkz": Case("K-BKZ, 15 samples a run, evenly in log t",
-                          recorded(KBKZ(0.25, **SCALE), _FEW_LOG), outside=True),
+                          recorded(KBKZ(0.25, **SCALE), _FEW_LOG), planted=DAMPED),
     "short_k_bkz": Case("K-BKZ, start-ups that end at a strain of 1.2",
-                        recorded(KBKZ(0.25, **SCALE), to_strain(1.2, _RATES)), outside=True),
+                        recorded(KBKZ(0.25, **SCALE), to_strain(1.2, _RATES)), planted=DAMPED),
     "low_ptt": Case("linear PTT, Wi up to 0.2, none held out",
                     recorded(PhanThienTanner(0.3, "linear", **SCALE), _LOW), held_out=(),
                     planted={"ptt_linear": {"epsilon": 0.3}}),

@@ -36,6 +36,7 @@ from hostile_fluids_exports import of_stress, on_instruments
 from hostile_fluids_laboratory import each
 from hostile_fluids_mixtures_cases import batches
 from hostile_fluids_records import (
+    DAMPED,
     FITTED,
     GIESEKUS,
     KNOWN,
@@ -71,7 +72,7 @@ EVALUATORS = {
                       digitised(GIESEKUS), read_by_hand(0.02), **_FLAWED),
     "digitised_k_bkz": Case("K-BKZ, read from a plot by hand",
                             recorded(KBKZ(0.25, **SCALE), LOGARITHMIC), read_by_hand(0.02),
-                            outside=True),
+                            planted=DAMPED, outside=True),
     "slip_of_one": Case("Giesekus, the fast run slips, 1.5e-3 1/(Pa s)",
                         on_instruments({"fast.csv": {"slip": 1.5e-3}}), **_FLAWED),
     "first_area": Case("linear PTT in extension, force over the first area",

@@ -12,6 +12,7 @@ from hostile_fluids_evaluators_cases import CASES as EVALUATORS_AND_BEFORE
 from hostile_fluids_laboratory import PlatePlate, each, warmed
 from hostile_fluids_materials import white
 from hostile_fluids_records import (
+    DAMPED,
     FITTED,
     FLOWS,
     GIESEKUS,
@@ -171,7 +172,7 @@ _LATE = ("transducer_lag", "time_delay", "rate_rise_time")
 
 FOLDERS = {
     "relaxation_k_bkz": Case("K-BKZ, relaxation after steps of strain alone", relaxing(_KBKZ),
-                             outside=True),
+                             planted=DAMPED),
     "relaxation_rolie_poly": Case("stretching Rolie–Poly, relaxation after steps of strain alone",
                                   relaxing(_ROLIE), **_RELEASE),
     "relaxation_pom_pom": Case("pom-pom, relaxation alone, modulus and time fitted",
@@ -199,7 +200,7 @@ FOLDERS = {
     ),
     "sweep_rolie_poly": Case("stretching Rolie–Poly, an amplitude sweep, a start-up held out",
                              only("held.csv", _ROLIE), tables=swept(_ROLIE), **_RELEASE),
-    "stopped_k_bkz": Case("K-BKZ, cessation alone", stopped(_KBKZ), outside=True),
+    "stopped_k_bkz": Case("K-BKZ, cessation alone", stopped(_KBKZ), planted=DAMPED),
     "stopped_pom_pom": Case("pom-pom, cessation, a start-up held out",
                             stopped(POM_POM, {"held.csv": 1.5}), outside=True),
     "paused_soft_glass": Case("a soft glass, sheared, at rest for 3 s, sheared again",
@@ -228,7 +229,7 @@ FOLDERS = {
                        planted={**MOBILITY, "rate_rise_time": {"tau": 0.02}}, terms=SQUARE,
                        same_as=_LATE),
     "louder_k_bkz": Case("K-BKZ, noise that grows with the stress, 3 % at 60 Pa", recorded(_KBKZ),
-                         growing(0.03, 60.0), outside=True),
+                         growing(0.03, 60.0), planted=DAMPED, outside=True),
     "known_offset": Case("Giesekus, an offset of 5 Pa declared as known that is not there",
                          recorded(GIESEKUS), planted=MOBILITY, terms=SQUARE, outside=True,
                          model={**KNOWN, "effects": {"stress_offset": {"offset": 5.0}}}),

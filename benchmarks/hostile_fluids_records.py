@@ -32,6 +32,8 @@ KNOWN = {"law": "ucm", "modulus_Pa": G, "relaxation_time_s": LAMBDA}
 FITTED = {"law": "ucm", "modulus_Pa": "fit", "relaxation_time_s": "fit"}
 MOBILITY = {"giesekus_mobility": {"alpha": 0.3}}
 SQUARE = {"sigma.sigma": 0.3}
+DAMPED = {"strain_damping": {"n": 0.25}}
+"""Effects of the K-BKZ fluids: all that there is where no flow turns, near it where one does."""
 _GROWTH, _WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 Sampled = dict[str, tuple[Flow, np.ndarray]]
 FLOWS: Sampled = {
@@ -118,6 +120,7 @@ class _Strange:
     truth: str
     fluid: Material
     same_as: tuple[str, ...] = ()
+    planted: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def recorded(material: Material = UCM, flows: Sampled = FLOWS, **faults):

@@ -6,6 +6,7 @@ from hostile_fluids_exports_cases import EXPORTS_AND_BEFORE
 from hostile_fluids_laboratory import each, sweep_of, times_stress, warmed
 from hostile_fluids_materials import white
 from hostile_fluids_records import (
+    DAMPED,
     FITTED,
     FLOWS,
     GIESEKUS,
@@ -112,7 +113,7 @@ SESSIONS = {
                          recorded(GIESEKUS), export=recorded_again("fast.csv", "again.csv"),
                          **_RIGHT),
     "copy_held": Case("K-BKZ, the run held out is one of those fitted",
-                      recorded(KBKZ(0.25, **SCALE)), outside=True,
+                      recorded(KBKZ(0.25, **SCALE)), planted=DAMPED, outside=True,
                       export=copied("fast.csv", "held.csv")),
     "copy_held_pom_pom": Case("pom-pom, one start-up, held out the same",
                               recorded(POM_POM, ONE_HELD), outside=True,

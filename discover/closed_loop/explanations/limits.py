@@ -11,7 +11,7 @@ from discover.forward.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 DAMPING = "strain_damping"
-"""Among the aliases of an effect, that a damping function of the strain does as well."""
+"""An effect, and among the aliases of others, that any damping function of the strain does as well."""
 
 
 def names_of_limits(
@@ -20,7 +20,8 @@ def names_of_limits(
     """Return what effects cannot be told from, by name of the effect.
 
     A structure that builds up in a time that no run lasts is seen to break only: what it does is a
-    damping by strain, and that it ever builds up, which the effect's name says, is not determined.
+    damping by the strain since it was at rest, and that it ever builds up, which the effect's name
+    says, is not determined.
     And in relaxation after steps of strain an effect that only multiplies each run by a number, to
     within what is left, is any damping function that has these values: stress relaxation whose time
     and strain separate tells no mechanism   [Wagner 1976, Rheol. Acta 15, 136].
@@ -33,7 +34,7 @@ def names_of_limits(
         for parameter, at in zip(effect.parameters, model.positions(effect.name), strict=True):
             if parameter.endless and fit.theta[at] >= batch.longest > 0.0:
                 found[effect.name] = parameter.endless
-        if at_rest and isinstance(effect, ConstitutiveEffect):
+        if at_rest and isinstance(effect, ConstitutiveEffect) and effect.name != DAMPING:
             theta, _ = FitProblem(model, batch).without(fit, effect.name)
             if _only_factors(model, batch, fit, theta):
                 found[effect.name] = DAMPING

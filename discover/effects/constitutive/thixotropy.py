@@ -57,7 +57,7 @@ EFFECT = Thixotropy(
             range_source="from the Brownian time 6πηa³/kT of particles of 0.1 µm in water, some "
             "milliseconds, to structures that build up over weeks or never (Mewis & Wagner 2009)",
             ends=("high",),
-            endless="strain_damping",
+            endless="damping_by_total_strain",
         ),
     ),
     equation=(
