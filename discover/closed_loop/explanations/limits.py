@@ -11,7 +11,7 @@ from discover.forward.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 DAMPING = "strain_damping"
-"""An effect, and among the aliases of others, that any damping function of the strain does as well."""
+"""An effect; among the aliases of others, that a damping function of the strain does as well."""
 
 
 def names_of_limits(
