@@ -32,7 +32,7 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import answer
-from hostile_fluids_folders_cases import CASES
+from hostile_fluids_loud_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
 from independent.folders import write_study, write_table

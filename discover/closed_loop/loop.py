@@ -178,8 +178,7 @@ def run_loop(
     side_by_side = Explanations()
     if final.carried:
         side_by_side = explain(
-            final.model, final.batch, final.beside_benches, final.fit, tested,
-            final.held_batch, judgement,
+            search, final.beside_benches, tested, final.held_batch, judgement,
             min((one.criterion for one in verdict.other_times), default=np.inf),
         )  # fmt: skip
     beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)

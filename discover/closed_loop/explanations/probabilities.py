@@ -29,6 +29,7 @@ def explanations_of(
     unlisted: float = np.inf,
     limits_of: Callable[[Carried], Mapping[str, str]] = lambda one: {},
     believed: Callable[[Carried], float] = lambda one: 1.0,
+    most: Sequence[float] = (),
 ) -> Explanations:
     """Return the probabilities of what was carried, twins merged, the likeliest first.
 
@@ -49,14 +50,21 @@ def explanations_of(
     believed
         Share of the probability that a set keeps, of twins the largest; the rest is that of none of
         them.
+    most
+        How probable each set can be at most, if nothing else explains the records; by default 1.
     """
     classes = _classes(carried)
     best = min(unlisted, *(one.criterion for one in carried))
     # a class counts once, however many spellings the library has for it
     weights = np.array([np.exp(-0.5 * (carried[c[0]].criterion - best)) for c in classes])
     none = unexplained_probability(judgement, effective_samples)
-    shares = (1.0 - none) * weights / (np.sum(weights) + np.exp(-0.5 * (unlisted - best)))
-    shares = shares * [max(believed(carried[i]) for i in c) for c in classes]
+    shares = weights / (np.sum(weights) + np.exp(-0.5 * (unlisted - best)))
+    most = most or [1.0] * len(carried)
+    # what else would have passed is counted once, by the test or by the shapes
+    shares = shares * [
+        min((1.0 - none) * max(believed(carried[i]) for i in c), max(most[i] for i in c))
+        for c in classes
+    ]
     none = 1.0 - float(np.sum(shares))
     kinds = {effect.name: effect.kind for effect in model.effects}
     found = []

@@ -9,23 +9,21 @@ from discover.closed_loop.explanations.bands.mixture import mixed_bands
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.nameless_terms import share_of_names
+from discover.closed_loop.explanations.other_shapes import most_believed
 from discover.closed_loop.explanations.probabilities import explanations_of
 from discover.closed_loop.explanations.untested import share_believed
 from discover.closed_loop.judging.before_after import errors_of, record_runs
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.run_record import RunRecord
+from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
-from discover.statistics.residual import summarise
 
 
 def explain(
-    model: AugmentedModel,
-    batch: Batch,
+    search: Search,
     carried: Sequence[Carried],
-    fit: Fit,
     runs: tuple[Sequence[Run], Sequence[Run]],
     held_batch: Batch | None,
     judgement: Judgement,
@@ -35,10 +33,8 @@ def explain(
 
     Parameters
     ----------
-    model, batch
-        The model with all candidates, and the fitted runs as it has them.
-    carried, fit
-        The explanations, and the fit of what the search chose.
+    search, carried
+        The search that has ended, and the explanations.
     runs
         The runs that were fitted, and those held out; or that other searches leave out in turn.
     held_batch
@@ -50,12 +46,13 @@ def explain(
     """
     if judgement.verdict == "no_signal":
         return Explanations()
+    model, batch = search.model, search.batch
     thetas = [one.fit.theta for one in carried]
     records = record_runs(model, batch, runs[0], thetas, held_out=False)
     if held_batch is not None:
         records += record_runs(model, held_batch, runs[1], thetas, held_out=True)
     errors = [errors_of(records, i) for i in range(len(thetas))]
-    effective = summarise(fit.residual, np.asarray(batch.weight)).effective_samples
+    effective = search.problem.independent_samples(search.fit)
 
     def limits_of(one: Carried) -> dict[str, str]:
         return names_of_limits(model, batch, runs[0], one.fit, one.effects)
@@ -64,8 +61,9 @@ def explain(
         tested = share_believed(model, one.fit, one.effects, runs)
         return tested * share_of_names(model, one.effects)
 
+    most = () if judgement.structured else most_believed(search, carried)
     return explanations_of(
-        model, carried, errors, judgement, effective, unlisted, limits_of, believed
+        model, carried, errors, judgement, effective, unlisted, limits_of, believed, most
     )
 
 
