@@ -63,7 +63,7 @@ def left(out: Path) -> None:
         CASES[quiet] = replace(LOUD[name], noise=white(_QUIET))
         run(quiet, "close-loop", out, 0, pages=False)
         found = json.loads((out / quiet / "close-loop" / "loop.json").read_text())
-        errors = [stage["error_after"]["fit"] for stage in found["stages"]]
+        errors = [stage["error"]["fit"] for stage in found["stages"]]
         own = []
         for before, after in pairwise(errors):
             rest = np.sqrt(max(after**2 - _QUIET**2, 0.0))
