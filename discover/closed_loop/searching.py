@@ -11,7 +11,7 @@ from discover.closed_loop.added_mode_apart import (
     start_from,
 )
 from discover.closed_loop.candidates import admission
-from discover.closed_loop.explanations import FACTORS, Carried, search_and_carry
+from discover.closed_loop.explanations import FACTORS, Carried, carry_and_turn
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law, law_beside_effects
@@ -108,7 +108,7 @@ class SearchTask:
             If the declared model, or none of the laws, can be integrated through the fitted runs.
         """
         if self.silent:
-            return self._from(declared, (), self.name)
+            return self._begun(declared, (), self.name)
         first = self._with_law(declared, laws)
         if len(declared.modulus) > 1:
             return self._with_modes_apart(first)
@@ -116,10 +116,9 @@ class SearchTask:
 
     def _with_law(self, declared: DeclaredModel, laws: Sequence[str]) -> SearchResult:
         if not laws:
-            return self._from(declared, (), self.name)
-        first = self._from(
-            *choose_law(declared, laws, self.fitted, self.held_out, self.say), self.name
-        )
+            return self._carried(self._begun(declared, (), self.name))
+        chosen = choose_law(declared, laws, self.fitted, self.held_out, self.say)
+        first = self._carried(self._begun(*chosen, self.name))
         if not first.search.active:
             return first
         other = law_beside_effects(
@@ -127,7 +126,7 @@ class SearchTask:
         )
         if other is None:
             return first
-        again = self._from(*other, f"{self.name}_{other[0].law_name}")
+        again = self._carried(self._begun(*other, f"{self.name}_{other[0].law_name}"))
         return again if _is_likelier(again.search, first.search) else first
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:
@@ -139,9 +138,11 @@ class SearchTask:
             return replace(first, by_mode=found)
         self.say(f"constants that may differ from mode to mode: {', '.join(names)}")
         apart = replace(declared, by_mode=tuple(names))
-        again = self._from(apart, first.laws, f"{self.name}_by_mode")
+        again = self._begun(apart, first.laws, f"{self.name}_by_mode")
         differ = any(one.degree for one in again.search.degrees.values())
-        return again if differ and _is_likelier(again.search, search, INDISTINGUISHABLE) else first
+        better = differ and _is_likelier(again.search, search, INDISTINGUISHABLE)
+        # what else explains the runs is followed only where the search is taken
+        return self._carried(again) if better else first
 
     def _with_added_mode_apart(self, first: SearchResult) -> SearchResult:
         search = first.search
@@ -153,7 +154,8 @@ class SearchTask:
             return replace(first, by_mode=by_mode or {})
         self.say(f"{found.name} may differ from mode to mode, beside {', '.join(found.effects)}")
         name = f"{self.name}_by_mode"
-        again = self._from(found.model.declared, first.laws, name, instead=(search, found))
+        begun = self._begun(found.model.declared, first.laws, name, instead=(search, found))
+        again = self._carried(begun)
         return first if _is_likelier(search, again.search, INDISTINGUISHABLE) else again
 
     def _alike(self, search: Search, names: list[str]) -> dict[str, ConstantByMode] | None:
@@ -177,7 +179,7 @@ class SearchTask:
         degrees = ", ".join(f"{name} of degree {degree}" for name, degree in least.items())
         self.say(f"constants that may differ from mode to mode once more: {degrees}")
         name = f"{self.name}_by_mode_{'_'.join(map(str, least.values()))}"
-        return self._from(before.declared, before.laws, name, least)
+        return self._carried(self._begun(before.declared, before.laws, name, least))
 
     @cached_property
     def _batch(self) -> Batch:
@@ -187,7 +189,12 @@ class SearchTask:
     def _held_batch(self) -> Batch | None:
         return make_batch(self.held_out) if self.held_out else None
 
-    def _from(
+    def _carried(self, begun: SearchResult) -> SearchResult:
+        """Return a search with what else explains the runs."""
+        carried = carry_and_turn(begun.search, self.max_effects, self.width, self.say)
+        return replace(begun, carried=carried)
+
+    def _begun(
         self,
         declared: DeclaredModel,
         laws: tuple[LawFit, ...],
@@ -229,8 +236,8 @@ class SearchTask:
                 find_instrument_effects(search, self.fitted, self.max_effects, self.say)
             else:
                 start_from(search, *instead)
-        carried = search_and_carry(search, self.max_effects, self.width, self.say)
-        return SearchResult(declared, laws, search, carried)
+        search.run(self.max_effects, self.say)
+        return SearchResult(declared, laws, search, [])
 
 
 def _may_differ(search: Search) -> list[str]:

@@ -4,7 +4,7 @@ from discover.closed_loop.explanations.bands.wider_intervals import (
     modes_over_explanations,
     over_explanations,
 )
-from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, search_and_carry
+from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, carry_and_turn
 from discover.closed_loop.explanations.other_benches import FACTORS, OtherBench, other_benches
 from discover.closed_loop.explanations.other_times import weighed_times
 from discover.closed_loop.explanations.proposed_tests import next_tests
@@ -16,12 +16,12 @@ __all__ = [
     "FACTORS",
     "Carried",
     "OtherBench",
+    "carry_and_turn",
     "explain",
     "modes_over_explanations",
     "next_tests",
     "other_benches",
     "over_explanations",
-    "search_and_carry",
     "weighed_times",
     "why_untested",
     "with_band",

@@ -54,14 +54,13 @@ class Carried:
     left_open: Mapping[int, float] = field(default_factory=dict)
 
 
-def search_and_carry(
+def carry_and_turn(
     search: Search, max_effects: int, width: int, say: Callable[[str], None]
 ) -> list[Carried]:
-    """Search, carry what explains as well, and go on from what is far likelier.
+    """Carry what explains as well, and let the search go on from what is far likelier.
 
     Arguments and result as of `carry`.
     """
-    search.run(max_effects, say)
     carried = carry(search, max_effects, width, say)
     for _ in range(_TURNS):
         if not turn_to_likelier(search, carried):
