@@ -65,7 +65,10 @@ def test_worlds_hold_every_law_flaw_protocol_and_noise():
     assert {w.flaw for w in worlds} >= {"sound", *known_flaws(draw), "saturated", "ringing"}
     assert {w.protocol for w in worlds} == {*FLOWS}
     assert {w.noise for w in worlds} == {*NOISES}
-    assert all(not w.inside for w in worlds[1::2])
+    # K-BKZ is damping by strain exactly where no flow turns
+    named = [w for w in worlds[1::2] if w.inside]
+    assert {(w.law, w.protocol) for w in named} == {("K-BKZ", "start-ups")}
+    assert len(named) < 20
     assert sum(w.inside for w in worlds[::2]) > 150
 
 
