@@ -250,8 +250,7 @@ SAMPLING = {
 NONE_HELD = {
     f"{which}_{name}": Case(
         f"{material.truth}, {which} runs, none held out", recorded(material.fluid, flows),
-        outside=True, same_as=material.same_as,
-        planted=material.planted, held_out=(),
+        outside=True, same_as=material.same_as, planted=material.planted, held_out=(),
     )
     for which, flows in (("three", ALL), ("two", TWO))
     for name, material in {

@@ -47,6 +47,7 @@ from independent import (
     step_strain,
     steps,
 )
+from independent.flow import Flow
 from independent.instruments import Instrument
 from independent.material import Material, RateLaw
 
@@ -65,20 +66,26 @@ PAUSED: Sampled = {
 }
 
 
+def _after(material: Material, flow: Flow, begin: float, after: np.ndarray, **cells) -> Record:
+    """Return the record of a flow from a time on, which is its zero."""
+    run = _record(Instrument().record(material, flow, begin + after), **cells)
+    run.columns["time_s"] = after
+    return run
+
+
 def relaxing(material: Material, takes: float = 0.02) -> Maker:
     """Return the maker of relaxations after steps of strain, each put on in a declared time."""
     strains = {"a.csv": 0.5, "b.csv": 1.5, "c.csv": 3.0, "held.csv": 2.0}
     after = np.geomspace(0.02, 6.0, 60)
 
     def make() -> dict[str, Record]:
-        made = {}
-        for name, strain in strains.items():
-            cells = {"step_strain": strain, "step_time_s": takes}
-            flow = step_strain(strain, takes)
-            run = _record(Instrument().record(material, flow, takes + after), **cells)
-            run.columns["time_s"] = after
-            made[name] = run
-        return made
+        return {
+            name: _after(
+                material, step_strain(strain, takes), takes, after,
+                step_strain=strain, step_time_s=takes,
+            )
+            for name, strain in strains.items()
+        }  # fmt: skip
 
     return make
 
@@ -92,13 +99,13 @@ def stopped(material: Material, then: Mapping[str, float] | None = None) -> Make
     after, lasted = np.linspace(0.0, 5.0, 80), 25.0
 
     def make() -> dict[str, Record]:
-        made = {}
-        for name, rate in rates.items():
-            cells = {"start": "steady", "rate_before_1_s": rate}
-            flow = steps([0.0, lasted], [rate, 0.0])
-            run = _record(Instrument().record(material, flow, lasted + after), **cells)
-            run.columns["time_s"] = after
-            made[name] = run
+        made = {
+            name: _after(
+                material, steps([0.0, lasted], [rate, 0.0]), lasted, after,
+                start="steady", rate_before_1_s=rate,
+            )
+            for name, rate in rates.items()
+        }  # fmt: skip
         starts: Sampled = {name: (start_up(rate), _GROWTH) for name, rate in (then or {}).items()}
         return made | recorded(material, starts)()
 

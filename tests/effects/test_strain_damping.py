@@ -5,7 +5,7 @@ import pytest
 from independent import KBKZ, Giesekus, start_up, steps
 
 import discover as dc
-from discover.dataset import Run, load_dataset
+from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.protocols import shear_rates, step_rates
@@ -43,18 +43,15 @@ def test_where_no_flow_turns_damping_by_strain_is_wagners_law(protocol, flow):
     ids=["K-BKZ", "Giesekus"],
 )
 @pytest.mark.usefixtures("effects_alone")
-def test_a_loop_names_damping_by_strain_where_it_is_and_not_elsewhere(tmp_path, material, name):
-    lot = np.random.default_rng(3)
+def test_a_loop_names_damping_by_strain_where_it_is_and_not_elsewhere(material, name):
+    lot, runs = np.random.default_rng(3), []
     for rate in (0.5, 2.0, 4.0):
         stress = material.respond(start_up(rate), TIMES).sigma12
         stress = stress + NOISE * np.max(stress) * lot.standard_normal(len(TIMES))
-        np.savetxt(
-            tmp_path / f"up{rate}.csv", np.column_stack([TIMES, rate + 0.0 * TIMES, stress]),
-            delimiter=",", header="time_s,shear_rate_1_s,stress_Pa", comments="",
-        )  # fmt: skip
-    (tmp_path / "runs.csv").write_text("file\nup0.5.csv\nup2.0.csv\nup4.0.csv\n")
+        rates = np.full(len(TIMES), rate)
+        runs.append(dc.Run(f"at {rate:g}", TIMES, dc.start_up(rate), rates, stress))
     loop = dc.close_loop(
-        load_dataset(tmp_path), dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
+        dc.Dataset("start-ups", tuple(runs)), dc.Fluid(dc.make_law("ucm"), MODULUS, TIME),
         effects=["strain_damping", "giesekus_mobility", "thixotropy"], max_effects=1,
         explanations=1,
     )  # fmt: skip

@@ -34,31 +34,31 @@ def most_believed(search: Search, carried: Sequence[Carried]) -> list[float]:
         What explains the records.
     """
     problem, model = search.problem, search.model
-    starts, free, names = [], [], []
+    starts: dict[tuple[str, ...], np.ndarray] = {}
     for one in carried:
-        for name in one.effects:
-            left = tuple(sorted(set(one.effects) - {name}))
-            if left in names:
-                continue
-            places = list(search.positions(left))
-            theta = model.zero()
-            theta[places] = one.fit.theta[places]
-            names.append(left)
-            starts.append(theta)
-            free.append(tuple(places))
-    if not names:
+        for left in _less_one(one.effects):
+            if left not in starts:
+                places = search.positions(left)
+                starts[left] = model.zero()
+                starts[left][places] = one.fit.theta[places]
+    if not starts:
         return [1.0] * len(carried)
-    fits = problem.fits(starts, free)
+    fits = problem.fits([*starts.values()], [search.positions(left) for left in starts])
     cost = {
         left: problem.cost(fit) if fit.usable else np.inf
-        for left, fit in zip(names, fits, strict=True)
+        for left, fit in zip(starts, fits, strict=True)
     }
     effective = problem.independent_samples(search.fit)
 
     def most(one: Carried) -> float:
         own = max(problem.cost(one.fit), np.finfo(float).tiny)
-        lost = [cost[tuple(sorted(set(one.effects) - {name}))] for name in one.effects]
-        least = effective * max(min(lost, default=np.inf) / own - 1.0, 0.0)
+        without = min((cost[left] for left in _less_one(one.effects)), default=np.inf)
+        least = effective * max(without / own - 1.0, 0.0)
         return 1.0 / (1.0 + float(np.sqrt(_UNSEEN / max(least, _UNSEEN))))
 
     return [most(one) for one in carried]
+
+
+def _less_one(effects: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return a set without each of its effects in turn, in alphabetical order."""
+    return [tuple(sorted(set(effects) - {name})) for name in effects]
