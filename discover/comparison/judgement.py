@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from discover.comparison.beside import Beside, look_beside
 from discover.comparison.fitting.classical import ClassicalFit
 from discover.comparison.fitting.law_by_mode import LawByMode
-from discover.comparison.fitting.named_effects import fit_named_effects
+from discover.comparison.fitting.named_effects import NamedExplanation, fit_named_effects
 from discover.comparison.instrument import Frame
 from discover.comparison.instrument.known import Known
 from discover.comparison.judging.bands.constants_in_bands import (
@@ -19,7 +19,11 @@ from discover.comparison.judging.bands.dense_library import (
     with_gain_in_dense,
     without_refuted_bands,
 )
-from discover.comparison.judging.bands.named_bands import with_named_effects
+from discover.comparison.judging.bands.named_bands import (
+    holding_named_effects,
+    with_named_effects,
+    with_named_told,
+)
 from discover.comparison.judging.bands.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.bands.rates_in_bands import holding_rate_errors
 from discover.comparison.judging.bands.second_normal_stress import with_any_second_normal_stress
@@ -187,15 +191,23 @@ def judge(
     outcomes = with_gain_in_dense(outcomes, tested.others)
     outcomes, refuted = without_refuted_bands(outcomes, flows, expectation, normal)
     behind_instrument = DENSE in frames and bool(known.effects and frames[DENSE].made)
+    named: tuple[NamedExplanation, ...] = ()
     if DENSE in outcomes and not (is_silent or normal or study.compare.quick or behind_instrument):
         say("effects with a name beside the dense library")
         # what a known instrument did is taken out of the data at hand alone
         data = None if known.effects else undated
-        outcomes = _beside_named(outcomes, frames[DENSE], data, flows, expectation)
+        named = _named(frames[DENSE], data, flows, expectation)
+        outcomes = with_named_effects(outcomes, flows, named)
+    if named and explanation.in_library and not frame.made:
+        noise = explanation.lack_of_fit["tensor_sindy"].noise
+        wider = holding_named_effects(tested.bands, flows, named, noise)
+        tested = replace(tested, bands=wider)
     if not normal:
         outcomes = with_any_second_normal_stress(outcomes, flows, explanation)
     bands = frame.bands(tested.bands)
     statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
+    if named and not frame.made:
+        statements = with_named_told(statements, named)
     warnings = [
         *_of_modes(outcomes, explanation, expectation),
         *((of_modes.said,) if of_modes.said else ()),
@@ -217,23 +229,18 @@ def judge(
     )
 
 
-def _beside_named(
-    outcomes: Mapping[str, LearnerOutcome],
-    frame: Frame,
-    data: StudyData | None,
-    flows: Sequence[Flow],
-    expectation: Expectation,
-) -> dict[str, LearnerOutcome]:
-    """Return the outcomes, the dense library's bands beside what explains the runs and has a name.
+def _named(
+    frame: Frame, data: StudyData | None, flows: Sequence[Flow], expectation: Expectation
+) -> tuple[NamedExplanation, ...]:
+    """Return what has a name and explains the runs.
 
     Of a law that does not relax by itself nothing is tried.
     """
     if not frame.model.law.linear_relaxation:
-        return dict(outcomes)
+        return ()
     data = frame.data if data is None else data
     runs = data.fit.runs, data.held_out.runs
-    named = fit_named_effects(frame.model, *runs, flows, expectation)
-    return with_named_effects(outcomes, flows, named)
+    return fit_named_effects(frame.model, *runs, flows, expectation)
 
 
 def _judged(flows: Sequence[Flow]) -> list[Flow]:

@@ -1,4 +1,4 @@
-"""What explains the runs and has a name is in the dense library's band; all records are scipy's."""
+"""What explains the runs and has a name is in the bands of libraries; all records are scipy's."""
 
 from dataclasses import replace
 
@@ -21,12 +21,18 @@ from discover.comparison.judging.bands.dense_library import (
     NAMED_BESIDE,
     without_refuted_bands,
 )
-from discover.comparison.judging.bands.named_bands import with_named_effects
+from discover.comparison.judging.bands.named_bands import (
+    holding_named_effects,
+    with_named_effects,
+    with_named_told,
+)
+from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.effects import make_effect
+from discover.identify.rivals.bands import PredictionBand
 from discover.laws import make_law
 from discover.protocols import start_up
 from discover.statistics import LackOfFit
@@ -185,6 +191,47 @@ def test_what_has_a_name_makes_no_band_where_the_laws_of_the_library_have_none()
     outcomes = with_named_effects({DENSE: none}, [flow], [explanation(flow, exact)])
     assert outcomes[DENSE].bands == {flow.key: None}
     assert outcomes[DENSE].details[NAMED_BESIDE] == []
+
+
+def sparse(flow, curves, half_width=0.01):
+    """A band of the sparse law about these curves, in one flow."""
+    chosen = np.stack([*curves.values()], axis=1)
+    low, high = (chosen + sign * half_width * np.max(chosen, axis=0) for sign in (-1.0, 1.0))
+    return {flow.key: PredictionBand(flow.times, chosen, low, high, low, high, 0.0)}
+
+
+def test_the_sparse_law_s_band_holds_n1_of_what_has_a_name_and_fits_alike():
+    found, flow, exact = explained(Giesekus(0.3), Instrument(lag=0.1))
+    # terms that follow the lag have another N1
+    own = sparse(flow, exact | {"N1": 1.2 * exact["N1"]})
+    wider = holding_named_effects(own, [flow], found, NOISE)[flow.key]
+    low, high = wider.rivals_low[:, 1], wider.rivals_high[:, 1]
+    assert np.mean((low <= exact["N1"]) & (exact["N1"] <= high)) > 0.9
+    # the band of the law's own constants, and what it predicts, stay
+    np.testing.assert_equal(wider.low, own[flow.key].low)
+    np.testing.assert_equal(wider.chosen, own[flow.key].chosen)
+    # and where the same law has the name, the band hardly grows
+    right = sparse(flow, exact, 0.05)
+    same = holding_named_effects(right, [flow], found, NOISE)[flow.key]
+    np.testing.assert_allclose(same.widths()["N1"], right[flow.key].widths()["N1"], rtol=0.05)
+
+
+def test_what_has_a_name_and_misses_the_held_out_record_is_in_no_sparse_band():
+    unseen, exact = recorded(UpperConvectedMaxwell(), UNSEEN, seed=1)
+    flow = as_flow(unseen)
+    wrong = explanation(flow, {q: 1.2 * curve for q, curve in exact.items()})
+    own = sparse(flow, exact)
+    np.testing.assert_equal(holding_named_effects(own, [flow], [wrong], NOISE), own)
+
+
+def test_only_what_is_determined_says_what_its_band_holds_beside():
+    unseen, exact = recorded(UpperConvectedMaxwell(), UNSEEN)
+    told = with_named_told(
+        [Statement("N1", IN_LIBRARY, "Narrow."), Statement("N2", "no", "Open.")],
+        [explanation(as_flow(unseen), exact)],
+    )
+    assert "wall slip" in told[0].text
+    assert told[1].text == "Open."
 
 
 @pytest.mark.parametrize(("pattern", "refuted"), [(0.0, False), (1.0, True)])

@@ -164,8 +164,8 @@ def _predicted(
 
 
 def _followed_by_all(
-    runs: Sequence[Float[np.ndarray, "draws n 3"]], experiment: Experiment
-) -> tuple[list[Float[np.ndarray, "draws n 3"]], Experiment]:
+    runs: Sequence[Float[np.ndarray, "_ n 3"]], experiment: Experiment
+) -> tuple[list[Float[np.ndarray, "_ kept 3"]], Experiment]:
     """Return an experiment as far as every law can be followed.
 
     A law without a steady state, or one that has run away in extension, is no curve to measure.

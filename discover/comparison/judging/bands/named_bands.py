@@ -1,4 +1,4 @@
-"""What explains the runs and has a name takes part in the dense library's band."""
+"""What explains the runs and has a name takes part in the bands of both libraries."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,9 +8,12 @@ from scipy.special import ndtri
 
 from discover.comparison.fitting.named_effects import NamedExplanation
 from discover.comparison.judging.bands.dense_library import DENSE, NAMED_BESIDE
+from discover.comparison.judging.statements import Statement
 from discover.comparison.judging.unseen_runs import misses
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
+from discover.identify.rivals.bands import PredictionBand
+from discover.words import listed
 
 _WITHIN = float(ndtri(0.975))
 """Standard deviations to either side that hold 95 %."""
@@ -45,6 +48,54 @@ def with_named_effects(
         }
     details = {**dense.details, "named_effects": _rows(found), NAMED_BESIDE: beside}
     return {**outcomes, DENSE: replace(dense, bands=bands, details=details)}
+
+
+def holding_named_effects(
+    bands: Mapping[str, PredictionBand],
+    flows: Sequence[Flow],
+    found: Sequence[NamedExplanation],
+    noise: float,
+) -> dict[str, PredictionBand]:
+    """Return bands of the sparse law that hold what explains the runs and has a name as well.
+
+    A law of some terms follows a fluid that the library does not hold, or one behind a flaw, to
+    the noise, and its constants are then known far better than its shape is.
+
+    Parameters
+    ----------
+    bands
+        Of the sparse law and its rivals, by the key of the flow.
+    flows, found
+        As in `with_named_effects`.
+    noise
+        Relative, of the records.
+    """
+    wider = dict(bands)
+    for flow in flows:
+        own, named = wider.get(flow.key), _band(found, flow)
+        if own is None or named is None or misses(named, flow, noise):
+            continue
+        low, high = (np.stack(ends, axis=-1) for ends in zip(*named.values(), strict=True))
+        wider[flow.key] = replace(
+            own,
+            rivals_low=np.minimum(own.rivals_low, low),
+            rivals_high=np.maximum(own.rivals_high, high),
+        )
+    return wider
+
+
+def with_named_told(
+    statements: Sequence[Statement], found: Sequence[NamedExplanation]
+) -> list[Statement]:
+    """Return the statements, those of what is determined with what their bands hold beside."""
+    names = [" with ".join(one.effects).replace("_", " ") for one in found if one.effects]
+    if not names:
+        return list(statements)
+    text = f"The band also holds what has a name and explains the runs: {listed(names)}."
+    return [
+        s if s.undetermined or not s.of_law else replace(s, text=f"{s.text} {text}")
+        for s in statements
+    ]
 
 
 def _band(found: Sequence[NamedExplanation], flow: Flow) -> Limits | None:
