@@ -20,6 +20,9 @@ from discover.simulate.modified_newton import (
 # that is seen: Newton's error goes as its square
 _MOST, _TOLERANCE = 40, 1e-7
 
+# Of a change of the states, what it may add to the misfit of the modes
+_SHARE = 10.0
+
 Levels = tuple[Float[Array, "..."], ...]
 
 
@@ -40,10 +43,11 @@ class Cycle(NamedTuple):
 
 
 class _Iterate(NamedTuple):
-    """An approximation to modes and states, and by how much it changed last."""
+    """An approximation to modes and states, and by how much these and both together moved last."""
 
     modes: Approximation
     levels: Levels
+    moved: Float[Array, ""]
     change: Float[Array, ""]
 
 
@@ -93,22 +97,22 @@ def periodic_start(
 
     def improved(now: _Iterate) -> _Iterate:
         after, levels_after, jacobian, own = with_derivative(now.modes.stress, now.levels)
-        modes, better = next_approximation(now.modes, after, jacobian)
+        # states that moved since put the modes off, which is no step of theirs that led astray
+        modes, better = next_approximation(now.modes, after, jacobian, _SHARE * now.moved)
         levels = tuple(
             before + (end - before) / (1.0 - slope)
             for before, end, slope in zip(now.levels, levels_after, own, strict=True)
         )
-        changes = [
-            relative_change(now.modes, modes, slowness, _TOLERANCE),
-            *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
-        ]
-        largest = jnp.max(jnp.stack(changes))
+        moves = [jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)]
+        moved = jnp.max(jnp.stack([jnp.zeros(()), *moves]))
+        largest = jnp.maximum(moved, relative_change(now.modes, modes, slowness, _TOLERANCE))
         change = jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0)
-        return _Iterate(modes, levels, change)
+        return _Iterate(modes, levels, moved, change)
 
     # the cycles from rest need no derivative
     begun = jax.lax.fori_loop(0, FROM_REST, lambda _, state: after_cycle(*state), rest)
-    start = _Iterate(first_approximation(begun[0], FROM_REST), begun[1], jnp.asarray(jnp.inf))
+    never = jnp.asarray(jnp.inf)
+    start = _Iterate(first_approximation(begun[0], FROM_REST), begun[1], jnp.zeros(()), never)
     end = jax.lax.while_loop(
         lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
         improved,

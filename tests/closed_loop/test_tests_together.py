@@ -50,8 +50,9 @@ def test_a_flow_curve_alone_shows_an_effect_beside_long_records_that_do_not(
     low, high = loop.stages[0].parameters["alpha"].ci95
     assert low < MOBILITY < high
     # a 95 % interval of the flow curve alone is four deviations wide; the start-ups, which tell
-    # nothing, weigh as much and widen it, and so do 0.5 to 2 % by which the curve may be read
-    assert high - low < 10.0 * deviation()
+    # nothing, weigh as much and widen it, and so do 0.5 to 2 % by which rates, stresses and moduli
+    # may be read: 10.6 in all
+    assert high - low < 12.0 * deviation()
 
 
 def deviation() -> float:

@@ -48,7 +48,10 @@ def test_the_loop_tells_what_each_kind_of_test_determined(tmp_path):
     own = told["alpha of giesekus_mobility"]
     alpha = loop.stages[0].parameters["alpha"]
     low, high = alpha.ci95_given_effects
-    assert own.together == pytest.approx(0.5 * (high - low) / alpha.value, rel=1e-3)
+    # the interval holds small faults of reading too, of 0.5 to 2 %, and the table noise alone: of
+    # 1 % in 140 samples, to which each run's σ12 answers by 0.1 to 0.3 of a relative change of α
+    assert own.together < 0.5 * (high - low) / alpha.value
+    assert 2.0 * 0.01 / np.sqrt(140) / 0.3 < own.together < 2.0 * 0.01 / np.sqrt(140) / 0.1
     assert set(own.alone) == {"start-up", "flow curve"}
     # twenty samples beside a hundred and twenty; they weigh as much as sixty, so together can be a
     # little worse than the start-ups alone

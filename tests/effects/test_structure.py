@@ -141,7 +141,6 @@ def alternating(law, cycles=40):
     return within, law.respond(oscillation(*SWING), times).sigma12[1:]
 
 
-@pytest.mark.slow
 def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     name = "thixotropic_relaxation_two_times"
     times, truth = alternating(independent_of(name))
@@ -151,6 +150,24 @@ def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     # of second order in the step, as above; 40 cycles are ten slow build-up times
     found = predicted([run], name, model=ALONE)[0]
     np.testing.assert_allclose(found, truth, atol=5e-3 * np.max(truth))
+
+
+@pytest.mark.parametrize("build_up", [0.1, 10.0, 100.0])
+def test_the_state_in_steady_alternation_is_found_however_slowly_a_structure_builds_up(build_up):
+    name, (amplitude, frequency) = "thixotropic_relaxation_two_times", SWING
+    times = np.linspace(0.0, 2.0 * np.pi / frequency, 33)
+    runs = [
+        Run(f"{more:g}", times, after_alternation(rate, times[-1], times),
+            shear_rates(rate, times), np.ones(33))
+        for more in (0.1, 1.0, 7.0)
+        for rate in [oscillatory_shear(more * amplitude, frequency)]
+    ]  # fmt: skip
+    theta = ALONE.zero()
+    theta[ALONE.positions(name)] = 1.0 / RATE, build_up, SLOWNESS, SHARE
+    found = ALONE.predict(theta, make_batch(runs, strain_step=0.1))
+    # a cycle brings the record back, but for errors of second order in steps that are not the same
+    # in the record as before: 1e-4 was measured
+    np.testing.assert_allclose(found[:, 0], found[:, -1], atol=5e-4 * np.max(found))
 
 
 @pytest.mark.slow
