@@ -240,7 +240,8 @@ def _carrying_over(
 ) -> Ended:
     """Return a search whose constants by mode carry over to the runs held out, or the first.
 
-    One that no more explains the fitted runs is taken for none.
+    One that no more explains the fitted runs is taken for none. What else would explain the runs is
+    followed only in the one that is taken.
     """
 
     def more(before: Ended) -> Ended | None:
@@ -248,6 +249,9 @@ def _carrying_over(
         return None if ended is None else judged(ended)
 
     last = lowest_not_refuted(first, more, lambda one: not one[-1].judgement.carries_over)
+    if last is first or last[-1].judgement.structured:
+        return first
+    last = judged(task.carried(last[0]))
     return first if last[-1].judgement.structured else last
 
 

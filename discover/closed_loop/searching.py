@@ -116,9 +116,9 @@ class SearchTask:
 
     def _with_law(self, declared: DeclaredModel, laws: Sequence[str]) -> SearchResult:
         if not laws:
-            return self._carried(self._begun(declared, (), self.name))
+            return self.carried(self._begun(declared, (), self.name))
         chosen = choose_law(declared, laws, self.fitted, self.held_out, self.say)
-        first = self._carried(self._begun(*chosen, self.name))
+        first = self.carried(self._begun(*chosen, self.name))
         if not first.search.active:
             return first
         other = law_beside_effects(
@@ -126,7 +126,7 @@ class SearchTask:
         )
         if other is None:
             return first
-        again = self._carried(self._begun(*other, f"{self.name}_{other[0].law_name}"))
+        again = self.carried(self._begun(*other, f"{self.name}_{other[0].law_name}"))
         return again if _is_likelier(again.search, first.search) else first
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:
@@ -142,7 +142,7 @@ class SearchTask:
         differ = any(one.degree for one in again.search.degrees.values())
         better = differ and _is_likelier(again.search, search, INDISTINGUISHABLE)
         # what else explains the runs is followed only where the search is taken
-        return self._carried(again) if better else first
+        return self.carried(again) if better else first
 
     def _with_added_mode_apart(self, first: SearchResult) -> SearchResult:
         search = first.search
@@ -155,7 +155,7 @@ class SearchTask:
         self.say(f"{found.name} may differ from mode to mode, beside {', '.join(found.effects)}")
         name = f"{self.name}_by_mode"
         begun = self._begun(found.model.declared, first.laws, name, instead=(search, found))
-        again = self._carried(begun)
+        again = self.carried(begun)
         return first if _is_likelier(search, again.search, INDISTINGUISHABLE) else again
 
     def _alike(self, search: Search, names: list[str]) -> dict[str, ConstantByMode] | None:
@@ -168,6 +168,8 @@ class SearchTask:
     def one_degree_more(self, before: SearchResult) -> SearchResult | None:
         """Search once more with constants by mode of one degree more; None where there is none.
 
+        What else explains the runs is not followed yet (`carried`).
+
         Parameters
         ----------
         before
@@ -179,7 +181,7 @@ class SearchTask:
         degrees = ", ".join(f"{name} of degree {degree}" for name, degree in least.items())
         self.say(f"constants that may differ from mode to mode once more: {degrees}")
         name = f"{self.name}_by_mode_{'_'.join(map(str, least.values()))}"
-        return self._carried(self._begun(before.declared, before.laws, name, least))
+        return self._begun(before.declared, before.laws, name, least)
 
     @cached_property
     def _batch(self) -> Batch:
@@ -189,7 +191,7 @@ class SearchTask:
     def _held_batch(self) -> Batch | None:
         return make_batch(self.held_out) if self.held_out else None
 
-    def _carried(self, begun: SearchResult) -> SearchResult:
+    def carried(self, begun: SearchResult) -> SearchResult:
         """Return a search with what else explains the runs."""
         carried = carry_and_turn(begun.search, self.max_effects, self.width, self.say)
         return replace(begun, carried=carried)
