@@ -230,7 +230,7 @@ def test_only_what_is_determined_says_what_its_band_holds_beside():
         [Statement("N1", IN_LIBRARY, "Narrow."), Statement("N2", "no", "Open.")],
         [explanation(as_flow(unseen), exact)],
     )
-    assert "wall slip" in told[0].text
+    assert "wall_slip" in told[0].text
     assert told[1].text == "Open."
 
 

@@ -88,7 +88,7 @@ def with_named_told(
     statements: Sequence[Statement], found: Sequence[NamedExplanation]
 ) -> list[Statement]:
     """Return the statements, those of what is determined with what their bands hold beside."""
-    names = [" with ".join(one.effects).replace("_", " ") for one in found if one.effects]
+    names = [" + ".join(one.effects) for one in found if one.effects]
     if not names:
         return list(statements)
     text = f"The band also holds what has a name and explains the runs: {listed(names)}."
