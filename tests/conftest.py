@@ -117,6 +117,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
             program.ask_for(xla_backend_optimization_level=1)
 
 
+def pytest_unconfigure() -> None:
+    """Spare pytest's last search for garbage what JAX remembers: it ends with the process."""
+    gc.freeze()
+
+
 def _compiles_soon(config: pytest.Config) -> bool:
     version = importlib.metadata.version("jax").rpartition(".")[0]
     return _leaves_slow_out(config) and version in _KNOWN_TO
