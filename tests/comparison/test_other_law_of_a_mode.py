@@ -14,7 +14,6 @@ from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
 from discover.study.declared_model import DeclaredModel
 
-
 MODULUS, SLOW, FAST = 60.0, 1.0, 0.2
 TIMES = np.linspace(0.1, 8.0, 80)
 TERM = RecoveredTerm("sigma.sigma", 0.3)
