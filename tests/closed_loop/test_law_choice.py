@@ -1,5 +1,8 @@
 """Of several laws the one that made the records is taken, and what cannot be told is said."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from independent.flow import start_up as flow_at
@@ -12,7 +15,10 @@ from independent.thixotropic import Thixotropic
 
 import discover as dc
 from discover.closed_loop import law_choice
+from discover.closed_loop.results.law_fit import LawFit
+from discover.effects import make_effect
 from discover.errors import InputError
+from discover.forward import AugmentedModel, DeclaredModel, data_scales
 from discover.report.loop.verdict import loop_verdict
 
 pytestmark = pytest.mark.usefixtures("effects_alone")
@@ -133,6 +139,31 @@ def found_beside(material, names, effects):
     )
 
 
+def asked_beside_a_structure(material, law, other):
+    """What the laws are said to be once a structure was found beside the first of them."""
+    data = runs(material, (0.5, 2.0, 4.0), seed=2, end=10.0)
+    declared = DeclaredModel.named(law, law_choice.starting_values(law), 100.0, 1.0)
+    model = AugmentedModel(declared, [make_effect("thixotropy")], data_scales(data.runs))
+    theta = model.zero()
+    theta[model.positions("thixotropy")] = [0.2, 4.0]
+    search: Any = SimpleNamespace(
+        model=model, active=["thixotropy"], fit=SimpleNamespace(theta=theta)
+    )
+    tried = [LawFit(law, {}), LawFit(other, {})]
+    return law_choice.law_beside_effects(declared, tried, search, data.runs, (), lambda *_: None)
+
+
+@pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
+def test_a_law_that_stood_for_a_structure_is_asked_again_beside_it():
+    material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
+    declared, lines = asked_beside_a_structure(material, "white_metzner", "ucm")
+    assert declared.law_name == "ucm"
+    assert [one.law for one in lines] == ["ucm", "white_metzner"]
+    # the control: one that is there has none to give way to
+    assert asked_beside_a_structure(Thixotropic(Giesekus(0.3), 0.3, 5.0), "giesekus", "ucm") is None
+
+
+@pytest.mark.slow
 def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
     found = found_beside(material, ("ucm", "white_metzner"), ["thixotropy"])
