@@ -117,6 +117,11 @@ def pytest_collection_finish(session: pytest.Session) -> None:
             program.ask_for(xla_backend_optimization_level=1)
 
 
+def pytest_unconfigure() -> None:
+    """Spare pytest's last search for garbage what JAX remembers: it ends with the process."""
+    gc.freeze()
+
+
 def _compiles_soon(config: pytest.Config) -> bool:
     version = importlib.metadata.version("jax").rpartition(".")[0]
     return _leaves_slow_out(config) and version in _KNOWN_TO
@@ -157,12 +162,21 @@ def optimised():
         yield
 
 
+def _leave_out_other_readings(patch: pytest.MonkeyPatch) -> None:
+    from discover.comparison import judgement
+
+    # each of these is asked on functions and in comparisons of its own (`tests/comparison`)
+    for name in ("hold_against_late_answers", "hold_against_misreading"):
+        patch.setattr(judgement, name, lambda explanation, *_: explanation)
+
+
 def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:
     from discover.comparison import judgement, learning
     from discover.comparison.judging.next_measurement import NextMeasurement
 
     nothing = judgement.Beside((), None, ())
     patch.setattr(judgement, "look_beside", lambda *_: nothing)
+    _leave_out_other_readings(patch)
     patch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
     patch.setattr(learning, "physics_of", lambda *_: {"checks": []})
 
@@ -177,6 +191,12 @@ def verdict_alone(monkeypatch):
 def left_to_the_verdict():
     """Return what does the same as `verdict_alone` to a patch of longer life than a test."""
     return _leave_out_what_stands_beside_a_verdict
+
+
+@pytest.fixture(scope="session")
+def left_to_the_page():
+    """Let a patch leave out whether records were misread, of which a page has a sentence alone."""
+    return _leave_out_other_readings
 
 
 @pytest.fixture(scope="module")

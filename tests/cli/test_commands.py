@@ -315,6 +315,7 @@ def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
     assert read == [tmp_path / "s.toml"]
 
 
+@pytest.mark.slow  # where programs are kept is decided at first use (`tests/door/test_import.py`)
 def test_commands_keep_compiled_programs_in_the_users_cache(tmp_path):
     code = "from discover.cli import main; main()"
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path / "cache")}

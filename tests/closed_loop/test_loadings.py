@@ -65,7 +65,7 @@ def closed(data, **options):
 
 @pytest.fixture(scope="module")
 def loaded(exact):
-    return closed(data_of(exact, FACTORS), loading=0.03)
+    return closed(data_of(exact, FACTORS), loading=0.03, explanations=1)
 
 
 def mobility(loop):

@@ -11,7 +11,7 @@ import discover as dc
 pytestmark = pytest.mark.usefixtures("effects_alone")
 
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
-EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "stress_gain", "stress_offset"]
+EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_offset"]
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
 
 

@@ -41,7 +41,7 @@ def runs_of(scatter, felt, seed):
     return runs
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_noise_of_the_reading_is_told_from_that_of_the_motor(seed):
     said = unfelt_scatter(DECLARED, runs_of(0.03, False, seed))
     assert "scatter by 3" in said or "scatter by 2" in said

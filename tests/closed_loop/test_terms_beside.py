@@ -32,7 +32,7 @@ def test_a_law_outside_the_dictionary_is_not_explained_by_loadings(seed):
         assert "follows terms of the library" not in given.remaining["description"]
 
 
-@pytest.mark.parametrize("seed", [5001, 5002])
+@pytest.mark.parametrize("seed", [5001, pytest.param(5002, marks=pytest.mark.slow)])
 def test_a_law_of_the_dictionary_stays_explained(seed):
     found = closed(Giesekus(0.3, 100.0), seed)
     assert [stage.effect for stage in found.stages] == ["giesekus_mobility"]

@@ -57,7 +57,7 @@ def fitted(modes, correlation, size, seed=0, told=None, rates=RATES):
     return MovedLaw(declared, {}, {}, free), flows
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_second_mode_is_told_from_correlated_noise(seed):
     found = clear_further_mode(*fitted([(60.0, 3.0), (80.0, 0.4)], 0.0, 0.01, seed), Expectation())
     assert found is not None
@@ -67,7 +67,9 @@ def test_a_second_mode_is_told_from_correlated_noise(seed):
 
 
 @pytest.mark.parametrize("correlation", [0.8, 0.95])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
+)
 def test_correlated_noise_of_one_mode_is_no_second_one(correlation, seed):
     runs = fitted([(100.0, 1.0)], correlation, 0.03, seed)
     assert clear_further_mode(*runs, Expectation()) is None
@@ -78,7 +80,7 @@ def test_a_noise_that_is_given_may_hold_a_mode():
     assert clear_further_mode(*runs, Expectation(noise=0.05)) is None
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_small_mode_that_the_spectrum_lacks_is_told_and_none_where_none_is(seed):
     def asked(modes):
         law, flows = fitted(modes, 0.0, 0.01, seed, (100.0, 1.0), (*RATES, WAVE))

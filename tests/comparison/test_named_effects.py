@@ -99,7 +99,12 @@ def holds(limits, exact):
     ("material", "instrument", "names"),
     [
         pytest.param(FenePeterlin(30.0), None, {("finite_extensibility",)}, marks=pytest.mark.slow),
-        (Giesekus(0.3), Instrument(lag=0.1), {("giesekus_mobility", "transducer_lag")}),
+        pytest.param(
+            Giesekus(0.3),
+            Instrument(lag=0.1),
+            {("giesekus_mobility", "transducer_lag")},
+            marks=pytest.mark.slow,
+        ),
         # a lag and a rate that rises late give a Maxwell fluid one σ12, and two N1
         (
             UpperConvectedMaxwell(),

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import inspect
+import os
 import subprocess
 import sys
 
@@ -13,10 +14,12 @@ import discover as dc
 HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "equinox")
 
 
-def python(code, *arguments):
+def python(code, *arguments, **environment):
     """What a fresh process prints."""
+    kept = {name: value for name, value in os.environ.items() if "COMPILATION_CACHE" not in name}
+    command = [sys.executable, "-c", code, *arguments]
     done = subprocess.run(
-        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=300
+        command, capture_output=True, text=True, timeout=300, env={**kept, **environment}
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -25,9 +28,25 @@ def python(code, *arguments):
 def test_importing_loads_nothing_heavy():
     code = f"import discover, sys; print([m for m in {HEAVY} if m in sys.modules])"
     assert python(code).strip() == "[]"
-    # negative control: a name that is used loads what it needs
-    code = f"import discover, sys; discover.Fluid; print([m for m in {HEAVY} if m in sys.modules])"
-    assert "jax" in python(code)
+
+
+def test_what_is_used_first_loads_what_it_needs_keeps_programs_and_lets_no_error_call_back(
+    tmp_path,
+):
+    # the negative control of the test above; equinox reads once, when it is imported, what becomes
+    # of an error inside a program, and diffrax imports it
+    code = f"""
+import sys
+import discover as dc
+dc.synthetic_dataset
+print([m for m in {HEAVY} if m in sys.modules])
+import equinox
+print(equinox._config.EQX_ON_ERROR)
+"""
+    loaded, on_error = python(code, XDG_CACHE_HOME=str(tmp_path)).splitlines()
+    assert "jax" in loaded
+    assert on_error == "nan"
+    assert (tmp_path / "discover" / "compiled").is_dir()
 
 
 def test_importing_takes_less_time_than_importing_numpy():
@@ -101,17 +120,6 @@ import discover as dc
 print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
 """
     assert python(code, str(tmp_path)).split() == ["float64", str(tmp_path)]
-
-
-def test_where_a_simulation_is_used_first_no_error_inside_a_program_calls_back():
-    # equinox reads once, when it is imported, what becomes of an error; diffrax imports it
-    code = """
-import discover as dc
-dc.synthetic_dataset
-import equinox
-print(equinox._config.EQX_ON_ERROR)
-"""
-    assert python(code).strip() == "nan"
 
 
 def test_python_m_discover_is_the_command():

@@ -7,7 +7,7 @@ from discover.dataset import Run
 from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.identify.structure.one_term_more import one_term_more
 from discover.identify.structure.structure import analyse_structure
-from discover.protocols import oscillatory_shear, start_up
+from discover.protocols import start_up
 from tensor_library.library import build_library
 
 ROWS = 200
@@ -39,8 +39,6 @@ def test_a_term_that_cannot_be_seen_beside_the_law_is_judged_elsewhere():
 
 TIMES = np.linspace(0.1, 8.0, 80)
 RUNS = [Run(str(r), TIMES, start_up(r), np.full(80, r), np.ones(80)) for r in (0.5, 2.0)]
-WAVE = oscillatory_shear(2.0, 1.0)
-RUNS.append(Run("wave", TIMES, WAVE, 2.0 * np.cos(TIMES), np.ones(80)))
 
 
 def test_a_law_that_stands_for_another_is_left_more_open_than_a_simple_one():

@@ -94,6 +94,7 @@ def test_a_law_without_twins_in_the_library_lists_none(giesekus):
     assert not any(r["exact"] for r in giesekus.result_.details["rivals"])
 
 
+@pytest.mark.slow
 def test_exponential_ptt_comes_back_with_its_inner_parameter():
     data = small_dataset("ptt_exponential", {"epsilon": 0.4})
     model = TensorSINDy(LIBRARY, **OF_ONE_TERM).fit(data)
@@ -215,7 +216,7 @@ def test_scikit_learn_splits_by_run():
 
 
 def test_refitting_forgets(giesekus):
-    model = clone(giesekus).set_params(**OF_ONE_TERM)
+    model = clone(giesekus).set_params(**ALONE, max_terms=1)
     model.fit(small_dataset("giesekus", {"alpha": 0.2}))
     model.fit(small_dataset("ucm"))
     assert model.terms_ == ()

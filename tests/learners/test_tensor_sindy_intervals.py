@@ -43,7 +43,7 @@ def coverage(correlation, sizes=(1.0,) * N_RUNS):
     return covered / (2 * N_SETS)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.9])
+@pytest.mark.parametrize("correlation", [0.0, pytest.param(0.6, marks=pytest.mark.slow), 0.9])
 def test_intervals_cover_as_often_as_they_claim(correlation):
     # 800 trials at 95 % have a standard deviation of 0.8 %; three of them, and the band
     assert 0.925 <= coverage(correlation) <= 0.98

@@ -55,7 +55,7 @@ def trained(learner, study, model, runs, seed=0, progress=None):
 
 
 @pytest.fixture(scope="module")
-def comparison():
+def comparison(left_to_the_page):
     study = parse_study(
         {
             "data": {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 21}},
@@ -69,6 +69,7 @@ def comparison():
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
+        left_to_the_page(patch)
         # of the five classical laws the page has a row each; what they are is for test_classical
         patch.setattr("discover.comparison.fitting.classical.CLASSICAL", ("ucm", "giesekus"))
         return replace(compare(study), name="<script>alert(1)</script>")

@@ -49,7 +49,8 @@ def in_the_loop(protocols, times=TIMES):
 
 
 @pytest.mark.parametrize(
-    "kind", ["uniaxial", "biaxial", pytest.param("planar", marks=pytest.mark.slow)]
+    "kind",
+    ["uniaxial", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("biaxial", "planar"))],
 )
 def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     protocol = in_flow(start_up(0.6), kind)

@@ -118,15 +118,21 @@ def test_the_exponential_method_converges_at_fourth_order():
     assert np.all(orders < 4.6), f"observed orders {orders}"
 
 
-def test_default_grids_are_accurate_to_1e_6_on_all_flows_of_the_paper():
-    for law, parameters in (("giesekus", {"alpha": 0.8}), ("ptt_exponential", {"epsilon": 0.4})):
-        fluid = Fluid.dimensionless(make_law(law, parameters))
-        flows = list(paper_training_protocols().values()) + list(paper_test_protocols().values())
-        times = np.linspace(0, 20, 41)
-        fast = solve_batch(fluid, lay_out(flows, [times] * len(flows)))
-        for stress, flow in zip(fast, flows, strict=True):
-            exact = simulate(fluid, flow, times, rtol=1e-10, atol=1e-12).components
-            assert float(jnp.max(jnp.abs(stress - exact))) < 5e-6 * np.abs(exact).max()
+@pytest.mark.parametrize(
+    ("law", "parameters"),
+    [
+        pytest.param("giesekus", {"alpha": 0.8}, marks=pytest.mark.slow),
+        ("ptt_exponential", {"epsilon": 0.4}),
+    ],
+)
+def test_default_grids_are_accurate_to_1e_6_on_all_flows_of_the_paper(law, parameters):
+    fluid = Fluid.dimensionless(make_law(law, parameters))
+    flows = list(paper_training_protocols().values()) + list(paper_test_protocols().values())
+    times = np.linspace(0, 20, 41)
+    fast = solve_batch(fluid, lay_out(flows, [times] * len(flows)))
+    for stress, flow in zip(fast, flows, strict=True):
+        exact = simulate(fluid, flow, times, rtol=1e-10, atol=1e-12).components
+        assert float(jnp.max(jnp.abs(stress - exact))) < 5e-6 * np.abs(exact).max()
 
 
 def test_phi_functions_match_their_integrals():

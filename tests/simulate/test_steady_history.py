@@ -12,7 +12,10 @@ BEFORE, AFTER = 20.0, 0.1
 TIMES = np.geomspace(1e-3, 60.0, 60)
 
 
-@pytest.mark.parametrize(("time", "epsilon"), [(0.036, 5.8), (0.014, 8.3), (0.9, 0.5)])
+@pytest.mark.parametrize(
+    ("time", "epsilon"),
+    [pytest.param(0.036, 5.8, marks=pytest.mark.slow), (0.014, 8.3), (0.9, 0.5)],
+)
 def test_the_stress_before_a_step_is_that_of_the_steady_flow(time, epsilon):
     fluid = Fluid(make_law("ptt_linear", {"epsilon": epsilon}), 1.0, time)
     flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))

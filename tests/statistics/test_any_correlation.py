@@ -32,7 +32,14 @@ def probabilities(correlation, sizes=(1.0,) * RUNS, zero=0.0):
 # of 100 draws at one in ten more than 20 come once in 1000 times, and at one in a thousand more
 # than 2. Runs of 80 samples hardly tell a correlation of 0.98 from a random walk
 @pytest.mark.parametrize(
-    ("correlation", "most"), [(0.0, 20), (0.5, 20), (0.9, 20), (0.95, 20), (0.98, 30)]
+    ("correlation", "most"),
+    [
+        (0.0, 20),
+        pytest.param(0.5, 20, marks=pytest.mark.slow),
+        (0.9, 20),
+        pytest.param(0.95, 20, marks=pytest.mark.slow),
+        (0.98, 30),
+    ],
 )
 def test_noise_alone_is_described_as_rarely_as_is_said(correlation, most):
     found = probabilities(correlation)
