@@ -125,11 +125,12 @@ def law_beside_effects(
     fitted: Sequence[Run],
     held_out: Sequence[Run],
     say: Callable[[str], None],
-) -> tuple[DeclaredModel, tuple[LawFit, ...]] | None:
-    """Return the law that the runs ask for beside the effects that were found; None for the same.
+) -> tuple[DeclaredModel | None, tuple[LawFit, ...]]:
+    """Return the law that the runs ask for beside the effects that were found, and all of them.
 
     The first law was chosen while these effects were missing, and may have stood for a part of
-    them: White–Metzner for a structure that flow breaks.
+    them: White–Metzner for a structure that flow breaks. None where it stays; its constants beside
+    the effects are others all the same.
     """
     model = search.model
     found = [
@@ -140,8 +141,24 @@ def law_beside_effects(
     chosen, lines = choose_law(declared, names, fitted, held_out, say, found)
     before = next(one for one in lines if one.law == declared.law_name)
     if before.behind is not None and before.behind <= BARE_MENTION:
-        return None
+        return None, taken_first(lines, declared.law_name)
     return chosen, lines
+
+
+def taken_first(lines: Sequence[LawFit], law: str) -> tuple[LawFit, ...]:
+    """Return laws that were fitted with the one that is taken first, from which others are told."""
+    taken = next(one for one in lines if one.law == law)
+    least = taken.behind or 0.0
+    others = [
+        replace(
+            one,
+            behind=None if one.behind is None else max(one.behind - least, 0.0),
+            is_told_apart=one.is_told_apart and (one.behind is None or one.behind > least),
+        )
+        for one in lines
+        if one is not taken
+    ]
+    return replace(taken, behind=0.0), *others
 
 
 def _contained_first(names: Sequence[str]) -> list[str]:

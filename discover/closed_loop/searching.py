@@ -14,7 +14,7 @@ from discover.closed_loop.candidates import admission
 from discover.closed_loop.explanations import FACTORS, Carried, carry_and_turn
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.closed_loop.law_choice import choose_law, law_beside_effects
+from discover.closed_loop.law_choice import choose_law, law_beside_effects, taken_first
 from discover.closed_loop.modes_apart import modes_apart
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.search import Search
@@ -121,13 +121,16 @@ class SearchTask:
         first = self.carried(self._begun(*chosen, self.name))
         if not first.search.active:
             return first
-        other = law_beside_effects(
+        other, lines = law_beside_effects(
             first.declared, first.laws, first.search, self.fitted, self.held_out, self.say
         )
         if other is None:
-            return first
-        again = self.carried(self._begun(*other, f"{self.name}_{other[0].law_name}"))
-        return again if _is_likelier(again.search, first.search) else first
+            return replace(first, laws=lines)
+        again = self.carried(self._begun(other, lines, f"{self.name}_{other.law_name}"))
+        if _is_likelier(again.search, first.search):
+            return again
+        # what its constants are beside the effects, all the same
+        return replace(first, laws=taken_first(lines, first.declared.law_name))
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:
         declared, search = first.declared, first.search

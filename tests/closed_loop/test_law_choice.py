@@ -159,8 +159,20 @@ def test_a_law_that_stood_for_a_structure_is_asked_again_beside_it():
     declared, lines = asked_beside_a_structure(material, "white_metzner", "ucm")
     assert declared.law_name == "ucm"
     assert [one.law for one in lines] == ["ucm", "white_metzner"]
-    # the control: one that is there has none to give way to
-    assert asked_beside_a_structure(Thixotropic(Giesekus(0.3), 0.3, 5.0), "giesekus", "ucm") is None
+    # the control: one that is there has none to give way to, and stands first
+    material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
+    stays, lines = asked_beside_a_structure(material, "giesekus", "ucm")
+    assert stays is None
+    assert [one.law for one in lines] == ["giesekus", "ucm"]
+
+
+def test_of_laws_about_as_likely_the_one_taken_stands_first_and_is_not_told_from_them():
+    lines = [LawFit("giesekus", {}, behind=0.0), LawFit("ptt_linear", {}, behind=1.5)]
+    lines.append(LawFit("ucm", {}, behind=9.0))
+    taken, likelier, far = law_choice.taken_first(lines, "ptt_linear")
+    assert (taken.law, taken.behind) == ("ptt_linear", 0.0)
+    assert (likelier.law, likelier.behind, likelier.is_told_apart) == ("giesekus", 0.0, False)
+    assert (far.behind, far.is_told_apart) == (7.5, True)
 
 
 @pytest.mark.slow
@@ -183,5 +195,8 @@ def test_control_a_law_that_is_there_stays_beside_an_effect():
     low, high = found.declared_parameters["alpha"].ci95
     assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
     assert f"of 2 laws {best.title}" in loop_verdict(found)[0]
+    # beside the effect, and not as it was chosen without: then 1, the end of its range
+    assert best.parameters["alpha"] == pytest.approx(found.declared_parameters["alpha"].value, 0.05)
+    assert best.at_end == ()
     written = found.to_json()["laws"][0]
     assert (written["law"], written["behind"]) == ("giesekus", 0.0)
