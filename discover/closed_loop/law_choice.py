@@ -130,7 +130,7 @@ def law_beside_effects(
 
     The first law was chosen while these effects were missing, and may have stood for a part of
     them: White–Metzner for a structure that flow breaks. None where it stays; its constants beside
-    the effects are others all the same.
+    the effects are others all the same. The best of the laws stands first.
     """
     model = search.model
     found = [
@@ -141,7 +141,7 @@ def law_beside_effects(
     chosen, lines = choose_law(declared, names, fitted, held_out, say, found)
     before = next(one for one in lines if one.law == declared.law_name)
     if before.behind is not None and before.behind <= BARE_MENTION:
-        return None, taken_first(lines, declared.law_name)
+        return None, lines
     return chosen, lines
 
 

@@ -124,12 +124,11 @@ class SearchTask:
         other, lines = law_beside_effects(
             first.declared, first.laws, first.search, self.fitted, self.held_out, self.say
         )
-        if other is None:
-            return replace(first, laws=lines)
-        again = self.carried(self._begun(other, lines, f"{self.name}_{other.law_name}"))
-        if _is_likelier(again.search, first.search):
-            return again
-        # what its constants are beside the effects, all the same
+        if other is not None:
+            again = self.carried(self._begun(other, lines, f"{self.name}_{other.law_name}"))
+            if _is_likelier(again.search, first.search):
+                return again
+        # the law stays, and its constants are those beside the effects
         return replace(first, laws=taken_first(lines, first.declared.law_name))
 
     def _with_modes_apart(self, first: SearchResult) -> SearchResult:

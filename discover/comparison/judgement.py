@@ -198,16 +198,16 @@ def judge(
         data = None if known.effects else undated
         named = _named(frames[DENSE], data, flows, expectation)
         outcomes = with_named_effects(outcomes, flows, named)
-    if named and explanation.in_library and not frame.made:
+    beside_sparse = named if explanation.in_library and not frame.made else ()
+    if beside_sparse:
         noise = explanation.lack_of_fit["tensor_sindy"].noise
-        wider = holding_named_effects(tested.bands, flows, named, noise)
+        wider = holding_named_effects(tested.bands, flows, beside_sparse, noise)
         tested = replace(tested, bands=wider)
     if not normal:
         outcomes = with_any_second_normal_stress(outcomes, flows, explanation)
     bands = frame.bands(tested.bands)
     statements = _statements(study, known, chosen, frame, outcomes, tested, beside, of_modes)
-    if named and not frame.made:
-        statements = with_named_told(statements, named)
+    statements = with_named_told(statements, beside_sparse)
     warnings = [
         *_of_modes(outcomes, explanation, expectation),
         *((of_modes.said,) if of_modes.said else ()),

@@ -32,8 +32,8 @@ _MOST, _TOLERANCE = 60, 1e-8
 # The same of the modes' steps: Newton's error goes as their square
 _STEP = 1e-6
 
-# Of a change beside the modes, what it may add to their misfit; and bounds of the secant's slope
-_SHARE, _SECANT = 10.0, (0.2, 5.0)
+# Bounds of the secant's slope
+_SECANT = 0.2, 5.0
 
 # ωt at which what needs no steps is looked at: a stress beside the modes, a signal
 PHASE = np.linspace(0.0, np.pi, 161)
@@ -97,8 +97,7 @@ def complex_modulus(
 
     def improved(now: _Iterate) -> _Iterate:
         found, jacobian = _end_with_derivative(half, now.modes.stress, now.levels, now.felt)
-        # what changed beside the modes since may cost its share
-        modes, better = next_approximation(now.modes, found.stress, jacobian, _SHARE * now.moved)
+        modes, better = next_approximation(now.modes, found.stress, jacobian, now.moved)
         return moved_to(now, found, modes, better)
 
     def followed(_, now: _Iterate) -> _Iterate:

@@ -14,6 +14,9 @@ _SHORTER, _EXACT = 0.25, 1e-12
 # Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
 _ROUNDING = 1e-13
 
+# Of a change beside the modes, what it may add to their misfit
+_BESIDE = 10.0
+
 # Five steps in a row that led astray: of sixty laws at six strengths none came round later than
 # that, but for states at the very edge of those that there are
 _HOPELESS = 5e-4
@@ -59,7 +62,7 @@ def next_approximation(
     now: Approximation,
     after: Float[Array, "s k"],
     jacobian: Float[Array, "k s s"],
-    lenience: Float[Array, ""] | float = 0.0,
+    moved: Float[Array, ""] | float = 0.0,
 ) -> tuple[Approximation, Bool[Array, " k"]]:
     """Return the next approximation, and of which modes this one was better than all before.
 
@@ -72,15 +75,15 @@ def next_approximation(
         The modes, and what a cycle makes of them.
     jacobian
         Of that in these, for each mode: direction, component.
-    lenience
-        By how much the misfit may be worse than the best one's, where something beside the modes
-        has changed.
+    moved
+        By how much something beside the modes has changed since, a state or what is felt. It puts
+        the modes off, which is no step of theirs that led astray.
     """
     difference = after - now.stress
     misfit = _size(difference) / (1.0 + _size(now.stress))
     begins = now.number <= FROM_REST
     # never where it is not a number
-    better = (misfit <= now.best_misfit + lenience) | (misfit < _EXACT)
+    better = (misfit <= now.best_misfit + _BESIDE * moved) | (misfit < _EXACT)
     better = better | (begins & jnp.isfinite(misfit))
     matrix = jnp.eye(len(after)) - jnp.swapaxes(jacobian, 1, 2)
     step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T

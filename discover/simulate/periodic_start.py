@@ -20,9 +20,6 @@ from discover.simulate.modified_newton import (
 # that is seen: Newton's error goes as its square
 _MOST, _TOLERANCE = 40, 1e-7
 
-# Of a change of the states, what it may add to the misfit of the modes
-_SHARE = 10.0
-
 Levels = tuple[Float[Array, "..."], ...]
 
 
@@ -97,8 +94,7 @@ def periodic_start(
 
     def improved(now: _Iterate) -> _Iterate:
         after, levels_after, jacobian, own = with_derivative(now.modes.stress, now.levels)
-        # states that moved since put the modes off, which is no step of theirs that led astray
-        modes, better = next_approximation(now.modes, after, jacobian, _SHARE * now.moved)
+        modes, better = next_approximation(now.modes, after, jacobian, now.moved)
         levels = tuple(
             before + (end - before) / (1.0 - slope)
             for before, end, slope in zip(now.levels, levels_after, own, strict=True)

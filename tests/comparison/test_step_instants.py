@@ -12,8 +12,7 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.comparison.fitting.step_instants import with_step_instants
 from discover.study.in_memory import data_in_memory, declared_fluid
-from tensor_library import parse_term
-from tensor_library.library import TermLibrary
+from tensor_library import TermLibrary, parse_term
 
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)

@@ -37,12 +37,12 @@ def with_named_effects(
     noise = max(one.left.noise for one in found)
     bands = dict(dense.bands)
     beside: list[str] = []
-    for flow in flows:
-        own, named = bands.get(flow.key), _band(found, flow)
-        if own is None or named is None or misses(named, flow, noise):
+    for key, named in _not_refuted(found, flows, noise).items():
+        own = bands.get(key)
+        if own is None:
             continue
-        beside.append(flow.key)
-        bands[flow.key] = {
+        beside.append(key)
+        bands[key] = {
             q: (np.minimum(own[q][0], low), np.maximum(own[q][1], high))
             for q, (low, high) in named.items()
         }
@@ -71,16 +71,15 @@ def holding_named_effects(
         Relative, of the records.
     """
     wider = dict(bands)
-    for flow in flows:
-        own, named = wider.get(flow.key), _band(found, flow)
-        if own is None or named is None or misses(named, flow, noise):
-            continue
-        low, high = (np.stack(ends, axis=-1) for ends in zip(*named.values(), strict=True))
-        wider[flow.key] = replace(
-            own,
-            rivals_low=np.minimum(own.rivals_low, low),
-            rivals_high=np.maximum(own.rivals_high, high),
-        )
+    for key, named in _not_refuted(found, flows, noise).items():
+        own = wider.get(key)
+        if own is not None:
+            low, high = (np.stack(ends, axis=-1) for ends in zip(*named.values(), strict=True))
+            wider[key] = replace(
+                own,
+                rivals_low=np.minimum(own.rivals_low, low),
+                rivals_high=np.maximum(own.rivals_high, high),
+            )
     return wider
 
 
@@ -96,6 +95,18 @@ def with_named_told(
         s if s.undetermined or not s.of_law else replace(s, text=f"{s.text} {text}")
         for s in statements
     ]
+
+
+def _not_refuted(
+    found: Sequence[NamedExplanation], flows: Sequence[Flow], noise: float
+) -> dict[str, Limits]:
+    """Return bands of explanations, by the key of the flow, unless a run held out misses them."""
+    bands = {flow.key: (flow, _band(found, flow)) for flow in flows}
+    return {
+        key: band
+        for key, (flow, band) in bands.items()
+        if band is not None and not misses(band, flow, noise)
+    }
 
 
 def _band(found: Sequence[NamedExplanation], flow: Flow) -> Limits | None:
